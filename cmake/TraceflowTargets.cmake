@@ -1,0 +1,53 @@
+# How every target of the project is built, said once: the standard, the warnings, the sanitizers, ccache.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR})
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+find_package(OpenMP REQUIRED COMPONENTS CXX)
+
+add_library(traceflow_settings INTERFACE)
+# -ffp-contract=off: a sum must not change its bytes because a compiler fused it in one build and not in another.
+target_compile_options(traceflow_settings INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion -Wno-sign-conversion -ffp-contract=off -fno-math-errno)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # GCC 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
+  target_compile_options(traceflow_settings INTERFACE -Wno-restrict)
+endif()
+if(TRACEFLOW_WERROR)
+  target_compile_options(traceflow_settings INTERFACE -Werror)
+endif()
+target_compile_definitions(traceflow_settings INTERFACE GLM_FORCE_SILENT_WARNINGS GLM_FORCE_XYZW_ONLY)
+target_include_directories(traceflow_settings INTERFACE ${CMAKE_SOURCE_DIR}/src)
+target_link_libraries(traceflow_settings INTERFACE OpenMP::OpenMP_CXX)
+if(TRACEFLOW_SANITIZE)
+  target_compile_options(traceflow_settings INTERFACE -fsanitize=${TRACEFLOW_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all)
+  target_link_options(traceflow_settings INTERFACE -fsanitize=${TRACEFLOW_SANITIZE})
+endif()
+
+# traceflow_library(ops_raster LINKS base math scene [SYSTEM packages...])
+# One library per folder: all .cpp files beside the CMakeLists.txt. LINKS are the rooms below that it may include; SYSTEM
+# are outside packages. A header of a room that is not linked is still found by the compiler, but its code will not link.
+function(traceflow_library name)
+  cmake_parse_arguments(ARG "" "" "LINKS;SYSTEM" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+  list(TRANSFORM ARG_LINKS PREPEND traceflow_)
+  if(sources)
+    add_library(traceflow_${name} STATIC ${sources})
+    target_link_libraries(traceflow_${name} PUBLIC traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})
+  else()
+    add_library(traceflow_${name} INTERFACE)
+    target_link_libraries(traceflow_${name} INTERFACE traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})
+  endif()
+endfunction()

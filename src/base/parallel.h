@@ -1,0 +1,79 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <mutex>
+#include <vector>
+
+#include "base/profile.h"
+
+namespace traceflow {
+
+// Number of threads that parallel loops use. 0 chooses the machine's cores.
+void set_threads(int count);
+int thread_count();
+
+namespace detail {
+
+// Carries the first exception out of an OpenMP region, which must not be left by one.
+class ExceptionBridge {
+ public:
+  template <class F>
+  void run(F&& f) noexcept {
+    try {
+      f();
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (!first_) first_ = std::current_exception();
+    }
+  }
+  void rethrow() {
+    if (first_) std::rethrow_exception(first_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::exception_ptr first_;
+};
+
+}  // namespace detail
+
+// f(begin, end) over [0, n) in blocks of `grain`, dealt to threads as they come free. Which elements share a block never
+// depends on the number of threads, so a sum kept per block and added in block order has the same bytes at any count.
+template <class F>
+void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
+  if (n <= 0) return;
+  const profile::Scope scope(description);
+  const int64_t blocks = (n + grain - 1) / grain;
+  detail::ExceptionBridge bridge;
+#pragma omp parallel for schedule(dynamic, 1) num_threads(thread_count()) if (blocks > 1)
+  for (int64_t block = 0; block < blocks; ++block) {
+    bridge.run([&] { f(block * grain, std::min(n, (block + 1) * grain)); });
+  }
+  bridge.rethrow();
+}
+
+// f(i) for every i in [0, n): the element-wise steps.
+template <class F>
+void parallel_for(const char* description, int64_t n, F&& f, int64_t grain = 1024) {
+  parallel_blocks(description, n, grain, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) f(i);
+  });
+}
+
+// Sum of f(i) over [0, n) in a fixed order: per block of `grain` first, then over the blocks.
+template <class T, class F>
+T ordered_sum(const char* description, int64_t n, F&& f, int64_t grain = 4096) {
+  std::vector<T> partial(static_cast<size_t>((n + grain - 1) / grain), T{});
+  parallel_blocks(description, n, grain, [&](int64_t begin, int64_t end) {
+    T sum{};
+    for (int64_t i = begin; i < end; ++i) sum += f(i);
+    partial[static_cast<size_t>(begin / grain)] = sum;
+  });
+  T total{};
+  for (const T& p : partial) total += p;
+  return total;
+}
+
+}  // namespace traceflow

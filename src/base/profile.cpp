@@ -1,0 +1,48 @@
+#include "base/profile.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <mutex>
+
+namespace traceflow::profile {
+
+namespace {
+
+std::atomic<bool> enabled{false};
+std::mutex mutex;
+std::vector<Entry> table;
+
+}  // namespace
+
+Scope::Scope(const char* name) : name_(nullptr) {
+  if (!enabled.load(std::memory_order_relaxed) || omp_in_parallel()) return;
+  name_ = name;
+  start_ = std::chrono::steady_clock::now();
+}
+
+Scope::~Scope() {
+  if (!name_) return;
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const std::lock_guard lock(mutex);
+  auto entry = std::find_if(table.begin(), table.end(), [&](const Entry& e) { return e.name == name_; });
+  if (entry == table.end()) entry = table.insert(table.end(), Entry{name_, 0, 0});
+  entry->calls += 1;
+  entry->seconds += seconds;
+}
+
+void enable(bool on) { enabled = on; }
+
+std::vector<Entry> entries() {
+  const std::lock_guard lock(mutex);
+  return table;
+}
+
+void clear() {
+  const std::lock_guard lock(mutex);
+  table.clear();
+}
+
+}  // namespace traceflow::profile

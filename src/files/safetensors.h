@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "base/tensor.h"
+
+namespace traceflow {
+
+// The safetensors format: a JSON header with names, types, shapes and offsets, then the bytes. Types: F32, F64, I32, I64, U8,
+// and for reading also F16 and BF16 (widened to float). Metadata is a map of strings.
+class Safetensors {
+ public:
+  // Throws InputError for a file that is not one or whose header points outside it.
+  static Safetensors read(const std::filesystem::path& path);
+
+  void add(const std::string& name, const Tensor<float>& tensor);
+  void add(const std::string& name, const Tensor<double>& tensor);
+  void add(const std::string& name, const Tensor<int32_t>& tensor);
+  void add(const std::string& name, const Tensor<int64_t>& tensor);
+  void add(const std::string& name, const Tensor<uint8_t>& tensor);
+  // Atomically (base/atomic_file.h). Equal contents give equal bytes.
+  void write(const std::filesystem::path& path) const;
+
+  bool has(const std::string& name) const;
+  std::vector<std::string> names() const;
+  // T is float, double, int32_t, int64_t or uint8_t. Throws InputError naming the file and the tensor when it is missing or has
+  // another type.
+  template <class T>
+  Tensor<T> tensor(const std::string& name) const;
+
+  std::map<std::string, std::string> metadata;
+
+ private:
+  struct Entry {
+    std::string type;
+    Shape shape;
+    std::vector<std::byte> bytes;
+  };
+  std::string origin_ = "safetensors";
+  std::map<std::string, Entry> entries_;
+};
+
+}  // namespace traceflow

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <memory>
+
+#include "base/options.h"
+#include "base/tensor.h"
+#include "math/types.h"
+#include "scene/surfels.h"
+
+// Traces rays through surfels and blends all hits in exact order of distance (method §5).
+// Differentiable: every posed value but tint, ray origins, ray directions.
+namespace traceflow::trace {
+
+struct Options {
+  float t_min = 1e-3F;  // hits nearer than this are ignored; scene units
+  float alpha_min = 1.0F / 255;
+  float alpha_max = 0.99F;
+  float transmittance_min = 1e-4F;
+  int hits_per_pass = 64;  // k: changes speed, never the image
+  Vec3<float> background{0};
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("t_min", t_min, "scene units", "Hits nearer than this are ignored (method §5.2).");
+    v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
+    v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
+    v.field("transmittance_min", transmittance_min, "", "A ray ends before its transmittance falls under this.");
+    v.field("hits_per_pass", hits_per_pass, "hits", "Hits held at a time; changes speed, not the image.");
+  }
+  void validate() const;
+};
+
+template <class T>
+struct BasicOutput {
+  Tensor<T> colour;    // R×3, Σ w c + background · remaining transmittance; c by the ray's direction
+  Tensor<T> alpha;     // R, Σ w
+  Tensor<T> distance;  // R, Σ w t / Σ w in units of the direction's length; 0 where alpha is 0
+};
+using Output = BasicOutput<float>;
+
+// dL/doutput. An empty tensor means zero.
+template <class T>
+struct BasicOutputGradient {
+  Tensor<T> colour, alpha, distance;
+};
+using OutputGradient = BasicOutputGradient<float>;
+
+template <class T>
+struct BasicInputGradient {
+  BasicPosedSurfels<T> surfels;
+  Tensor<T> origins;     // R×3
+  Tensor<T> directions;  // R×3
+  // M, the density-control signal: Σ over hits of |dL/dposition| · t / 2 as EnvGS has it. The reference leaves it empty.
+  Tensor<T> position_gradient;
+};
+using InputGradient = BasicInputGradient<float>;
+
+// A bounding volume hierarchy over the surfels' disks, each out to where its α falls under alpha_min (method §5.1).
+class Bvh;
+struct BvhDeleter {
+  void operator()(Bvh* bvh) const;
+};
+using BvhPtr = std::unique_ptr<Bvh, BvhDeleter>;
+BvhPtr make_bvh();
+// (Re)builds; reuse one object across iterations. Surfels that are not finite, have no area or whose opacity is under
+// alpha_min are left out. The result does not depend on the number of threads.
+void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh);
+
+// The hit lists that forward keeps for backward. Reuse one object across iterations.
+struct Saved;
+struct SavedDeleter {
+  void operator()(Saved* saved) const;
+};
+using SavedPtr = std::unique_ptr<Saved, SavedDeleter>;
+SavedPtr make_saved();
+// How many hits were blended, over all rays.
+int64_t blended_hits(const Saved& saved);
+
+// origins, directions: R×3, world; directions need not have unit length (SH uses the unit one). Rays that are not finite or
+// have a zero direction see the background. `bvh` was built from these surfels. saved may be null.
+void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
+             const Tensor<float>& directions, const Options& options, Output& output, Saved* saved);
+
+// Sets (does not add to) `gradient`. Sums in a fixed order: the same bytes at any thread count.
+void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
+              const Options& options, const Saved& saved, const OutputGradient& grad_output, InputGradient& gradient);
+
+// The plain truth: double precision, every ray against every surfel, sorted.
+void forward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
+                       const Tensor<double>& directions, const Options& options, BasicOutput<double>& output);
+void backward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
+                        const Tensor<double>& directions, const Options& options,
+                        const BasicOutputGradient<double>& grad_output, BasicInputGradient<double>& gradient);
+
+}  // namespace traceflow::trace

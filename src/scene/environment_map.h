@@ -1,0 +1,22 @@
+#pragma once
+
+#include <optional>
+
+#include "base/tensor.h"
+#include "scene/field.h"
+
+namespace traceflow {
+
+// A learnable cube map queried by the reflection direction (method §9), the peer of the environment surfels. The residual
+// field moves the direction with time: d' = normalised(d + F(d, t)), d entering F detached.
+template <class T>
+struct BasicEnvironmentMap {
+  // (6·S)×S×3 logits, faces +x −x +y −y +z −z stacked, each S×S; colour = σ(logit), bilinear within a face.
+  Tensor<T> logit;
+  std::optional<BasicField<T>> field;  // 3 outputs
+
+  int64_t face_size() const { return logit.empty() ? 0 : logit.dim(1); }
+};
+using EnvironmentMap = BasicEnvironmentMap<float>;
+
+}  // namespace traceflow

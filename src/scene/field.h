@@ -1,0 +1,106 @@
+#pragma once
+
+#include <vector>
+
+#include "base/options.h"
+#include "base/random.h"
+#include "base/tensor.h"
+
+namespace traceflow {
+
+// The shape of a residual field's network (method §1.2). Defaults are the paper's.
+struct NetworkOptions {
+  int depth = 8;
+  int width = 256;
+  int skip = 5;
+  int position_frequencies = 10;
+  int time_frequencies = 6;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("depth", depth, "layers", "Linear layers before the heads (method §1.2).");
+    v.field("width", width, "units", "Width of the hidden layers.");
+    v.field("skip", skip, "layer", "Layer (from 0) before which the encoding is concatenated again; 0 for none.");
+    v.field("position_frequencies", position_frequencies, "octaves", "Frequencies of the position's encoding.");
+    v.field("time_frequencies", time_frequencies, "octaves", "Frequencies of the time's encoding.");
+  }
+  void validate() const;
+  // Numbers in the encoding of (x, t): 3·(1 + 2·L_x) + 1 + 2·L_t.
+  int encoding_size() const { return 3 + 6 * position_frequencies + 1 + 2 * time_frequencies; }
+  // Inputs of layer l: the encoding for the first, [encoding, hidden] at the skip, else hidden.
+  int layer_inputs(int layer) const {
+    return layer == 0 ? encoding_size() : layer == skip ? encoding_size() + width : width;
+  }
+};
+
+// The parameters of one residual field F(x, t): R³×[0,1] → R^outputs; also the shape of its gradients and moments.
+// Encoding order: x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x (three numbers each), then the same for t.
+template <class T>
+struct BasicField {
+  NetworkOptions shape;
+  std::vector<Tensor<T>> weight;  // layer l: width × layer_inputs(l), row-major; at the skip the encoding comes first
+  std::vector<Tensor<T>> bias;    // layer l: width
+  Tensor<T> head_weight;          // outputs × width: all linear heads stacked
+  Tensor<T> head_bias;            // outputs
+
+  int outputs() const { return head_bias.empty() ? 0 : static_cast<int>(head_bias.dim(0)); }
+
+  // f(name, tensor) for every parameter tensor: "weight0", "bias0", …, "head_weight", "head_bias".
+  template <class F>
+  void for_each(F&& f) {
+    visit(*this, f);
+  }
+  template <class F>
+  void for_each(F&& f) const {
+    visit(*this, f);
+  }
+
+ private:
+  template <class Self, class F>
+  static void visit(Self& self, F&& f) {
+    for (size_t l = 0; l < self.weight.size(); ++l) {
+      f("weight" + std::to_string(l), self.weight[l]);
+      f("bias" + std::to_string(l), self.bias[l]);
+    }
+    f(std::string("head_weight"), self.head_weight);
+    f(std::string("head_bias"), self.head_bias);
+  }
+};
+using Field = BasicField<float>;
+
+// Hidden layers uniform in ±1/√inputs, heads zero, so that F ≡ 0 at the start (method §1.2).
+Field make_field(const NetworkOptions& shape, int outputs, Random& random);
+
+template <class To, class From>
+BasicField<To> zeros_like(const BasicField<From>& field) {
+  BasicField<To> result;
+  result.shape = field.shape;
+  for (const auto& w : field.weight) result.weight.emplace_back(w.shape());
+  for (const auto& b : field.bias) result.bias.emplace_back(b.shape());
+  result.head_weight = Tensor<To>(field.head_weight.shape());
+  result.head_bias = Tensor<To>(field.head_bias.shape());
+  return result;
+}
+template <class To, class From>
+BasicField<To> convert(const BasicField<From>& field) {
+  BasicField<To> result;
+  result.shape = field.shape;
+  for (const auto& w : field.weight) result.weight.push_back(convert<To>(w));
+  for (const auto& b : field.bias) result.bias.push_back(convert<To>(b));
+  result.head_weight = convert<To>(field.head_weight);
+  result.head_bias = convert<To>(field.head_bias);
+  return result;
+}
+
+// Where each residual stands in a field's output row (method §1.2). The environment has no tint.
+namespace residual {
+inline constexpr int position = 0;
+inline constexpr int rotation = 3;
+inline constexpr int log_scale = 7;
+inline constexpr int opacity = 9;
+inline constexpr int tint = 10;
+inline constexpr int main_outputs = 11;
+inline constexpr int environment_outputs = 10;
+}  // namespace residual
+
+}  // namespace traceflow

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+
+#include "math/types.h"
+#include "scene/environment_map.h"
+#include "scene/field.h"
+#include "scene/surfels.h"
+
+namespace traceflow {
+
+// Where reflections come from (method §9).
+enum class Specular { none, environment_gaussians, environment_map };
+
+// x_in_scene = (x_in_capture - centre) · scale, as scene.json says (method §2); undone on export.
+struct SceneNormalisation {
+  Vec3<double> centre{0};
+  double scale = 1;
+};
+
+// What is reconstructed (method §1): two sets of surfels and a residual field for each, or a cube map in the place of the
+// second set. A field that is absent is F ≡ 0.
+struct Scene {
+  Surfels main;
+  Surfels environment;
+  std::optional<Field> main_field;
+  std::optional<Field> environment_field;
+  std::optional<EnvironmentMap> environment_map;
+  Specular specular = Specular::environment_gaussians;
+  SceneNormalisation normalisation;
+  float extent = 1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
+};
+
+}  // namespace traceflow

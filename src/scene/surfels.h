@@ -1,0 +1,88 @@
+#pragma once
+
+#include "base/tensor.h"
+
+namespace traceflow {
+
+// A set of N surfels as they are stored and trained, before activation (method §1.1). Also the shape of their gradients
+// and of Adam's moments. T is float in the program, double in references.
+template <class T>
+struct BasicSurfels {
+  Tensor<T> position;       // N×3, world (normalised scene units)
+  Tensor<T> log_scale;      // N×2, log of the standard deviations along t_u, t_v
+  Tensor<T> rotation;       // N×4, quaternion (w, x, y, z), any length
+  Tensor<T> opacity_logit;  // N
+  Tensor<T> sh;             // N×K×3, spherical harmonics, K = (degree + 1)²
+  Tensor<T> tint_logit;     // N, specular tint; empty for the environment
+
+  int64_t count() const { return position.empty() ? 0 : position.dim(0); }
+  bool has_tint() const { return !tint_logit.empty(); }
+
+  // f(name, tensor) for every group, in the order above. An environment has no tint group.
+  template <class F>
+  void for_each(F&& f) {
+    visit(*this, f);
+  }
+  template <class F>
+  void for_each(F&& f) const {
+    visit(*this, f);
+  }
+
+ private:
+  template <class Self, class F>
+  static void visit(Self& self, F&& f) {
+    f("position", self.position);
+    f("log_scale", self.log_scale);
+    f("rotation", self.rotation);
+    f("opacity_logit", self.opacity_logit);
+    f("sh", self.sh);
+    if (!self.tint_logit.empty()) f("tint_logit", self.tint_logit);
+  }
+};
+using Surfels = BasicSurfels<float>;
+
+// M surfels at one time, activated (method §1.3): what the rasteriser and the tracer see. A subset of the stored ones in
+// ascending order. Also the shape of the gradients by these values.
+template <class T>
+struct BasicPosedSurfels {
+  Tensor<T> position;  // M×3, world
+  Tensor<T> scale;     // M×2, standard deviations, > 0
+  Tensor<T> rotation;  // M×4, quaternion (w, x, y, z), any length: users normalise it (math/rotation.h)
+  Tensor<T> opacity;   // M, in (0, 1)
+  Tensor<T> sh;        // M×K×3, only the degrees in use: K = (active degree + 1)²
+  Tensor<T> tint;      // M, in (0, 1); empty for the environment
+
+  int64_t count() const { return position.empty() ? 0 : position.dim(0); }
+  bool has_tint() const { return !tint.empty(); }
+
+  // Zeros in the shapes of another set: how a gradient starts.
+  template <class U>
+  void reset_like(const BasicPosedSurfels<U>& other) {
+    position.reset(other.position.shape());
+    scale.reset(other.scale.shape());
+    rotation.reset(other.rotation.shape());
+    opacity.reset(other.opacity.shape());
+    sh.reset(other.sh.shape());
+    tint.reset(other.tint.shape());
+  }
+};
+using PosedSurfels = BasicPosedSurfels<float>;
+
+// Zeros in the shapes of another set.
+template <class To, class From>
+BasicSurfels<To> zeros_like(const BasicSurfels<From>& s) {
+  return {Tensor<To>(s.position.shape()),      Tensor<To>(s.log_scale.shape()), Tensor<To>(s.rotation.shape()),
+          Tensor<To>(s.opacity_logit.shape()), Tensor<To>(s.sh.shape()),        Tensor<To>(s.tint_logit.shape())};
+}
+template <class To, class From>
+BasicSurfels<To> convert(const BasicSurfels<From>& s) {
+  return {convert<To>(s.position),      convert<To>(s.log_scale), convert<To>(s.rotation),
+          convert<To>(s.opacity_logit), convert<To>(s.sh),        convert<To>(s.tint_logit)};
+}
+template <class To, class From>
+BasicPosedSurfels<To> convert(const BasicPosedSurfels<From>& s) {
+  return {convert<To>(s.position), convert<To>(s.scale), convert<To>(s.rotation),
+          convert<To>(s.opacity),  convert<To>(s.sh),    convert<To>(s.tint)};
+}
+
+}  // namespace traceflow
