@@ -29,6 +29,8 @@ struct Scene {
   Specular specular = Specular::environment_gaussians;
   SceneNormalisation normalisation;
   float extent = 1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
+  // The largest distance by which the main field lately moved a surfel: what view culling must allow for.
+  float main_reach = 0;
 };
 
 }  // namespace traceflow

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <vector>
+
+#include "math/camera.h"
+#include "ops/raster/raster.h"
+#include "ops/surface/surface.h"
+#include "ops/trace/trace.h"
+#include "scene/scene.h"
+
+namespace traceflow {
+
+// One picture to make.
+struct FrameRequest {
+  Camera<float> camera;
+  float time = 0;
+  int sh_degree_main = 3;
+  int sh_degree_environment = 3;
+  bool deform_main = true;         // evaluate the main set's field, where the scene has one (method §7.1)
+  bool deform_environment = true;  // likewise the environment's
+  bool specular = true;            // trace reflections, where the scene has them (method §7.2)
+  bool pseudo_normals = false;     // compute N_d, which only the losses need
+  bool probes = false;             // training: trace a random share of the other pixels too (method §4.4)
+  uint64_t probe_seed = 0;
+  // Skip main surfels that lie outside the view by more than the scene's reach. Training does; a picture does
+  // not need to.
+  bool cull = false;
+};
+
+// A picture with all its layers.
+struct Frame {
+  PosedSurfels main;            // what was rasterised
+  std::vector<int32_t> subset;  // which stored main surfels these are; empty means all
+  PosedSurfels environment;     // what was traced
+  raster::Output raster;        // diffuse colour, alpha, tint, normal, depths, distortion
+  Tensor<float> pseudo_normal;  // H×W×3 when asked for
+  surface::TracedPixels traced;
+  Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
+  Tensor<float> colour;         // H×W×3, the final image (method §6)
+  float reach = 0;              // the largest distance by which the field moved a surfel of this frame
+
+  // The specular colours as an image: H×W×3, black where nothing was traced.
+  Tensor<float> specular_image() const;
+};
+
+// dL/d(layers of a frame), an empty tensor meaning zero.
+struct FrameGradient {
+  Tensor<float> colour;         // H×W×3
+  Tensor<float> normal;         // H×W×3
+  Tensor<float> pseudo_normal;  // H×W×3
+  Tensor<float> distortion;     // H×W
+  Tensor<float> alpha;          // H×W
+  Tensor<float> depth;          // H×W
+};
+
+// Which parts of a scene a backward pass must reach. What is off is left at zero and its work is skipped
+// where it can be.
+struct Trainable {
+  bool main = true;  // every group of the main surfels but tint
+  bool tint = true;
+  bool main_field = true;
+  bool environment = true;  // environment surfels, or the map
+  bool environment_field = true;
+};
+
+// dL/d(parameters of a scene), with the signals that density control accumulates.
+struct SceneGradient {
+  Surfels main;
+  Surfels environment;
+  Field main_field;
+  Field environment_field;
+  EnvironmentMap environment_map;
+  CameraGradient<float> camera;
+  Tensor<float> main_signal;  // N, norm of the screen-space centre gradient (method §3.6); 0 where not drawn
+  Tensor<uint8_t> main_visible;         // N
+  Tensor<float> environment_signal;     // N, trace::BasicInputGradient::position_gradient
+  Tensor<uint8_t> environment_visible;  // N, 1 where the signal is not zero
+
+  // Zeros in the shapes of the scene.
+  void reset(const Scene& scene);
+};
+
+}  // namespace traceflow

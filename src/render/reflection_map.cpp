@@ -1,0 +1,31 @@
+#include "render/reflection_map.h"
+
+#include "base/parallel.h"
+#include "ops/environment_map/environment_map.h"
+
+namespace traceflow::reflection_map {
+
+void forward(const EnvironmentMap& map, const Tensor<float>& directions, float time, bool deform,
+             field::Precision precision, Tensor<float>& colour, Saved& saved) {
+  saved.moved = directions;
+  if (deform && map.field) {
+    field::forward(*map.field, directions, time, precision, saved.residual, &saved.field);
+    parallel_for("render: move directions", saved.moved.size(),
+                 [&](int64_t i) { saved.moved[i] += saved.residual[i]; });
+  }
+  environment_map::forward(map.logit, saved.moved, colour);
+}
+
+void backward(const EnvironmentMap& map, const Tensor<float>& directions, float time, bool deform,
+              bool train_field, const Saved& saved, const Tensor<float>& grad_colour,
+              EnvironmentMap& gradient, Tensor<float>& grad_directions) {
+  grad_directions.reset(directions.shape());
+  environment_map::backward(map.logit, saved.moved, grad_colour, gradient.logit, grad_directions);
+  // The direction enters the field detached, so what reaches the moved direction reaches both d and F
+  // unchanged.
+  if (deform && train_field && map.field) {
+    field::backward(*map.field, directions, time, saved.field, grad_directions, *gradient.field);
+  }
+}
+
+}  // namespace traceflow::reflection_map

@@ -1,0 +1,36 @@
+#include "render/render_options.h"
+
+namespace traceflow {
+
+void RenderOptions::validate() const {
+  check_option(depth_ratio >= 0 && depth_ratio <= 1, "render.depth_ratio", depth_ratio, "0 to 1");
+  select.validate();
+  raster_options(1).validate();
+  trace_options(1).validate();
+}
+
+raster::Options RenderOptions::raster_options(float extent) const {
+  raster::Options options;
+  options.sort = sort;
+  options.near_plane = near_plane * extent;
+  options.far_plane = far_plane * extent;
+  options.low_pass = low_pass;
+  options.alpha_min = alpha_min;
+  options.alpha_max = alpha_max;
+  options.transmittance_min = transmittance_min;
+  options.background = background;
+  return options;
+}
+
+trace::Options RenderOptions::trace_options(float extent) const {
+  trace::Options options;
+  options.t_min = trace_from * extent;
+  options.alpha_min = alpha_min;
+  options.alpha_max = alpha_max;
+  options.transmittance_min = transmittance_min;
+  options.hits_per_pass = hits_per_pass;
+  options.background = specular_background;
+  return options;
+}
+
+}  // namespace traceflow

@@ -1,0 +1,58 @@
+#pragma once
+
+#include "base/options.h"
+#include "math/types.h"
+#include "ops/field/field.h"
+#include "ops/raster/raster.h"
+#include "ops/surface/surface.h"
+#include "ops/trace/trace.h"
+
+namespace traceflow {
+
+// How a frame is made of a scene. Lengths are relative to the scene's extent, so that they mean the same in
+// every capture.
+struct RenderOptions {
+  raster::SortOrder sort = raster::SortOrder::centre;
+  float near_plane = 0.01F;
+  float far_plane = 100;
+  bool low_pass = true;
+  float alpha_min = 1.0F / 255;
+  float alpha_max = 0.99F;
+  float transmittance_min = 1e-4F;
+  float depth_ratio = 0;
+  float trace_from = 1e-3F;
+  int hits_per_pass = 64;
+  Vec3<float> background{0};
+  Vec3<float> specular_background{0};
+  surface::SelectOptions select;
+  field::Precision precision = field::Precision::fp32;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("sort", sort, "", "Blending order: centre (as 2DGS) or hit (exact per pixel) (method §3.3).");
+    v.field("near_plane", near_plane, "extents", "Nearest camera depth that is drawn (method §3.4).");
+    v.field("far_plane", far_plane, "extents", "Far end of the distortion's depth mapping (method §3.5).");
+    v.field("low_pass", low_pass, "", "Screen-space low-pass of 2DGS (method §3.2).");
+    v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
+    v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
+    v.field("transmittance_min", transmittance_min, "",
+            "A ray ends before its transmittance falls under this.");
+    v.field("depth_ratio", depth_ratio, "",
+            "Surface depth from expected (0) to median (1) depth (method §4.1).");
+    v.field("trace_from", trace_from, "extents",
+            "Reflected hits nearer than this are ignored (method §5.2).");
+    v.field("hits_per_pass", hits_per_pass, "hits",
+            "Hits held at a time by the tracer; changes speed, not the image.");
+    v.field("background", background, "", "Colour behind the main surfels (method §3.5).");
+    v.field("specular_background", specular_background, "", "Colour behind the environment (method §5.4).");
+    v.group("select", select);
+    v.field("precision", precision, "", "Arithmetic of the fields' hidden layers: fp32 or bf16.");
+  }
+  void validate() const;
+
+  // The ops' own options for a scene of this extent.
+  raster::Options raster_options(float extent) const;
+  trace::Options trace_options(float extent) const;
+};
+
+}  // namespace traceflow

@@ -1,0 +1,212 @@
+#include "render/renderer.h"
+
+#include <cmath>
+
+#include "base/parallel.h"
+#include "math/spherical_harmonics.h"
+#include "ops/shade/shade.h"
+#include "render/visibility.h"
+
+namespace traceflow {
+
+namespace {
+
+const Field* field_if(const std::optional<Field>& field, bool wanted) {
+  return wanted && field ? &*field : nullptr;
+}
+
+int stored_degree(const Surfels& surfels) { return surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0; }
+
+// The largest distance between posed and stored positions.
+float largest_move(const Surfels& stored, const Frame& frame) {
+  float largest2 = 0;
+  for (int64_t i = 0; i < frame.main.count(); ++i) {
+    const int64_t k = frame.subset.empty() ? i : frame.subset[static_cast<size_t>(i)];
+    const Vec3<float> move = load3<float>(frame.main.position.row(i)) - load3<float>(stored.position.row(k));
+    const float length2 = dot(move, move);
+    if (length2 > largest2 && std::isfinite(length2)) largest2 = length2;
+  }
+  return std::sqrt(largest2);
+}
+
+}  // namespace
+
+Tensor<float> Frame::specular_image() const {
+  Tensor<float> image(colour.shape());
+  for (size_t k = 0; k < traced.pixel.size(); ++k) {
+    store3(image.data() + 3 * static_cast<int64_t>(traced.pixel[k]),
+           load3<float>(specular_rays.row(static_cast<int64_t>(k))));
+  }
+  return image;
+}
+
+void SceneGradient::reset(const Scene& scene) {
+  main = zeros_like<float>(scene.main);
+  environment = zeros_like<float>(scene.environment);
+  if (scene.main_field) main_field = zeros_like<float>(*scene.main_field);
+  if (scene.environment_field) environment_field = zeros_like<float>(*scene.environment_field);
+  if (scene.environment_map) {
+    environment_map.logit.reset(scene.environment_map->logit.shape());
+    environment_map.field.reset();
+    if (scene.environment_map->field)
+      environment_map.field = zeros_like<float>(*scene.environment_map->field);
+  }
+  camera = {};
+  main_signal.reset({scene.main.count()});
+  main_visible.reset({scene.main.count()});
+  environment_signal.reset({scene.environment.count()});
+  environment_visible.reset({scene.environment.count()});
+}
+
+bool Renderer::reflects(const Scene& scene, const FrameRequest& request) const {
+  if (!request.specular || !scene.main.has_tint()) return false;
+  if (scene.specular == Specular::environment_gaussians) return scene.environment.count() > 0;
+  return scene.specular == Specular::environment_map && scene.environment_map.has_value();
+}
+
+const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
+  const Field* field = field_if(scene.main_field, request.deform_main);
+  const raster::Options raster_options = options_.raster_options(scene.extent);
+
+  // Choose the surfels that can show, and pose them.
+  frame_.subset.clear();
+  bool nothing_in_view = false;
+  if (request.cull) {
+    frame_.subset =
+        surfels_in_view(scene.main, request.camera, raster_options.near_plane, field ? scene.main_reach : 0);
+    nothing_in_view = frame_.subset.empty();
+  }
+  if (nothing_in_view) {
+    frame_.main = PosedSurfels{};
+  } else {
+    deform::forward(scene.main, field, request.time, frame_.subset,
+                    std::min(request.sh_degree_main, stored_degree(scene.main)), options_.precision,
+                    frame_.main, keep_for_backward ? &main_saved_ : nullptr);
+  }
+  frame_.reach = field ? largest_move(scene.main, frame_) : 0;
+
+  // Draw them.
+  raster::forward(frame_.main, request.camera, raster_options, frame_.raster,
+                  keep_for_backward ? raster_saved_.get() : nullptr);
+  if (request.pseudo_normals) {
+    surface::pseudo_normals(request.camera, frame_.raster.depth, frame_.raster.median_depth,
+                            frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
+  }
+
+  // Mirror the view at what was drawn.
+  frame_.traced.pixel.clear();
+  frame_.traced.weight.clear();
+  frame_.specular_rays.resize({0, 3});
+  if (reflects(scene, request)) {
+    forward_specular(scene, request, keep_for_backward);
+  }
+  shade::forward(frame_.raster.colour, frame_.raster.tint, std::span<const int32_t>(frame_.traced.pixel),
+                 frame_.specular_rays, frame_.colour);
+  return frame_;
+}
+
+void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
+  frame_.traced = surface::select_pixels(frame_.raster.alpha, frame_.raster.tint, frame_.raster.normal,
+                                         options_.select, request.probes, request.probe_seed);
+  surface::reflection_rays(request.camera, std::span<const int32_t>(frame_.traced.pixel), frame_.raster.depth,
+                           frame_.raster.median_depth, frame_.raster.normal, options_.depth_ratio, origins_,
+                           directions_);
+  if (scene.specular == Specular::environment_map) {
+    reflection_map::forward(*scene.environment_map, directions_, request.time, request.deform_environment,
+                            options_.precision, frame_.specular_rays, map_saved_);
+    return;
+  }
+  const trace::Options trace_options = options_.trace_options(scene.extent);
+  deform::forward(scene.environment, field_if(scene.environment_field, request.deform_environment),
+                  request.time, {}, std::min(request.sh_degree_environment, stored_degree(scene.environment)),
+                  options_.precision, frame_.environment, keep_for_backward ? &environment_saved_ : nullptr);
+  trace::build(frame_.environment, trace_options, *bvh_);
+  trace::forward(frame_.environment, *bvh_, origins_, directions_, trace_options, trace_output_,
+                 keep_for_backward ? trace_saved_.get() : nullptr);
+  frame_.specular_rays = trace_output_.colour;
+}
+
+void Renderer::backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
+                        const FrameGradient& grad_frame, SceneGradient& gradient) {
+  const Field* field = field_if(scene.main_field, request.deform_main);
+  const Shape image = frame_.raster.alpha.shape();
+  grad_raster_.tint.reset(image);
+  grad_raster_.depth.reset(image);
+  grad_raster_.median_depth.reset(image);
+  grad_raster_.normal.reset(frame_.raster.normal.shape());
+  grad_raster_.alpha = grad_frame.alpha;
+  grad_raster_.distortion = grad_frame.distortion;
+  if (!grad_frame.normal.empty()) grad_raster_.normal = grad_frame.normal;
+  if (!grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
+
+  // Shade.
+  shade::backward(frame_.raster.colour, frame_.raster.tint, std::span<const int32_t>(frame_.traced.pixel),
+                  std::span<const float>(frame_.traced.weight), frame_.specular_rays, grad_frame.colour,
+                  grad_raster_.colour, grad_raster_.tint, grad_trace_.colour);
+  // Trace and reflect.
+  if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, gradient);
+  if (frame_.main.count() == 0 || !(trainable.main || trainable.tint || trainable.main_field)) return;
+
+  // With the geometry frozen only the tint's gradient is wanted (method §7.2).
+  if (!trainable.main) {
+    for (Tensor<float>* unused :
+         {&grad_raster_.colour, &grad_raster_.normal, &grad_raster_.depth, &grad_raster_.median_depth,
+          &grad_raster_.alpha, &grad_raster_.distortion}) {
+      unused->resize({0});
+    }
+  }
+  // Surface.
+  if (trainable.main && !grad_frame.pseudo_normal.empty()) {
+    surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
+                                     frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,
+                                     grad_raster_.depth, grad_raster_.median_depth, gradient.camera);
+  }
+  // Rasterise.
+  raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
+                   grad_raster_, grad_raster_input_);
+  gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;
+  gradient.camera.position += grad_raster_input_.camera.position;
+  const std::vector<uint8_t> drawn = raster::visible(*raster_saved_);
+  for (int64_t i = 0; i < frame_.main.count(); ++i) {
+    const int64_t k = frame_.subset.empty() ? i : frame_.subset[static_cast<size_t>(i)];
+    gradient.main_signal[k] = grad_raster_input_.screen_gradient[i];
+    gradient.main_visible[k] = drawn[static_cast<size_t>(i)];
+  }
+  // Deform.
+  deform::backward(scene.main, field, request.time, frame_.subset, frame_.main, main_saved_,
+                   grad_raster_input_.surfels, gradient.main,
+                   field && trainable.main_field ? &gradient.main_field : nullptr);
+}
+
+void Renderer::backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
+                                 SceneGradient& gradient) {
+  const std::span<const int32_t> pixels(frame_.traced.pixel);
+  Tensor<float>* grad_origins = &grad_trace_input_.origins;
+  Tensor<float>* grad_directions = &grad_trace_input_.directions;
+  if (scene.specular == Specular::environment_map) {
+    grad_origins->reset(origins_.shape());
+    reflection_map::backward(*scene.environment_map, directions_, request.time, request.deform_environment,
+                             trainable.environment_field, map_saved_, grad_trace_.colour,
+                             gradient.environment_map, *grad_directions);
+  } else {
+    const Field* field = field_if(scene.environment_field, request.deform_environment);
+    trace::backward(frame_.environment, origins_, directions_, options_.trace_options(scene.extent),
+                    *trace_saved_, grad_trace_, grad_trace_input_);
+    gradient.environment_signal = grad_trace_input_.position_gradient;
+    for (int64_t i = 0; i < frame_.environment.count(); ++i) {
+      gradient.environment_visible[i] = gradient.environment_signal[i] != 0 ? 1 : 0;
+    }
+    if (trainable.environment) {
+      deform::backward(scene.environment, field, request.time, {}, frame_.environment, environment_saved_,
+                       grad_trace_input_.surfels, gradient.environment,
+                       field && trainable.environment_field ? &gradient.environment_field : nullptr);
+    }
+  }
+  if (!trainable.main) return;
+  surface::reflection_rays_backward(request.camera, pixels, frame_.raster.depth, frame_.raster.median_depth,
+                                    frame_.raster.normal, options_.depth_ratio, *grad_origins,
+                                    *grad_directions, grad_raster_.depth, grad_raster_.median_depth,
+                                    grad_raster_.normal, gradient.camera);
+}
+
+}  // namespace traceflow

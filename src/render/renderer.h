@@ -1,0 +1,50 @@
+#pragma once
+
+#include "ops/deform/deform.h"
+#include "render/frame.h"
+#include "render/reflection_map.h"
+#include "render/render_options.h"
+
+namespace traceflow {
+
+// Strings the ops into a frame (method §1.3 … §6), and its derivative in the mirror order. Holds the memory
+// that frames need, so that one renderer used for many frames stops allocating.
+class Renderer {
+ public:
+  explicit Renderer(const RenderOptions& options) : options_(options) {}
+
+  const RenderOptions& options() const { return options_; }
+  RenderOptions& options() { return options_; }
+
+  // Deform → rasterise → surface → reflect → trace → shade. The frame stays valid until the next call.
+  // keep_for_backward: false saves the work and memory that only backward() needs.
+  const Frame& forward(const Scene& scene, const FrameRequest& request, bool keep_for_backward = false);
+
+  // Adds dL/dscene to `gradient` (reset by the caller to the scene's shapes), of the last forward() with
+  // keep_for_backward, whose scene and request these are.
+  void backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
+                const FrameGradient& grad_frame, SceneGradient& gradient);
+
+ private:
+  void forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
+  void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
+                         SceneGradient& gradient);
+  bool reflects(const Scene& scene, const FrameRequest& request) const;
+
+  RenderOptions options_;
+  Frame frame_;
+  deform::Saved main_saved_, environment_saved_;
+  raster::SavedPtr raster_saved_ = raster::make_saved();
+  trace::BvhPtr bvh_ = trace::make_bvh();
+  trace::SavedPtr trace_saved_ = trace::make_saved();
+  trace::Output trace_output_;
+  reflection_map::Saved map_saved_;
+  Tensor<float> origins_, directions_;  // P×3, the mirrored rays
+
+  raster::OutputGradient grad_raster_;
+  raster::InputGradient grad_raster_input_;
+  trace::OutputGradient grad_trace_;
+  trace::InputGradient grad_trace_input_;
+};
+
+}  // namespace traceflow
