@@ -1,0 +1,368 @@
+#include "files/safetensors.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <span>
+#include <string_view>
+
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "files/half.h"
+
+namespace traceflow {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr uint64_t length_bytes = 8;
+constexpr uint64_t max_header_bytes = 100'000'000;  // the format's own limit
+constexpr size_t max_rank = 4;
+constexpr int max_nesting = 8;
+constexpr const char* metadata_key = "__metadata__";
+
+struct Type {
+  std::string_view name;
+  uint64_t bytes;
+};
+constexpr std::array<Type, 7> types{
+    {{"F64", 8}, {"I64", 8}, {"F32", 4}, {"I32", 4}, {"F16", 2}, {"BF16", 2}, {"U8", 1}}};
+
+const Type* find_type(std::string_view name) {
+  const auto* const found =
+      std::find_if(types.begin(), types.end(), [&](const Type& t) { return t.name == name; });
+  return found == types.end() ? nullptr : found;
+}
+
+template <class T>
+constexpr const char* type_name() {
+  if constexpr (std::is_same_v<T, float>) return "F32";
+  if constexpr (std::is_same_v<T, double>) return "F64";
+  if constexpr (std::is_same_v<T, int32_t>) return "I32";
+  if constexpr (std::is_same_v<T, int64_t>) return "I64";
+  if constexpr (std::is_same_v<T, uint8_t>) return "U8";
+}
+
+// One tensor as the header describes it, checked against itself but not yet against its neighbours.
+struct Described {
+  std::string name;
+  Type type;
+  Shape shape;
+  uint64_t begin;
+  uint64_t end;
+};
+
+// Text from a file as it may be shown in one line: short, without control characters.
+std::string shown(const std::string& text) {
+  std::string result = text.substr(0, 80);
+  for (char& c : result) {
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
+  }
+  return text.size() > 80 ? result + "..." : result;
+}
+
+std::string shown(const Json& value) {
+  return shown(value.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+std::ifstream open(const std::filesystem::path& path, uint64_t& size) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw InputError(path.string(), "", "no such file", "a safetensors file");
+  }
+  size = std::filesystem::file_size(path, error);
+  std::ifstream file(path, std::ios::binary);
+  if (error || !file)
+    throw InputError(path.string(), "", "a file that cannot be opened", "a safetensors file");
+  return file;
+}
+
+void read_bytes(std::ifstream& file, const std::string& origin, const std::string& field,
+                std::span<char> into) {
+  file.read(into.data(), static_cast<std::streamsize>(into.size()));
+  if (file.gcount() != static_cast<std::streamsize>(into.size())) {
+    throw InputError(origin, field, "an early end of file", std::to_string(into.size()) + " bytes");
+  }
+}
+
+// The header as JSON. A name that stands twice is refused, since readers would differ on which one counts; so
+// is nesting that no header has, since printing it would take the stack.
+Json parse_header(const std::string& text, const std::string& origin) {
+  std::set<std::string> names;
+  const auto check = [&](int depth, Json::parse_event_t event, Json& value) {
+    if (depth > max_nesting)
+      throw InputError(origin, "header", "JSON nested too deep", "a safetensors header");
+    if (event == Json::parse_event_t::key && depth == 1 && !names.insert(value.get<std::string>()).second) {
+      throw InputError(origin, "header", "the name " + shown(value) + " twice", "every tensor once");
+    }
+    return true;
+  };
+  try {
+    Json header = Json::parse(text, check);
+    if (!header.is_object()) throw InputError(origin, "header", shown(header), "a JSON object");
+    return header;
+  } catch (const Json::exception&) {
+    throw InputError(origin, "header", "text that is not JSON", "a JSON object");
+  }
+}
+
+Json read_header(std::ifstream& file, uint64_t file_size, const std::string& origin, uint64_t& data_start) {
+  if (file_size < length_bytes) {
+    throw InputError(origin, "", std::to_string(file_size) + " bytes",
+                     "a safetensors file of 8 bytes or more");
+  }
+  std::array<char, length_bytes> length{};
+  read_bytes(file, origin, "header length", length);
+  uint64_t header_bytes = 0;
+  for (size_t i = 0; i < length_bytes; ++i) {
+    header_bytes |= static_cast<uint64_t>(static_cast<unsigned char>(length[i])) << (8 * i);
+  }
+  const uint64_t limit = std::min(max_header_bytes, file_size - length_bytes);
+  if (header_bytes > limit) {
+    throw InputError(origin, "header length", std::to_string(header_bytes),
+                     "at most " + std::to_string(limit),
+                     "the file is cut short or is not a safetensors file");
+  }
+  std::string text(header_bytes, '\0');
+  read_bytes(file, origin, "header", text);
+  data_start = length_bytes + header_bytes;
+  return parse_header(text, origin);
+}
+
+uint64_t unsigned_number(const Json& value, const std::string& origin, const std::string& field) {
+  if (!value.is_number_unsigned())
+    throw InputError(origin, field, shown(value), "a number that is not negative");
+  return value.get<uint64_t>();
+}
+
+// Also computes the number of elements, which must fit 63 bits.
+Shape parse_shape(const Json& dims, const std::string& origin, const std::string& field, uint64_t& elements) {
+  if (!dims.is_array() || dims.size() > max_rank) {
+    throw InputError(origin, field, shown(dims), "a list of at most 4 dimensions");
+  }
+  std::array<int64_t, max_rank> sizes{};
+  int64_t product = 1;
+  for (size_t i = 0; i < dims.size(); ++i) {
+    const uint64_t size = unsigned_number(dims[i], origin, field);
+    const bool fits = size <= static_cast<uint64_t>(INT64_MAX);
+    if (!fits || __builtin_mul_overflow(product, static_cast<int64_t>(size), &product)) {
+      throw InputError(origin, field, shown(dims), "a size that fits 63 bits");
+    }
+    sizes[i] = static_cast<int64_t>(size);
+  }
+  elements = static_cast<uint64_t>(product);
+  switch (dims.size()) {
+    case 0:
+      return {1};  // a scalar
+    case 1:
+      return {sizes[0]};
+    case 2:
+      return {sizes[0], sizes[1]};
+    case 3:
+      return {sizes[0], sizes[1], sizes[2]};
+    default:
+      return {sizes[0], sizes[1], sizes[2], sizes[3]};
+  }
+}
+
+Described parse_entry(const std::string& name, const Json& entry, const std::string& origin,
+                      uint64_t data_bytes) {
+  const std::string field = "tensor " + shown(name);
+  if (!entry.is_object() || !entry.contains("dtype") || !entry.contains("shape") ||
+      !entry.contains("data_offsets")) {
+    throw InputError(origin, field, shown(entry), "an object with dtype, shape and data_offsets");
+  }
+  const Json& dtype = entry["dtype"];
+  const Type* type = dtype.is_string() ? find_type(dtype.get<std::string>()) : nullptr;
+  if (type == nullptr) {
+    throw InputError(origin, field + " dtype", shown(dtype), "F32, F64, I32, I64, U8, F16 or BF16");
+  }
+  uint64_t elements = 0;
+  const Shape shape = parse_shape(entry["shape"], origin, field + " shape", elements);
+  const Json& offsets = entry["data_offsets"];
+  if (!offsets.is_array() || offsets.size() != 2) {
+    throw InputError(origin, field + " data_offsets", shown(offsets), "two numbers");
+  }
+  const uint64_t begin = unsigned_number(offsets[0], origin, field + " data_offsets");
+  const uint64_t end = unsigned_number(offsets[1], origin, field + " data_offsets");
+  if (begin > end || end > data_bytes) {
+    throw InputError(origin, field + " data_offsets", shown(offsets),
+                     "a range within " + std::to_string(data_bytes) + " bytes of data");
+  }
+  if (elements > (end - begin) / type->bytes || elements * type->bytes != end - begin) {
+    throw InputError(origin, field + " data_offsets", std::to_string(end - begin) + " bytes",
+                     shape.to_string() + " elements of " + std::to_string(type->bytes) + " bytes");
+  }
+  return {name, *type, shape, begin, end};
+}
+
+std::map<std::string, std::string> parse_metadata(const Json& metadata, const std::string& origin) {
+  if (!metadata.is_object()) throw InputError(origin, metadata_key, shown(metadata), "an object of strings");
+  std::map<std::string, std::string> result;
+  for (const auto& [key, value] : metadata.items()) {
+    if (!value.is_string()) throw InputError(origin, "metadata " + shown(key), shown(value), "a string");
+    result[key] = value.get<std::string>();
+  }
+  return result;
+}
+
+// The tensors must tile the data: no byte twice, none left over, as the format demands.
+void check_tiling(const std::vector<Described>& tensors, const std::string& origin, uint64_t data_bytes) {
+  uint64_t next = 0;
+  for (const Described& t : tensors) {
+    if (t.begin != next) {
+      throw InputError(origin, "tensor " + shown(t.name) + " data_offsets",
+                       "a start at " + std::to_string(t.begin),
+                       std::to_string(next) + ", where the one before ends");
+    }
+    next = t.end;
+  }
+  if (next != data_bytes) {
+    throw InputError(origin, "", std::to_string(data_bytes) + " bytes of data", std::to_string(next));
+  }
+}
+
+template <class Widen>
+std::vector<std::byte> widened(const std::vector<std::byte>& narrow, Widen widen) {
+  std::vector<std::byte> wide(narrow.size() * 2);
+  for (size_t i = 0; i < narrow.size() / 2; ++i) {
+    uint16_t bits = 0;
+    std::memcpy(&bits, narrow.data() + 2 * i, sizeof bits);
+    const float value = widen(bits);
+    std::memcpy(wide.data() + 4 * i, &value, sizeof value);
+  }
+  return wide;
+}
+
+template <class T>
+std::vector<std::byte> bytes_of(const Tensor<T>& tensor) {
+  const auto bytes = std::as_bytes(tensor.values());
+  return {bytes.begin(), bytes.end()};
+}
+
+Json shape_list(const Shape& shape) {
+  Json dims = Json::array();
+  for (int i = 0; i < shape.rank(); ++i) dims.push_back(shape[i]);
+  return shape.rank() == 0 ? Json::array({0}) : dims;
+}
+
+}  // namespace
+
+Safetensors Safetensors::read(const std::filesystem::path& path) {
+  Safetensors result;
+  result.origin_ = path.string();
+  uint64_t file_size = 0;
+  uint64_t data_start = 0;
+  std::ifstream file = open(path, file_size);
+  const Json header = read_header(file, file_size, result.origin_, data_start);
+
+  std::vector<Described> tensors;
+  for (const auto& [name, entry] : header.items()) {
+    if (name == metadata_key) {
+      result.metadata = parse_metadata(entry, result.origin_);
+    } else {
+      tensors.push_back(parse_entry(name, entry, result.origin_, file_size - data_start));
+    }
+  }
+  std::sort(tensors.begin(), tensors.end(), [](const Described& a, const Described& b) {
+    return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
+  });
+  check_tiling(tensors, result.origin_, file_size - data_start);
+
+  for (const Described& t : tensors) {
+    std::vector<std::byte> bytes(t.end - t.begin);
+    read_bytes(file, result.origin_, "tensor " + shown(t.name),
+               {reinterpret_cast<char*>(bytes.data()), bytes.size()});
+    std::string type(t.type.name);
+    if (type == "F16" || type == "BF16") {
+      bytes = widened(bytes, type == "F16" ? widen_half : widen_bfloat16);
+      type = "F32";
+    }
+    result.entries_[t.name] = {type, t.shape, std::move(bytes)};
+  }
+  return result;
+}
+
+void Safetensors::add(const std::string& name, const Tensor<float>& tensor) {
+  entries_[name] = {type_name<float>(), tensor.shape(), bytes_of(tensor)};
+}
+void Safetensors::add(const std::string& name, const Tensor<double>& tensor) {
+  entries_[name] = {type_name<double>(), tensor.shape(), bytes_of(tensor)};
+}
+void Safetensors::add(const std::string& name, const Tensor<int32_t>& tensor) {
+  entries_[name] = {type_name<int32_t>(), tensor.shape(), bytes_of(tensor)};
+}
+void Safetensors::add(const std::string& name, const Tensor<int64_t>& tensor) {
+  entries_[name] = {type_name<int64_t>(), tensor.shape(), bytes_of(tensor)};
+}
+void Safetensors::add(const std::string& name, const Tensor<uint8_t>& tensor) {
+  entries_[name] = {type_name<uint8_t>(), tensor.shape(), bytes_of(tensor)};
+}
+
+void Safetensors::write(const std::filesystem::path& path) const {
+  require(!has(metadata_key), "no tensor takes the metadata's name");
+  // Wide types first, so that every tensor starts at a multiple of its element's size.
+  std::vector<std::pair<const std::string*, const Entry*>> order;
+  uint64_t data_bytes = 0;
+  for (const auto& [name, entry] : entries_) {
+    order.emplace_back(&name, &entry);
+    data_bytes += entry.bytes.size();
+  }
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+    return find_type(a.second->type)->bytes > find_type(b.second->type)->bytes;
+  });
+
+  Json header = Json::object();
+  if (!metadata.empty()) header[metadata_key] = metadata;
+  uint64_t offset = 0;
+  for (const auto& [name, entry] : order) {
+    header[*name] = {{"dtype", entry->type},
+                     {"shape", shape_list(entry->shape)},
+                     {"data_offsets", {offset, offset + entry->bytes.size()}}};
+    offset += entry->bytes.size();
+  }
+  std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  text.resize((text.size() + 7) / 8 * 8, ' ');
+
+  std::string file;
+  file.reserve(length_bytes + text.size() + data_bytes);
+  for (size_t i = 0; i < length_bytes; ++i) file += static_cast<char>(text.size() >> (8 * i) & 0xFFU);
+  file += text;
+  for (const auto& [name, entry] : order) {
+    file.append(reinterpret_cast<const char*>(entry->bytes.data()), entry->bytes.size());
+  }
+  write_atomically(path, file);
+}
+
+bool Safetensors::has(const std::string& name) const { return entries_.count(name) != 0; }
+
+std::vector<std::string> Safetensors::names() const {
+  std::vector<std::string> result;
+  for (const auto& [name, entry] : entries_) result.push_back(name);
+  return result;
+}
+
+template <class T>
+Tensor<T> Safetensors::tensor(const std::string& name) const {
+  const auto found = entries_.find(name);
+  if (found == entries_.end()) throw InputError(origin_, "tensor " + shown(name), "none", "this tensor");
+  const Entry& entry = found->second;
+  if (entry.type != type_name<T>()) {
+    throw InputError(origin_, "tensor " + shown(name), "type " + entry.type, type_name<T>());
+  }
+  Tensor<T> result(entry.shape);
+  if (!entry.bytes.empty()) std::memcpy(result.data(), entry.bytes.data(), entry.bytes.size());
+  return result;
+}
+
+template Tensor<float> Safetensors::tensor(const std::string&) const;
+template Tensor<double> Safetensors::tensor(const std::string&) const;
+template Tensor<int32_t> Safetensors::tensor(const std::string&) const;
+template Tensor<int64_t> Safetensors::tensor(const std::string&) const;
+template Tensor<uint8_t> Safetensors::tensor(const std::string&) const;
+
+}  // namespace traceflow
