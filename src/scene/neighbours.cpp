@@ -1,0 +1,56 @@
+#include "scene/neighbours.h"
+
+#include <nanoflann.hpp>
+
+#include "base/parallel.h"
+
+namespace traceflow {
+
+namespace {
+
+struct Cloud {
+  const Tensor<float>& points;
+  size_t kdtree_get_point_count() const { return static_cast<size_t>(points.dim(0)); }
+  float kdtree_get_pt(size_t i, size_t axis) const {
+    return points(static_cast<int64_t>(i), static_cast<int64_t>(axis));
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud, 3>;
+
+}  // namespace
+
+Neighbours nearest_neighbours(const Tensor<float>& points, int k) {
+  const int64_t count = points.empty() ? 0 : points.dim(0);
+  Neighbours result{Tensor<int32_t>({count, k}), Tensor<float>({count, k})};
+  if (count == 0) return result;
+  const Cloud cloud{points};
+  const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+
+  parallel_for("scene: nearest neighbours", count, [&](int64_t i) {
+    // Ask for one more, since the point itself is among its neighbours.
+    const auto wanted = static_cast<size_t>(k) + 1;
+    std::vector<size_t> index(wanted);
+    std::vector<float> distance2(wanted);
+    nanoflann::KNNResultSet<float> found(wanted);
+    found.init(index.data(), distance2.data());
+    tree.findNeighbors(found, points.row(i), nanoflann::SearchParams());
+    int filled = 0;
+    for (size_t j = 0; j < found.size() && filled < k; ++j) {
+      if (index[j] == static_cast<size_t>(i)) continue;
+      result.index(i, filled) = static_cast<int32_t>(index[j]);
+      result.distance2(i, filled) = distance2[j];
+      ++filled;
+    }
+    for (int j = filled; j < k; ++j) {
+      result.index(i, j) = filled > 0 ? result.index(i, filled - 1) : -1;
+      result.distance2(i, j) = filled > 0 ? result.distance2(i, filled - 1) : 0;
+    }
+  });
+  return result;
+}
+
+}  // namespace traceflow

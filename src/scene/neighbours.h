@@ -1,0 +1,15 @@
+#pragma once
+
+#include "base/tensor.h"
+
+namespace traceflow {
+
+// For each of N points its k nearest others, nearest first. Fewer than k others: the rest repeat the farthest
+// found; a lone point has none (index -1, distance 0).
+struct Neighbours {
+  Tensor<int32_t> index;    // N×k
+  Tensor<float> distance2;  // N×k, squared
+};
+Neighbours nearest_neighbours(const Tensor<float>& points, int k);
+
+}  // namespace traceflow

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+// What happens during training, told as it happens. The progress bar, the JSON-lines log and the web viewer
+// listen; training itself prints nothing and knows none of them. Events come from the training thread, in
+// order.
+namespace traceflow::events {
+
+struct SurfelCounts {
+  int64_t main = 0;
+  int64_t environment = 0;
+};
+
+// A named number, such as one term of the loss.
+struct Term {
+  std::string name;
+  double value = 0;
+};
+
+// First of all events, and again after --resume.
+struct Started {
+  std::string capture;
+  std::filesystem::path run;
+  int64_t iteration = 0;   // already done: 0, or where a resumed run goes on
+  int64_t iterations = 0;  // in all
+  int threads = 1;
+  uint64_t seed = 0;
+  SurfelCounts surfels;
+};
+
+// One iteration is done.
+struct Step {
+  int64_t iteration = 0;  // done so far, this one included
+  int64_t iterations = 0;
+  std::string phase;
+  double loss = 0;          // weighted sum of the terms
+  std::vector<Term> terms;  // unweighted
+  double psnr = 0;          // dB, of this iteration's view, smoothed over the last ones
+  double seconds = 0;       // of training so far, earlier sessions of a resumed run included
+  double rate = 0;          // iterations a second, over the last ones
+  SurfelCounts surfels;
+};
+
+// Density control has run on one set. Counts are split by cause.
+struct DensityChanged {
+  int64_t iteration = 0;
+  std::string set;  // "main" or "environment"
+  int64_t cloned = 0;
+  int64_t split = 0;
+  int64_t pruned_transparent = 0;
+  int64_t pruned_large = 0;
+  bool opacity_reset = false;
+  bool at_cap = false;  // would have grown further but for the cap
+  int64_t count = 0;    // surfels of the set from now on
+};
+
+struct PhaseEntered {
+  int64_t iteration = 0;
+  std::string phase;
+};
+
+// Means over views that training does not see.
+struct Evaluated {
+  int64_t iteration = 0;
+  std::string split;
+  int64_t views = 0;
+  double psnr = 0;
+  double ssim = 0;
+  double seconds = 0;  // that the evaluation took
+};
+
+struct Warning {
+  int64_t iteration = 0;
+  std::string text;  // one line
+};
+
+// The state of the run is on disk.
+struct Saved {
+  int64_t iteration = 0;
+  std::filesystem::path path;
+  double seconds = 0;  // that saving took
+};
+
+enum class Ending { completed, interrupted, diverged };
+
+// Last of all events.
+struct Finished {
+  Ending ending = Ending::completed;
+  int64_t iteration = 0;
+  double seconds = 0;  // of training, earlier sessions of a resumed run included
+  double psnr = 0;     // as in the last Step
+  SurfelCounts surfels;
+  std::string reason;  // one line where the ending is not `completed`
+};
+
+using Event = std::variant<Started, Step, DensityChanged, PhaseEntered, Evaluated, Warning, Saved, Finished>;
+using Listener = std::function<void(const Event&)>;
+
+// Hands every event to every listener, in the order in which they were added.
+class Stream {
+ public:
+  void listen(Listener listener) { listeners_.push_back(std::move(listener)); }
+  void emit(const Event& event) const {
+    for (const Listener& listener : listeners_) listener(event);
+  }
+
+ private:
+  std::vector<Listener> listeners_;
+};
+
+// For std::visit with one lambda per kind of event: std::visit(Overloaded{[](const Step& s) {…}, …}, event).
+template <class... Visitors>
+struct Overloaded : Visitors... {
+  using Visitors::operator()...;
+};
+template <class... Visitors>
+Overloaded(Visitors...) -> Overloaded<Visitors...>;
+
+}  // namespace traceflow::events

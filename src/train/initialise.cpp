@@ -1,0 +1,229 @@
+#include "train/initialise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "math/rotation.h"
+#include "math/spherical_harmonics.h"
+#include "math/symmetric_eigen.h"
+#include "scene/neighbours.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr int neighbours_for_scale = 3;
+constexpr int neighbours_for_normal = 10;
+constexpr size_t views_for_colour = 8;
+// Neighbours at one place would give a scale of zero, whose logarithm is not a number.
+constexpr float least_distance2 = 1e-10F;
+
+float logit(float p) { return std::log(p / (1 - p)); }
+
+Surfels empty_surfels(int64_t count, int degree, bool tint) {
+  Surfels s;
+  s.position.reset({count, 3});
+  s.log_scale.reset({count, 2});
+  s.rotation.reset({count, 4});
+  s.opacity_logit.reset({count});
+  s.sh.reset({count, sh_coefficients(degree), 3});
+  if (tint) s.tint_logit.reset({count});
+  return s;
+}
+
+void set_scales_from_neighbours(Surfels& s) {
+  const Neighbours near = nearest_neighbours(s.position, neighbours_for_scale);
+  for (int64_t i = 0; i < s.count(); ++i) {
+    float sum = 0;
+    for (int k = 0; k < neighbours_for_scale; ++k) sum += near.distance2(i, k);
+    const float log_scale = 0.5F * std::log(std::max(sum / neighbours_for_scale, least_distance2));
+    s.log_scale(i, 0) = log_scale;
+    s.log_scale(i, 1) = log_scale;
+  }
+}
+
+void set_random_rotations(Surfels& s, Random& random) {
+  for (float& q : s.rotation.values()) q = static_cast<float>(random.normal());
+}
+
+// The rotation whose third column is n, any turn about it.
+Vec4<float> quaternion_towards(const Vec3<float>& n) {
+  // Half-way quaternion from z to n; for n = -z a half turn about x.
+  if (n.z < -0.9999F) return {0, 1, 0, 0};
+  const Vec4<float> q(1 + n.z, -n.y, n.x, 0);
+  return q / glm::length(q);
+}
+
+void set_rotations_from_neighbours(Surfels& s) {
+  const Neighbours near = nearest_neighbours(s.position, neighbours_for_normal);
+  parallel_for("initialise: normals", s.count(), [&](int64_t i) {
+    Vec3<double> mean(0);
+    std::array<Vec3<double>, neighbours_for_normal + 1> around{};
+    around[0] = load3<double>(s.position.row(i));
+    for (int k = 0; k < neighbours_for_normal; ++k) {
+      around[static_cast<size_t>(k) + 1] = load3<double>(s.position.row(std::max(0, near.index(i, k))));
+    }
+    for (const auto& x : around) mean += x / static_cast<double>(around.size());
+    Mat3<double> covariance(0);
+    for (const auto& x : around) covariance += outerProduct(x - mean, x - mean);
+    const Vec4<float> q = quaternion_towards(Vec3<float>(symmetric_eigen(covariance).vectors[0]));
+    std::copy_n(&q[0], 4, s.rotation.row(i));
+  });
+}
+
+// Views in the order of their distance from time 0.
+std::vector<const View*> earliest_views(const Capture& capture) {
+  std::vector<const View*> views;
+  for (const View& view : capture.train) views.push_back(&view);
+  std::stable_sort(views.begin(), views.end(),
+                   [](const View* a, const View* b) { return a->time < b->time; });
+  views.resize(std::min(views.size(), views_for_colour));
+  return views;
+}
+
+// The median over the earliest photographs of the colour at which each surfel projects; grey where none sees
+// it. The median forgives the views in which something stands before it.
+void set_colours_from_views(Surfels& s, const Capture& capture) {
+  const std::vector<const View*> views = earliest_views(capture);
+  std::vector<std::shared_ptr<const ViewImages>> images;
+  images.reserve(views.size());
+  for (const View* view : views) images.push_back(load_images(capture, *view));
+  parallel_for("initialise: colours", s.count(), [&](int64_t i) {
+    std::array<std::vector<float>, 3> seen;
+    for (size_t v = 0; v < views.size(); ++v) {
+      const Camera<float>& camera = views[v]->camera;
+      const Vec3<float> x = camera.point_in_camera(load3<float>(s.position.row(i)));
+      if (!(x.z > 0)) continue;
+      const Vec2<float> at = camera.project(x);
+      if (!(at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
+            at.y < static_cast<float>(camera.height))) {
+        continue;
+      }
+      const float* pixel = &images[v]->colour(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x), 0);
+      for (size_t c = 0; c < 3; ++c) seen[c].push_back(pixel[c]);
+    }
+    if (seen[0].empty()) return;
+    for (size_t c = 0; c < 3; ++c) {
+      const auto middle = seen[c].begin() + static_cast<std::ptrdiff_t>(seen[c].size() / 2);
+      std::nth_element(seen[c].begin(), middle, seen[c].end());
+      s.sh(i, 0, static_cast<int64_t>(c)) = (*middle - 0.5F) / static_cast<float>(sh_c0);
+    }
+  });
+}
+
+// At most `limit` of the points, drawn without replacement, in their order.
+Tensor<float> thinned(const Tensor<float>& points, int64_t limit, Random& random) {
+  const int64_t count = points.dim(0);
+  if (count <= limit) return points;
+  Tensor<float> kept({limit, 3});
+  int64_t taken = 0;
+  for (int64_t i = 0; i < count; ++i) {
+    if (random.below(count - i) < limit - taken) std::copy_n(points.row(i), 3, kept.row(taken++));
+  }
+  return kept;
+}
+
+Tensor<float> finite_points(const Tensor<float>& points) {
+  Tensor<float> kept(points.shape());
+  int64_t count = 0;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const float* p = points.row(i);
+    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))
+      std::copy_n(p, 3, kept.row(count++));
+  }
+  kept.resize({count, 3});
+  return kept;
+}
+
+// The range of one coordinate without its outermost half per cent on either side.
+Vec2<float> robust_range(std::vector<float> values) {
+  std::sort(values.begin(), values.end());
+  const size_t cut = values.size() / 200;
+  return {values[cut], values[values.size() - 1 - cut]};
+}
+
+}  // namespace
+
+Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random) {
+  Surfels s = empty_surfels(points.dim(0), options.sh_degree, true);
+  s.position = points;
+  set_scales_from_neighbours(s);
+  if (options.normals_from_points && s.count() > neighbours_for_normal) {
+    set_rotations_from_neighbours(s);
+  } else {
+    set_random_rotations(s, random);
+  }
+  s.opacity_logit.fill(logit(options.opacity));
+  s.tint_logit.fill(logit(options.tint));
+  return s;
+}
+
+Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views,
+                       const InitialOptions& options, Random& random) {
+  Vec3<float> low(0);
+  Vec3<float> high(0);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<float> values;
+    for (int64_t i = 0; i < points.dim(0); ++i) values.push_back(points(i, axis));
+    const Vec2<float> range = robust_range(std::move(values));
+    low[axis] = range[0];
+    high[axis] = range[1];
+  }
+  for (const View& view : views) {
+    low = glm::min(low, view.camera.position);
+    high = glm::max(high, view.camera.position);
+  }
+  const Vec3<float> centre = 0.5F * (low + high);
+  const Vec3<float> size = options.environment_box * (high - low);
+
+  const int cells = options.environment_cells;
+  const int64_t count = static_cast<int64_t>(cells) * cells * cells * options.environment_per_cell;
+  Surfels s = empty_surfels(count, options.environment_sh_degree, false);
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t cell = i / options.environment_per_cell;
+    const Vec3<float> corner(static_cast<float>(cell % cells), static_cast<float>(cell / cells % cells),
+                             static_cast<float>(cell / cells / cells));
+    const Vec3<float> offset(random.uniform(), random.uniform(), random.uniform());
+    store3(s.position.row(i), centre + size * ((corner + offset) / static_cast<float>(cells) - 0.5F));
+  }
+  set_scales_from_neighbours(s);
+  set_random_rotations(s, random);
+  s.opacity_logit.fill(logit(options.environment_opacity));
+  return s;
+}
+
+Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
+  const Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
+  if (points.dim(0) == 0) {
+    throw InputError((capture.folder / "points.npy").string(), "", "no finite points", "points to start from",
+                     "add points.npy (P×3, capture units), e.g. from structure from motion");
+  }
+  const int64_t limit = std::min(options.initial.max_points, options.density.max_surfels);
+  Scene scene;
+  scene.specular = options.specular;
+  scene.normalisation = capture.normalisation;
+  scene.extent = capture.extent;
+  scene.main = surfels_at_points(thinned(points, limit, random), options.initial, random);
+  if (options.initial.colours_from_views) set_colours_from_views(scene.main, capture);
+  if (options.deform.main)
+    scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
+
+  if (options.specular == Specular::environment_gaussians) {
+    scene.environment = surfels_around(points, capture.train, options.initial, random);
+    if (options.deform.environment) {
+      scene.environment_field =
+          make_field(options.deform.environment_network, residual::environment_outputs, random);
+    }
+  } else if (options.specular == Specular::environment_map) {
+    scene.environment_map.emplace();
+    scene.environment_map->logit.reset({6L * options.initial.map_size, options.initial.map_size, 3});
+    if (options.deform.environment) {
+      scene.environment_map->field = make_field(options.deform.environment_network, 3, random);
+    }
+  }
+  return scene;
+}
+
+}  // namespace traceflow

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "base/random.h"
+#include "capture/capture.h"
+#include "scene/scene.h"
+#include "train/options.h"
+
+namespace traceflow {
+
+// The scene that training starts from (method §7.8): main surfels at the capture's points, environment
+// surfels (or a map) around them, fields at zero. Throws InputError when the capture has no points to start
+// from.
+Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
+
+// Its two halves. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
+Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);
+// Surfels drawn uniformly in cells of the box around the points and the cameras, `environment_box` times as
+// large.
+Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views,
+                       const InitialOptions& options, Random& random);
+
+}  // namespace traceflow

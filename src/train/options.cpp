@@ -1,0 +1,150 @@
+#include "train/options.h"
+
+namespace traceflow {
+
+namespace {
+
+void check_share(float value, const char* name) {
+  check_option(value >= 0 && value <= 1, name, value, "0 to 1");
+}
+void check_not_negative(double value, const char* name) {
+  check_option(value >= 0, name, value, "0 or more");
+}
+
+TrainOptions cpu_preset() {
+  TrainOptions o;
+  o.iterations = 5000;
+  o.save_every = 1000;
+  o.initial.tint = 0.1F;
+  o.initial.max_points = 12000;
+  o.initial.sh_degree = 2;
+  o.initial.environment_sh_degree = 1;
+  o.initial.environment_cells = 12;
+  o.initial.map_size = 32;
+  o.deform.network.width = 64;
+  o.deform.network.depth = 6;
+  o.deform.network.skip = 3;
+  o.deform.network.position_frequencies = 8;
+  o.deform.environment_network = o.deform.network;
+  o.deform.environment_network.position_frequencies = 6;
+  o.rates.position = 4e-4F;
+  o.rates.field_end = 2e-5F;
+  o.density.every = 1800;
+  o.density.from = 1800;
+  o.density.opacity_reset_every = 0;
+  o.density.max_surfels = 20000;
+  o.environment_density.every = 3000;
+  o.environment_density.opacity_reset_every = 0;
+  o.environment_density.max_surfels = 12000;
+  return o;
+}
+
+TrainOptions demo_preset() {
+  TrainOptions o = cpu_preset();
+  o.iterations = 2000;
+  o.density.every = 3000;
+  o.density.from = 3000;
+  o.density.max_surfels = 12000;
+  o.initial.max_points = 8000;
+  return o;
+}
+
+}  // namespace
+
+void ScheduleOptions::validate() const {
+  check_option(length > 0, "schedule.length", length, "a positive number");
+  check_not_negative(deform_from, "schedule.deform_from");
+  check_not_negative(normal_from, "schedule.normal_from");
+  check_not_negative(specular_from, "schedule.specular_from");
+  check_option(joint_from >= specular_from, "schedule.joint_from", joint_from,
+               "no less than schedule.specular_from");
+  check_option(sh_every > 0, "schedule.sh_every", sh_every, "a positive number");
+  check_not_negative(time_jitter, "schedule.time_jitter");
+}
+
+void RateOptions::validate() const {
+  for (const auto& [value, name] : {std::pair{position, "rates.position"},
+                                    {position_end, "rates.position_end"},
+                                    {field, "rates.field"},
+                                    {field_end, "rates.field_end"},
+                                    {map, "rates.map"},
+                                    {map_end, "rates.map_end"}}) {
+    check_option(value > 0, name, value, "a positive number");
+  }
+  for (const auto& [value, name] : {std::pair{sh, "rates.sh"},
+                                    {opacity, "rates.opacity"},
+                                    {log_scale, "rates.log_scale"},
+                                    {rotation, "rates.rotation"},
+                                    {tint, "rates.tint"}}) {
+    check_not_negative(value, name);
+  }
+  check_option(sh_rest_divisor > 0, "rates.sh_rest_divisor", sh_rest_divisor, "a positive number");
+  check_option(beta1 >= 0 && beta1 < 1, "rates.beta1", beta1, "0 to under 1");
+  check_option(beta2 >= 0 && beta2 < 1, "rates.beta2", beta2, "0 to under 1");
+  check_option(epsilon > 0, "rates.epsilon", epsilon, "a positive number");
+}
+
+void LossOptions::validate() const {
+  check_share(ssim, "loss.ssim");
+  check_not_negative(normal, "loss.normal");
+  check_not_negative(normal_prior, "loss.normal_prior");
+  check_not_negative(distortion, "loss.distortion");
+}
+
+void DensityOptions::validate(const std::string& group) const {
+  check_option(every > 0, group + ".every", every, "a positive number");
+  check_option(opacity_reset_every >= 0, group + ".opacity_reset_every", opacity_reset_every,
+               "0 (none) or more");
+  check_option(max_surfels > 0, group + ".max_surfels", max_surfels, "a positive number");
+  check_option(opacity_reset > 0 && opacity_reset < 1, group + ".opacity_reset", opacity_reset,
+               "between 0 and 1");
+  check_option(gradient_threshold > 0, group + ".gradient_threshold", gradient_threshold,
+               "a positive number");
+}
+
+void DeformOptions::validate() const {
+  check_option(kind == "network", "deform.kind", kind, "network");
+  network.validate();
+  environment_network.validate();
+}
+
+void InitialOptions::validate() const {
+  check_option(max_points > 0, "initial.max_points", max_points, "a positive number");
+  check_option(sh_degree >= 0 && sh_degree <= 3, "initial.sh_degree", sh_degree, "0 to 3");
+  check_option(environment_sh_degree >= 0 && environment_sh_degree <= 3, "initial.environment_sh_degree",
+               environment_sh_degree, "0 to 3");
+  for (const auto& [value, name] : {std::pair{opacity, "initial.opacity"},
+                                    {tint, "initial.tint"},
+                                    {environment_opacity, "initial.environment_opacity"}}) {
+    check_option(value > 0 && value < 1, name, value, "between 0 and 1");
+  }
+  check_option(environment_cells >= 1 && environment_cells <= 128, "initial.environment_cells",
+               environment_cells, "1 to 128");
+  check_option(environment_per_cell >= 1, "initial.environment_per_cell", environment_per_cell, "1 or more");
+  check_option(environment_box > 0, "initial.environment_box", environment_box, "a positive number");
+  check_option(map_size >= 2 && map_size <= 4096, "initial.map_size", map_size, "2 to 4096");
+}
+
+void TrainOptions::validate() const {
+  check_option(iterations >= 1, "iterations", iterations, "1 or more");
+  check_option(save_every >= 1, "save_every", save_every, "1 or more");
+  check_option(memory_budget >= 0, "memory_budget", memory_budget, "0 (automatic) or more MiB");
+  capture.validate();
+  initial.validate();
+  deform.validate();
+  render.validate();
+  loss.validate();
+  rates.validate();
+  schedule.validate();
+  density.validate("density");
+  environment_density.validate("environment_density");
+}
+
+TrainOptions preset(const std::string& name) {
+  if (name == "paper") return {};
+  if (name == "cpu") return cpu_preset();
+  if (name == "demo") return demo_preset();
+  throw InputError("option", "preset", name, "paper, cpu or demo");
+}
+
+}  // namespace traceflow

@@ -1,0 +1,242 @@
+#pragma once
+
+#include <string>
+
+#include "capture/capture.h"
+#include "ops/optimize/adam.h"
+#include "render/render_options.h"
+#include "scene/scene.h"
+
+// Every number of the training method under its name (method §7, §9).
+namespace traceflow {
+
+// Marks of the coarse-to-fine schedule (method §7.1–§7.3, §7.6), counted in a schedule of `length`
+// iterations; a run of another length scales every mark in proportion.
+struct ScheduleOptions {
+  int length = 60000;
+  int deform_from = 3000;
+  int normal_from = 6000;
+  int specular_from = 9000;
+  int joint_from = 15000;
+  int sh_every = 1000;
+  float time_jitter = 0.1F;
+  int time_jitter_until = 20000;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("length", length, "iterations",
+            "Length in which the schedule's marks are counted; runs scale them.");
+    v.field("deform_from", deform_from, "iteration", "The main field starts (method §7.1).");
+    v.field("normal_from", normal_from, "iteration", "The normal losses start (method §7.1).");
+    v.field("specular_from", specular_from, "iteration",
+            "Phase 2: the environment trains alone (method §7.2).");
+    v.field("joint_from", joint_from, "iteration", "Phase 3: everything trains (method §7.3).");
+    v.field("sh_every", sh_every, "iterations",
+            "The harmonics' degree grows by one this often (method §7.6).");
+    v.field("time_jitter", time_jitter, "frames",
+            "Noise on the time at the start, annealed to zero (method §7.6).");
+    v.field("time_jitter_until", time_jitter_until, "iteration", "Where the noise on the time ends.");
+  }
+  void validate() const;
+};
+
+// Learning rates of Adam (method §7.6). Positions are relative to the scene's extent.
+struct RateOptions {
+  float position = 1.6e-4F;
+  float position_end = 1.6e-6F;
+  float sh = 2.5e-3F;
+  float sh_rest_divisor = 20;
+  float opacity = 0.05F;
+  float log_scale = 5e-3F;
+  float rotation = 1e-3F;
+  float tint = 0.01F;
+  float field = 8e-4F;
+  float field_end = 1.6e-6F;
+  float map = 0.016F;
+  float map_end = 1.6e-4F;
+  float beta1 = 0.9F;
+  float beta2 = 0.999F;
+  float epsilon = 1e-15F;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("position", position, "extents", "Positions, first iteration.");
+    v.field("position_end", position_end, "extents", "Positions, last iteration (log-linear between).");
+    v.field("sh", sh, "", "Harmonics of degree 0.");
+    v.field("sh_rest_divisor", sh_rest_divisor, "", "Higher harmonics learn this many times slower.");
+    v.field("opacity", opacity, "", "Opacity logits.");
+    v.field("log_scale", log_scale, "", "Log-scales.");
+    v.field("rotation", rotation, "", "Quaternions.");
+    v.field("tint", tint, "", "Specular-tint logits.");
+    v.field("field", field, "", "Residual fields, first iteration.");
+    v.field("field_end", field_end, "", "Residual fields, last iteration (log-linear between).");
+    v.field("map", map, "", "Environment map, first iteration.");
+    v.field("map_end", map_end, "", "Environment map, last iteration (log-linear between).");
+    v.field("beta1", beta1, "", "Adam's decay of the first moment.");
+    v.field("beta2", beta2, "", "Adam's decay of the second moment.");
+    v.field("epsilon", epsilon, "", "Adam's ε.");
+  }
+  void validate() const;
+  optimize::AdamOptions adam() const { return {beta1, beta2, epsilon}; }
+};
+
+// Weights of the loss (method §7.4).
+struct LossOptions {
+  float ssim = 0.2F;
+  float normal = 0.05F;
+  float normal_prior = 0.05F;
+  float distortion = 0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("ssim", ssim, "", "Share of 1 - SSIM in the photometric loss; L1 takes the rest (method §7.4).");
+    v.field("normal", normal, "", "Normal consistency L_norm (method §7.4).");
+    v.field("normal_prior", normal_prior, "",
+            "Agreement with the capture's normal priors, L_tc-norm (method §7.4).");
+    v.field("distortion", distortion, "", "Depth distortion (method §7.4).");
+  }
+  void validate() const;
+};
+
+// Density control of one set (method §7.7). Marks are counted in schedule.length iterations and scale with
+// the run.
+struct DensityOptions {
+  int from = 500;
+  int every = 100;
+  int until = 30000;
+  float gradient_threshold = 2e-4F;
+  float clone_below = 0.01F;
+  float prune_opacity = 0.05F;
+  float prune_above = 0.1F;
+  int opacity_reset_every = 3000;
+  float opacity_reset = 0.01F;
+  int max_surfels = 300000;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("from", from, "iteration", "First density control.");
+    v.field("every", every, "iterations", "Interval of density control.");
+    v.field("until", until, "iteration", "Last density control.");
+    v.field("gradient_threshold", gradient_threshold, "",
+            "Mean centre gradient above which a surfel multiplies.");
+    v.field("clone_below", clone_below, "extents",
+            "Largest scale up to which it is cloned; above, it is split.");
+    v.field("prune_opacity", prune_opacity, "", "Surfels fainter than this go.");
+    v.field("prune_above", prune_above, "extents", "Surfels wider than this go.");
+    v.field("opacity_reset_every", opacity_reset_every, "iterations",
+            "Interval of opacity resets; 0 for none.");
+    v.field("opacity_reset", opacity_reset, "", "Opacity that a reset leaves at most.");
+    v.field("max_surfels", max_surfels, "surfels", "Hard cap on the set's size.");
+  }
+  void validate(const std::string& group) const;
+};
+
+// Which fields there are, and their networks (method §1.2, §9).
+struct DeformOptions {
+  std::string kind = "network";
+  bool main = true;
+  bool environment = true;
+  NetworkOptions network;
+  NetworkOptions environment_network;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("kind", kind, "", "Kind of residual field: network.");
+    v.field("main", main, "", "The main surfels move.");
+    v.field("environment", environment, "", "The environment moves.");
+    v.group("network", network);
+    v.group("environment_network", environment_network);
+  }
+  void validate() const;
+};
+
+// How a scene starts (method §7.8).
+struct InitialOptions {
+  int max_points = 200000;
+  int sh_degree = 3;
+  int environment_sh_degree = 3;
+  float opacity = 0.1F;
+  float tint = 0.001F;
+  bool colours_from_views = true;
+  bool normals_from_points = true;
+  int environment_cells = 32;
+  int environment_per_cell = 5;
+  float environment_opacity = 0.1F;
+  float environment_box = 1.5F;
+  int map_size = 64;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("max_points", max_points, "points", "At most this many of the capture's points become surfels.");
+    v.field("sh_degree", sh_degree, "", "Degree of the main surfels' harmonics.");
+    v.field("environment_sh_degree", environment_sh_degree, "", "Degree of the environment's harmonics.");
+    v.field("opacity", opacity, "", "First opacity of main surfels.");
+    v.field("tint", tint, "", "First specular tint; short schedules want 0.1.");
+    v.field("colours_from_views", colours_from_views, "",
+            "First colours from photographs near time 0, else grey.");
+    v.field("normals_from_points", normals_from_points, "",
+            "First orientation from neighbouring points, else random.");
+    v.field("environment_cells", environment_cells, "cells",
+            "Cells along each side of the environment's box.");
+    v.field("environment_per_cell", environment_per_cell, "surfels", "Environment surfels in each cell.");
+    v.field("environment_opacity", environment_opacity, "", "First opacity of environment surfels.");
+    v.field("environment_box", environment_box, "", "Size of that box, in boxes around cameras and points.");
+    v.field("map_size", map_size, "texels", "Side of a face of the environment map.");
+  }
+  void validate() const;
+};
+
+// What happens to a gradient that is not a number.
+enum class NonFinite { stop, drop };
+
+struct TrainOptions {
+  int iterations = 60000;
+  int64_t seed = 1;
+  Specular specular = Specular::environment_gaussians;
+  int64_t memory_budget = 0;
+  int save_every = 5000;
+  NonFinite non_finite = NonFinite::stop;
+  float collapse_decibels = 10;
+  CaptureOptions capture;
+  InitialOptions initial;
+  DeformOptions deform;
+  RenderOptions render;
+  LossOptions loss;
+  RateOptions rates;
+  ScheduleOptions schedule;
+  DensityOptions density;
+  DensityOptions environment_density{
+      .from = 9000, .every = 500, .gradient_threshold = 1e-4F, .max_surfels = 200000};
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("iterations", iterations, "iterations",
+            "Length of the run; every mark of the schedule scales with it.");
+    v.field("seed", seed, "", "Seed of every random choice.");
+    v.field("specular", specular, "",
+            "Where reflections come from: none, environment-gaussians, environment-map.");
+    v.field("memory_budget", memory_budget, "MiB",
+            "Memory that the run may take; 0 for three quarters of the machine's.");
+    v.field("save_every", save_every, "iterations", "Interval of checkpoints.");
+    v.field("non_finite", non_finite, "",
+            "A gradient that is not finite stops the run, or is dropped and counted.");
+    v.field("collapse_decibels", collapse_decibels, "dB",
+            "Fall of the mean PSNR under its best that ends the run; 0: never.");
+    v.group("capture", capture);
+    v.group("initial", initial);
+    v.group("deform", deform);
+    v.group("render", render);
+    v.group("loss", loss);
+    v.group("rates", rates);
+    v.group("schedule", schedule);
+    v.group("density", density);
+    v.group("environment_density", environment_density);
+  }
+  void validate() const;
+};
+
+// The named starting points: "paper" (60,000 iterations as published), "cpu" (two cores, a quarter of an hour
+// at 240×135), "demo" (minutes). Throws InputError for another name.
+TrainOptions preset(const std::string& name);
+
+}  // namespace traceflow

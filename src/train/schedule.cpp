@@ -1,0 +1,113 @@
+#include "train/schedule.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace traceflow {
+
+const char* to_string(Phase phase) {
+  switch (phase) {
+    case Phase::diffuse:
+      return "diffuse";
+    case Phase::specular:
+      return "specular";
+    case Phase::joint:
+      return "joint";
+  }
+  return "";
+}
+
+int Schedule::mark(int in_schedule) const {
+  return static_cast<int>(
+      std::llround(static_cast<double>(in_schedule) * options_.iterations / options_.schedule.length));
+}
+
+int Schedule::interval(int in_schedule) const { return std::max(1, mark(in_schedule)); }
+
+Phase Schedule::phase(int iteration) const {
+  // Without reflections there is nothing for phases 2 and 3 to add.
+  if (!specular() || iteration < mark(options_.schedule.specular_from)) return Phase::diffuse;
+  return iteration < mark(options_.schedule.joint_from) ? Phase::specular : Phase::joint;
+}
+
+Trainable Schedule::trainable(int iteration) const {
+  const Phase now = phase(iteration);
+  Trainable t;
+  t.main = now != Phase::specular;
+  t.main_field = t.main && deforms_main(iteration);
+  t.tint = now != Phase::diffuse;
+  t.environment = now != Phase::diffuse;
+  t.environment_field = deforms_environment(iteration);
+  return t;
+}
+
+bool Schedule::deforms_main(int iteration) const {
+  return options_.deform.main && iteration >= mark(options_.schedule.deform_from);
+}
+
+bool Schedule::deforms_environment(int iteration) const {
+  return options_.deform.environment && phase(iteration) != Phase::diffuse;
+}
+
+bool Schedule::uses_normal_losses(int iteration) const {
+  return iteration >= mark(options_.schedule.normal_from);
+}
+
+int Schedule::sh_degree(int iteration, int start, int limit) const {
+  return std::clamp((iteration - start) / interval(options_.schedule.sh_every), 0, limit);
+}
+
+int Schedule::sh_degree_main(int iteration) const {
+  return sh_degree(iteration, 0, options_.initial.sh_degree);
+}
+
+int Schedule::sh_degree_environment(int iteration) const {
+  return sh_degree(iteration, mark(options_.schedule.specular_from), options_.initial.environment_sh_degree);
+}
+
+double Schedule::time_jitter(int iteration) const {
+  const int until = mark(options_.schedule.time_jitter_until);
+  if (iteration >= until) return 0;
+  return options_.schedule.time_jitter * (1.0 - static_cast<double>(iteration) / until);
+}
+
+bool Schedule::densifies(int iteration, const DensityOptions& density) const {
+  return iteration >= mark(density.from) && iteration < mark(density.until) && iteration > 0 &&
+         iteration % interval(density.every) == 0;
+}
+
+bool Schedule::resets(int iteration, const DensityOptions& density) const {
+  return density.opacity_reset_every > 0 && iteration > mark(density.from) &&
+         iteration < mark(density.until) && iteration % interval(density.opacity_reset_every) == 0;
+}
+
+bool Schedule::densifies_main(int iteration) const {
+  return phase(iteration) != Phase::specular && densifies(iteration, options_.density);
+}
+
+bool Schedule::densifies_environment(int iteration) const {
+  return phase(iteration) != Phase::diffuse && densifies(iteration, options_.environment_density);
+}
+
+bool Schedule::resets_main_opacity(int iteration) const {
+  return phase(iteration) != Phase::specular && resets(iteration, options_.density);
+}
+
+bool Schedule::resets_environment_opacity(int iteration) const {
+  return phase(iteration) != Phase::diffuse && resets(iteration, options_.environment_density);
+}
+
+double Schedule::position_rate(int iteration) const {
+  return optimize::log_linear(options_.rates.position, options_.rates.position_end, iteration,
+                              options_.iterations);
+}
+
+double Schedule::field_rate(int iteration) const {
+  return optimize::log_linear(options_.rates.field, options_.rates.field_end, iteration, options_.iterations);
+}
+
+double Schedule::map_rate(int iteration) const {
+  return optimize::log_linear(options_.rates.map, options_.rates.map_end, iteration, options_.iterations);
+}
+
+}  // namespace traceflow

@@ -1,0 +1,51 @@
+#pragma once
+
+#include "render/frame.h"
+#include "train/options.h"
+
+namespace traceflow {
+
+// Which part of the method is training (method §7.1–§7.3).
+enum class Phase { diffuse, specular, joint };
+const char* to_string(Phase phase);
+
+// What an iteration of a run does (method §7): the options' marks scaled to the run's length. Iterations
+// count from 0.
+class Schedule {
+ public:
+  explicit Schedule(const TrainOptions& options) : options_(options) {}
+
+  Phase phase(int iteration) const;
+  Trainable trainable(int iteration) const;
+  bool deforms_main(int iteration) const;
+  bool deforms_environment(int iteration) const;
+  bool uses_normal_losses(int iteration) const;
+  int sh_degree_main(int iteration) const;
+  int sh_degree_environment(int iteration) const;
+  // Standard deviation of the noise on the time (method §7.6), in frame intervals.
+  double time_jitter(int iteration) const;
+
+  bool densifies_main(int iteration) const;
+  bool densifies_environment(int iteration) const;
+  bool resets_main_opacity(int iteration) const;
+  bool resets_environment_opacity(int iteration) const;
+
+  // Learning rates that fall along the run.
+  double position_rate(int iteration) const;
+  double field_rate(int iteration) const;
+  double map_rate(int iteration) const;
+
+ private:
+  // A mark of the schedule in iterations of this run.
+  int mark(int in_schedule) const;
+  // Iterations from one event to the next, at least one.
+  int interval(int in_schedule) const;
+  bool densifies(int iteration, const DensityOptions& density) const;
+  bool resets(int iteration, const DensityOptions& density) const;
+  int sh_degree(int iteration, int start, int limit) const;
+  bool specular() const { return options_.specular != Specular::none; }
+
+  TrainOptions options_;
+};
+
+}  // namespace traceflow
