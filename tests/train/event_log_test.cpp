@@ -1,0 +1,118 @@
+#include "train/event_log.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+
+namespace traceflow {
+namespace {
+
+using nlohmann::json;
+
+std::filesystem::path scratch(const std::string& name) {
+  const auto path = std::filesystem::path(testing::TempDir()) / ("traceflow_" + name + ".jsonl");
+  std::filesystem::remove(path);
+  return path;
+}
+
+std::vector<json> lines(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::vector<json> result;
+  for (std::string line; std::getline(file, line);) result.push_back(json::parse(line));
+  return result;
+}
+
+events::Step step(int64_t iteration, int64_t iterations) {
+  events::Step e;
+  e.iteration = iteration;
+  e.iterations = iterations;
+  return e;
+}
+
+TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
+  events::Step full = step(7, 10);
+  full.phase = "specular";
+  full.loss = 0.5;
+  full.terms = {{"l1", 0.25}, {"ssim", 1.5}};
+  full.psnr = 21.5;
+  full.seconds = 3;
+  full.rate = 2.5;
+  full.surfels = {100, 20};
+  const auto path = scratch("kinds");
+  {
+    EventLog log(path);
+    log(events::Started{"plate", "runs/plate", 0, 10, 2, 42, {100, 20}});
+    log(full);
+    log(events::DensityChanged{8, "main", 1, 2, 3, 4, true, false, 96});
+    log(events::PhaseEntered{9, "joint"});
+    log(events::Evaluated{9, "test", 5, 20.25, 0.75, 1.5});
+    log(events::Warning{9, "a \"quoted\"\nline"});
+    log(events::Saved{10, "runs/plate/state.safetensors", 0.5});
+    log(events::Finished{events::Ending::interrupted, 10, 4, 22, {96, 20}, "SIGTERM"});
+  }
+  const std::vector<json> written = lines(path);
+  ASSERT_EQ(written.size(), 8U);
+  EXPECT_EQ(written[0], json::parse(R"({"event":"started","capture":"plate","run":"runs/plate","iteration":0,
+      "iterations":10,"threads":2,"seed":42,"surfels":{"main":100,"environment":20}})"));
+  EXPECT_EQ(written[1],
+            json::parse(R"({"event":"step","iteration":7,"iterations":10,"phase":"specular","loss":0.5,
+      "terms":{"l1":0.25,"ssim":1.5},"psnr":21.5,"seconds":3.0,"rate":2.5,"surfels":{"main":100,"environment":20}})"));
+  EXPECT_EQ(written[2],
+            json::parse(R"({"event":"density_changed","iteration":8,"set":"main","cloned":1,"split":2,
+      "pruned_transparent":3,"pruned_large":4,"opacity_reset":true,"at_cap":false,"count":96})"));
+  EXPECT_EQ(written[3], json::parse(R"({"event":"phase_entered","iteration":9,"phase":"joint"})"));
+  EXPECT_EQ(written[4],
+            json::parse(R"({"event":"evaluated","iteration":9,"split":"test","views":5,"psnr":20.25,
+      "ssim":0.75,"seconds":1.5})"));
+  EXPECT_EQ(written[5]["text"], "a \"quoted\"\nline");
+  EXPECT_EQ(written[6], json::parse(R"({"event":"saved","iteration":10,"path":"runs/plate/state.safetensors",
+      "seconds":0.5})"));
+  EXPECT_EQ(written[7],
+            json::parse(R"({"event":"finished","ending":"interrupted","iteration":10,"seconds":4.0,
+      "psnr":22.0,"surfels":{"main":96,"environment":20},"reason":"SIGTERM"})"));
+}
+
+TEST(EventLog, AppendsAndThinsStepsButKeepsTheLast) {
+  const auto path = scratch("thinned");
+  for (int session = 0; session < 2; ++session) {
+    EventLog log(path, 3);
+    for (int64_t i = 1; i <= 7; ++i) log(step(i, 7));
+    log(events::PhaseEntered{7, "joint"});
+  }
+  std::vector<int64_t> iterations;
+  for (const json& line : lines(path)) iterations.push_back(line["iteration"]);
+  EXPECT_EQ(iterations, (std::vector<int64_t>{3, 6, 7, 7, 3, 6, 7, 7}));
+}
+
+TEST(EventLog, WritesNullForWhatIsNotFinite) {
+  events::Step diverged = step(1, 1);
+  diverged.loss = std::nan("");
+  diverged.psnr = INFINITY;
+  const json line = json::parse(to_json_line(diverged));
+  EXPECT_TRUE(line["loss"].is_null());
+  EXPECT_TRUE(line["psnr"].is_null());
+}
+
+TEST(EventLog, TextThatIsNotUtf8StillMakesALine) {
+  EXPECT_NO_THROW(json::parse(to_json_line(events::Warning{0, "\xFF"})));
+}
+
+TEST(EventLog, RefusesAPlaceThatCannotBeWritten) {
+  EXPECT_THROW(EventLog("/nowhere/at/all/log.jsonl"), InputError);
+}
+
+TEST(EventStream, CallsListenersInOrder) {
+  std::string heard;
+  events::Stream stream;
+  stream.listen([&](const events::Event&) { heard += "a"; });
+  stream.listen([&](const events::Event& e) { heard += std::to_string(e.index()); });
+  stream.emit(events::Step{});
+  stream.emit(events::Finished{});
+  EXPECT_EQ(heard, "a1a7");
+}
+
+}  // namespace
+}  // namespace traceflow
