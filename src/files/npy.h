@@ -1,18 +1,47 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "base/tensor.h"
+#include "files/input_file.h"
 
 namespace traceflow {
 
-// Reads a .npy array of up to 4 dimensions as float32. Accepts little-endian float16/32/64, int and uint of 8 to 64 bits and
-// bool, C order (Fortran order is transposed). Throws InputError for object arrays, other types, and sizes that the file
-// does not hold (checked before memory is taken).
+// Reads a .npy array of up to 4 dimensions as float32. Accepts little-endian float16/32/64, int and uint of 8
+// to 64 bits and bool, C order (Fortran order is transposed). Throws InputError for object arrays, other
+// types, and sizes that the file does not hold (checked before memory is taken). A scalar is read as an array
+// of one element.
 Tensor<float> read_npy(const std::filesystem::path& path);
 // The array `name` of a .npz (zip, stored or deflated); an empty name takes the only one.
 Tensor<float> read_npz(const std::filesystem::path& path, const std::string& name = "");
 // float32, C order, format version 1.0. Written atomically.
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array);
+
+// An array left on the disk and read in slices, for those larger than memory should hold. Throws InputError
+// as read_npy does.
+class NpyFile {
+ public:
+  // A .npy, or by the extension .npz the array `name` of one (empty: the only one). A deflated array is
+  // unpacked once into a nameless temporary file.
+  explicit NpyFile(const std::filesystem::path& path, const std::string& name = "");
+
+  const std::filesystem::path& path() const { return file_.path(); }
+  const Shape& shape() const { return shape_; }
+  Tensor<float> read() const;
+  // Element i of the first dimension (rank ≥ 2, C order). Safe to call from several threads.
+  Tensor<float> slice(int64_t i) const;
+
+ private:
+  void read_header(int64_t begin, int64_t end);
+  Tensor<float> read_elements(int64_t first, const Shape& shape) const;
+
+  InputFile file_;
+  Shape shape_;
+  char kind_ = 'f';  // numpy's: f, i, u, b
+  int width_ = 4;    // bytes of an element
+  bool fortran_order_ = false;
+  int64_t data_offset_ = 0;
+};
 
 }  // namespace traceflow

@@ -7,8 +7,9 @@
 
 namespace traceflow {
 
-// An 8-bit image as stored, H×W×C with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA). 16-bit files keep their high byte;
-// palettes are expanded. Throws InputError for what is not a PNG or is larger than 32,768 pixels a side.
+// An 8-bit image as stored, H×W×C with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA). 16-bit files keep
+// their high byte; palettes are expanded. Throws InputError for what is not a PNG or is larger than 32,768
+// pixels a side.
 Tensor<uint8_t> read_png(const std::filesystem::path& path);
 // Width and height from the header alone.
 struct PngSize {

@@ -1,0 +1,90 @@
+#include "files/input_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "base/error.h"
+
+namespace traceflow {
+
+InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
+  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor_ < 0) throw InputError(path.string(), "", std::strerror(errno), "a readable file");
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
+    close();
+    throw InputError(path.string(), "", "something that is not a regular file", "a readable file");
+  }
+  size_ = status.st_size;
+}
+
+InputFile::InputFile(std::filesystem::path path, int descriptor, int64_t size)
+    : path_(std::move(path)), descriptor_(descriptor), size_(size) {}
+
+InputFile InputFile::scratch(const std::filesystem::path& origin) {
+  std::string name = (std::filesystem::temp_directory_path() / "traceflow-XXXXXX").string();
+  const int descriptor = ::mkstemp(name.data());
+  if (descriptor < 0) {
+    throw InputError(origin.string(), "temporary file " + name, std::strerror(errno), "room to unpack",
+                     "set TMPDIR to a folder with space");
+  }
+  ::unlink(name.c_str());
+  return {origin, descriptor, 0};
+}
+
+InputFile::~InputFile() { close(); }
+
+InputFile::InputFile(InputFile&& other) noexcept
+    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)), size_(other.size_) {}
+
+InputFile& InputFile::operator=(InputFile&& other) noexcept {
+  if (this == &other) return *this;
+  close();
+  path_ = std::move(other.path_);
+  descriptor_ = std::exchange(other.descriptor_, -1);
+  size_ = other.size_;
+  return *this;
+}
+
+void InputFile::close() noexcept {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  descriptor_ = -1;
+}
+
+void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
+  for (size_t done = 0; done < bytes.size();) {
+    const ssize_t n = ::pread(descriptor_, bytes.data() + done, bytes.size() - done,
+                              static_cast<off_t>(offset) + static_cast<off_t>(done));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) throw InputError(path_.string(), "read", std::strerror(errno), "a readable file");
+    if (n == 0) {
+      throw InputError(path_.string(), "", std::to_string(size_) + " bytes",
+                       std::to_string(offset + static_cast<int64_t>(bytes.size())) + " bytes at least",
+                       "the file is cut short; copy it again");
+    }
+    done += static_cast<size_t>(n);
+  }
+}
+
+void InputFile::append(std::span<const std::byte> bytes) {
+  for (size_t done = 0; done < bytes.size();) {
+    const ssize_t n =
+        ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(size_));
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) {
+      throw InputError(path_.string(), "unpacking", std::strerror(errno), "room in the temporary folder",
+                       "set TMPDIR to a folder with space");
+    }
+    done += static_cast<size_t>(n);
+    size_ += n;
+  }
+}
+
+}  // namespace traceflow

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+namespace traceflow {
+
+// A file opened for reading at any place, by several threads at once. Every failure is an InputError naming
+// the file.
+class InputFile {
+ public:
+  explicit InputFile(const std::filesystem::path& path);
+  // A nameless file in the machine's temporary folder, gone when closed; errors name `origin`.
+  static InputFile scratch(const std::filesystem::path& origin);
+  ~InputFile();
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&& other) noexcept;
+  InputFile(const InputFile&) = delete;
+  InputFile& operator=(const InputFile&) = delete;
+
+  const std::filesystem::path& path() const { return path_; }
+  int64_t size() const { return size_; }
+  // Fills `bytes` from `offset`. Throws when the file ends before.
+  void read_at(int64_t offset, std::span<std::byte> bytes) const;
+  // Only for scratch files: grows the file.
+  void append(std::span<const std::byte> bytes);
+
+ private:
+  InputFile(std::filesystem::path path, int descriptor, int64_t size);
+  void close() noexcept;
+
+  std::filesystem::path path_;
+  int descriptor_ = -1;
+  int64_t size_ = 0;
+};
+
+}  // namespace traceflow
