@@ -243,9 +243,9 @@ Tensor<float> read_npz(const std::filesystem::path& path, const std::string& nam
 
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array) {
   std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (";
-  for (int r = 0; r < array.shape().rank(); ++r) header += std::to_string(array.dim(r)) + ", ";
-  header += "), }";
-  if (array.shape().rank() > 1) header.erase(header.rfind(", )"), 2);
+  for (int r = 0; r < array.shape().rank(); ++r)
+    header += (r == 0 ? "" : ", ") + std::to_string(array.dim(r));
+  header += array.shape().rank() == 1 ? ",), }" : "), }";
   // The data starts at a multiple of 64 bytes, the header's last byte is a newline.
   constexpr size_t fixed = 10;
   header.append(63 - (fixed + header.size()) % 64, ' ').push_back('\n');

@@ -1,0 +1,261 @@
+#include "files/npy.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+#include <zlib.h>
+
+#include <cstring>
+#include <fstream>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "support/temp_folder.h"
+
+namespace traceflow {
+namespace {
+
+void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// A .npy as numpy writes it, byte by byte.
+std::string npy(const std::string& dictionary, const std::string& data, int version = 1) {
+  std::string header = dictionary + "\n";
+  std::string bytes = "\x93NUMPY";
+  bytes += {static_cast<char>(version), '\0', static_cast<char>(header.size() & 0xff),
+            static_cast<char>(header.size() >> 8)};
+  if (version > 1) bytes += {'\0', '\0'};
+  return bytes + header + data;
+}
+std::string dictionary(const std::string& type, const std::string& shape, bool fortran = false) {
+  return "{'descr': '" + type + "', 'fortran_order': " + (fortran ? "True" : "False") +
+         ", 'shape': " + shape + ", }";
+}
+template <class T>
+std::string raw(std::initializer_list<T> values) {
+  return {reinterpret_cast<const char*>(values.begin()), values.size() * sizeof(T)};
+}
+
+std::string little(uint64_t value, int width) {
+  std::string bytes;
+  for (int i = 0; i < width; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
+  return bytes;
+}
+
+std::string deflated(const std::string& data) {
+  z_stream stream{};
+  deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
+  std::string out(deflateBound(&stream, data.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(data.data()));
+  stream.avail_in = static_cast<uInt>(data.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  deflate(&stream, Z_FINISH);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+// A zip archive written independently of the reader, after the format's description. `zip64` puts the sizes
+// into the extra field as numpy.savez does.
+std::string zip(const std::vector<std::pair<std::string, std::string>>& members, bool deflate_them,
+                bool zip64 = false) {
+  std::string body, directory;
+  for (const auto& [name, data] : members) {
+    const std::string stored = deflate_them ? deflated(data) : data;
+    const std::string method = little(deflate_them ? 8 : 0, 2);
+    const std::string extra =
+        zip64 ? little(1, 2) + little(16, 2) + little(data.size(), 8) + little(stored.size(), 8) : "";
+    const std::string sizes = zip64 ? little(0xffffffff, 4) + little(0xffffffff, 4)
+                                    : little(stored.size(), 4) + little(data.size(), 4);
+    const std::string common = little(20, 2) + little(0, 2) + method + little(0, 4) + little(0, 4) + sizes +
+                               little(name.size(), 2) + little(extra.size(), 2);
+    directory += "PK\1\2" + little(20, 2) + common + little(0, 2) + little(0, 2) + little(0, 2) +
+                 little(0, 4) + little(body.size(), 4) + name + extra;
+    body += "PK\3\4" + common + name + extra + stored;
+  }
+  return body + directory + "PK\5\6" + little(0, 4) + little(members.size(), 2) + little(members.size(), 2) +
+         little(directory.size(), 4) + little(body.size(), 4) + little(0, 2);
+}
+
+RC_GTEST_PROP(Npy, write_then_read_is_the_same_array, ()) {
+  const TempFolder folder;
+  const auto dims = *rc::gen::container<std::vector<int64_t>>(4, rc::gen::inRange<int64_t>(0, 6));
+  const int rank = *rc::gen::inRange(1, 5);
+  const Shape shape = rank == 1   ? Shape{dims[0]}
+                      : rank == 2 ? Shape{dims[0], dims[1]}
+                      : rank == 3 ? Shape{dims[0], dims[1], dims[2]}
+                                  : Shape{dims[0], dims[1], dims[2], dims[3]};
+  Tensor<float> array(shape);
+  Random random(*rc::gen::arbitrary<uint64_t>());
+  for (float& v : array.values()) v = static_cast<float>(random.normal());
+  write_npy(folder / "a.npy", array);
+  const Tensor<float> read = read_npy(folder / "a.npy");
+  RC_ASSERT(read.shape() == shape);
+  RC_ASSERT(std::equal(read.data(), read.data() + read.size(), array.data()));
+}
+
+TEST(Npy, written_header_is_numpys) {
+  const TempFolder folder;
+  write_npy(folder / "a.npy", Tensor<float>({2, 3}));
+  const std::string bytes = bytes_of(folder / "a.npy");
+  EXPECT_EQ(bytes.size(), 128U + 24U);
+  EXPECT_EQ(bytes.substr(10, 57), "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3),");
+  EXPECT_EQ(bytes[127], '\n');
+  write_npy(folder / "b.npy", Tensor<float>({5}));
+  EXPECT_NE(bytes_of(folder / "b.npy").find("'shape': (5,)"), std::string::npos);
+}
+
+TEST(Npy, every_type_widens_to_float) {
+  const TempFolder folder;
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"<f2", raw<uint16_t>({0x3c00, 0xc000, 0x0001, 0x7bff})},
+      {"<f4", raw<float>({1, -2, 3.5F, 1e9F})},
+      {"<f8", raw<double>({1, -2, 3.5, 1e9})},
+      {"|b1", raw<uint8_t>({1, 0, 1, 1})},
+      {"|i1", raw<int8_t>({1, -2, 127, -128})},
+      {"|u1", raw<uint8_t>({1, 2, 127, 255})},
+      {"<i2", raw<int16_t>({1, -2, 300, -30000})},
+      {"<u2", raw<uint16_t>({1, 2, 300, 65535})},
+      {"<i4", raw<int32_t>({1, -2, 300, -70000})},
+      {"<u4", raw<uint32_t>({1, 2, 300, 4294967295U})},
+      {"<i8", raw<int64_t>({1, -2, 300, -70000})},
+      {"<u8", raw<uint64_t>({1, 2, 300, 1ULL << 63})}};
+  const std::vector<std::vector<float>> expected = {
+      {1, -2, 0x1p-24F, 65504}, {1, -2, 3.5F, 1e9F},  {1, -2, 3.5F, 1e9F},  {1, 0, 1, 1},
+      {1, -2, 127, -128},       {1, 2, 127, 255},     {1, -2, 300, -30000}, {1, 2, 300, 65535},
+      {1, -2, 300, -70000},     {1, 2, 300, 0x1p32F}, {1, -2, 300, -70000}, {1, 2, 300, 0x1p63F}};
+  for (size_t i = 0; i < cases.size(); ++i) {
+    write_bytes(folder / "a.npy", npy(dictionary(cases[i].first, "(4,)"), cases[i].second));
+    const Tensor<float> read = read_npy(folder / "a.npy");
+    ASSERT_EQ(read.shape(), (Shape{4})) << cases[i].first;
+    for (int k = 0; k < 4; ++k) EXPECT_EQ(read[k], expected[i][static_cast<size_t>(k)]) << cases[i].first;
+  }
+}
+
+TEST(Npy, versions_two_and_three_scalars_and_python_2_shapes) {
+  const TempFolder folder;
+  for (const int version : {1, 2, 3}) {
+    write_bytes(folder / "a.npy", npy(dictionary("<f4", "(2L, 1L)"), raw<float>({4, 5}), version));
+    EXPECT_EQ(read_npy(folder / "a.npy").shape(), (Shape{2, 1}));
+  }
+  write_bytes(folder / "scalar.npy", npy(dictionary("<f4", "()"), raw<float>({4})));
+  EXPECT_EQ(read_npy(folder / "scalar.npy").shape(), (Shape{1}));
+  EXPECT_EQ(read_npy(folder / "scalar.npy")[0], 4);
+}
+
+TEST(Npy, fortran_order_is_transposed) {
+  const TempFolder folder;
+  // numpy: asfortranarray([[1, 2, 3], [4, 5, 6]]) stands in the file column by column.
+  write_bytes(folder / "a.npy", npy(dictionary("<f4", "(2, 3)", true), raw<float>({1, 4, 2, 5, 3, 6})));
+  const Tensor<float> read = read_npy(folder / "a.npy");
+  for (int i = 0; i < 6; ++i) EXPECT_EQ(read[i], static_cast<float>(i + 1));
+  EXPECT_THROW(NpyFile(folder / "a.npy").slice(0), InputError);
+}
+
+TEST(Npy, slices_are_rows_of_the_whole) {
+  const TempFolder folder;
+  Tensor<float> array({5, 3, 2, 3});
+  for (int64_t i = 0; i < array.size(); ++i) array[i] = static_cast<float>(i);
+  write_npy(folder / "a.npy", array);
+  write_bytes(folder / "stored.npz", zip({{"depth.npy", bytes_of(folder / "a.npy")}}, false));
+  write_bytes(folder / "deflated.npz", zip({{"depth.npy", bytes_of(folder / "a.npy")}}, true));
+  for (const char* name : {"a.npy", "stored.npz", "deflated.npz"}) {
+    const NpyFile file(folder / name);
+    ASSERT_EQ(file.shape(), array.shape()) << name;
+    for (int64_t i = 0; i < 5; ++i) {
+      const Tensor<float> slice = file.slice(i);
+      ASSERT_EQ(slice.shape(), (Shape{3, 2, 3})) << name;
+      EXPECT_TRUE(std::equal(slice.data(), slice.data() + slice.size(), array.row(i))) << name;
+    }
+  }
+}
+
+TEST(Npz, members_are_found_by_name) {
+  const TempFolder folder;
+  const std::string a = npy(dictionary("<f4", "(1,)"), raw<float>({1}));
+  const std::string b = npy(dictionary("<f4", "(1,)"), raw<float>({2}));
+  for (const bool deflate_them : {false, true}) {
+    for (const bool zip64 : {false, true}) {
+      write_bytes(folder / "two.npz", zip({{"a.npy", a}, {"b.npy", b}}, deflate_them, zip64));
+      EXPECT_EQ(read_npz(folder / "two.npz", "a")[0], 1);
+      EXPECT_EQ(read_npz(folder / "two.npz", "b.npy")[0], 2);
+      EXPECT_THROW(read_npz(folder / "two.npz"), InputError);
+      EXPECT_THROW(read_npz(folder / "two.npz", "c"), InputError);
+    }
+  }
+}
+
+TEST(NpyHostile, headers_that_lie_are_refused) {
+  const TempFolder folder;
+  const std::string data = raw<float>({1, 2, 3, 4});
+  const std::string bad[] = {
+      npy(dictionary("<f4", "(5,)"), data),
+      npy(dictionary("<f4", "(99999999999999,)"), data),
+      npy(dictionary("<f4", "(4294967296, 4294967296, 4294967296)"), data),
+      npy(dictionary("<f4", "(99999999999999999999999,)"), data),
+      npy(dictionary("<f4", "(-1,)"), data),
+      npy(dictionary("<f4", "(1, 1, 1, 1, 4)"), data),
+      npy(dictionary("<f4", "(x,)"), data),
+      npy(dictionary("<f4", "4"), data),
+      npy(dictionary("<f4", "(4,"), data),
+      npy(dictionary("|O", "(1,)"), data),
+      npy(dictionary("<M8[ns]", "(1,)"), data),
+      npy(dictionary(">f4", "(4,)"), data),
+      npy(dictionary("<f3", "(4,)"), data),
+      npy(dictionary("<c8", "(2,)"), data),
+      npy(dictionary("", "(2,)"), data),
+      npy("{'descr': [('x', '<f4')], 'fortran_order': False, 'shape': (4,), }", data),
+      npy("{'fortran_order': False, 'shape': (4,), }", data),
+      npy("{'descr': '<f4', 'fortran_order': False}", data),
+      npy("", data),
+      npy("{'descr'", data),
+      npy("{'descr':", data),
+      npy(dictionary("<f4", "(4,)"), data, 9),
+      "\x93NUMPY\x02" + std::string("\0\xff\xff\xff\x7f", 5) + data,
+      "",
+      "\x93NUMPY",
+      "PK",
+  };
+  for (const std::string& bytes : bad) {
+    write_bytes(folder / "bad.npy", bytes);
+    EXPECT_THROW(read_npy(folder / "bad.npy"), InputError) << bytes;
+  }
+}
+
+TEST(NpyHostile, truncated_files_are_refused) {
+  const TempFolder folder;
+  const std::string whole = npy(dictionary("<f4", "(2, 2)"), raw<float>({1, 2, 3, 4}));
+  for (size_t length = 0; length < whole.size(); ++length) {
+    write_bytes(folder / "cut.npy", whole.substr(0, length));
+    EXPECT_THROW(read_npy(folder / "cut.npy"), InputError) << length;
+  }
+}
+
+TEST(NpzHostile, truncations_and_flipped_bytes_never_crash) {
+  const TempFolder folder;
+  const std::string member = npy(dictionary("<f4", "(2, 2)"), raw<float>({1, 2, 3, 4}));
+  for (const bool deflate_them : {false, true}) {
+    const std::string whole = zip({{"a.npy", member}}, deflate_them);
+    for (size_t at = 0; at < whole.size(); ++at) {
+      write_bytes(folder / "cut.npz", whole.substr(0, at));
+      EXPECT_THROW(read_npz(folder / "cut.npz"), InputError) << at;
+      for (const int flip : {0x01, 0x80, 0xff}) {
+        std::string broken = whole;
+        broken[at] = static_cast<char>(broken[at] ^ flip);
+        write_bytes(folder / "broken.npz", broken);
+        try {
+          EXPECT_LE(read_npz(folder / "broken.npz").size(), 4);
+        } catch (const InputError&) {
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace traceflow
