@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <type_traits>
 
@@ -12,11 +13,20 @@
 //     v.group("loss", loss);                       // a nested options struct
 //   }
 //
-// and `void validate() const`, which throws InputError through check_option. Everything else (flags, --set, TOML, the
-// checkpoint, the viewer) is a visitor of these, so an option is named once. A dotted path names a field from outside:
-// `loss.normal`. Names use snake_case; supported types: bool, int, int64_t, float, double, std::string, and enums that
-// have `enum_names(E)` (see below).
+// and `void validate() const`, which throws InputError through check_option. Everything else (flags, --set,
+// TOML, the checkpoint, the viewer) is a visitor of these (base/option_fields.h), so an option is named once.
+// A dotted path names a field from outside: `loss.normal`. Names use snake_case; supported types: bool, int,
+// int64_t, float, double, std::string, Vec3 of a float, and enums whose values count from 0 and whose names
+// stand beside them in a function found by ADL:
+//
+//   enum class SortOrder { centre, hit };
+//   constexpr std::array<std::string_view, 2> enum_names(SortOrder) { return {"centre", "hit"}; }
 namespace traceflow {
+
+// A number as the user would write it: the shortest text that reads back as the same value.
+std::string number_text(double value);
+std::string number_text(float value);
+std::string number_text(int64_t value);
 
 // Throws InputError "option NAME: found …, expected …" unless the condition holds.
 template <class T>
@@ -24,8 +34,10 @@ void check_option(bool condition, const std::string& name, const T& found, const
   if (condition) return;
   if constexpr (std::is_convertible_v<T, std::string>) {
     throw InputError("option", name, found, expected);
+  } else if constexpr (std::is_floating_point_v<T>) {
+    throw InputError("option", name, number_text(found), expected);
   } else {
-    throw InputError("option", name, std::to_string(found), expected);
+    throw InputError("option", name, number_text(static_cast<int64_t>(found)), expected);
   }
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/options.h"
@@ -36,6 +38,9 @@ struct ViewTruth {
 
 // Axes of the normal priors' camera space, the sign of each against OpenCV's (x right, y down, z forward).
 enum class PriorAxes { automatic, opengl, opencv, stable_normal };
+constexpr std::array<std::string_view, 4> enum_names(PriorAxes) {
+  return {"automatic", "opengl", "opencv", "stable-normal"};
+}
 
 struct CaptureOptions {
   int downscale = 1;

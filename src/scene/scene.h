@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <optional>
+#include <string_view>
 
 #include "math/types.h"
 #include "scene/environment_map.h"
@@ -11,6 +13,9 @@ namespace traceflow {
 
 // Where reflections come from (method §9).
 enum class Specular { none, environment_gaussians, environment_map };
+constexpr std::array<std::string_view, 3> enum_names(Specular) {
+  return {"none", "environment-gaussians", "environment-map"};
+}
 
 // x_in_scene = (x_in_capture - centre) · scale, as scene.json says (method §2); undone on export.
 struct SceneNormalisation {

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <string>
+#include <string_view>
 
 #include "capture/capture.h"
 #include "ops/optimize/adam.h"
@@ -188,6 +190,8 @@ struct InitialOptions {
 
 // What happens to a gradient that is not a number.
 enum class NonFinite { stop, drop };
+constexpr std::array<std::string_view, 2> enum_names(NonFinite) { return {"stop", "drop"}; }
+constexpr std::array<std::string_view, 2> enum_names(NonFinite) { return {"stop", "drop"}; }
 
 struct TrainOptions {
   int iterations = 60000;

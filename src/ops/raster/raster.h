@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "base/options.h"
@@ -12,13 +14,16 @@
 // Differentiable: every posed value and the camera pose; every output but which hit is the median.
 namespace traceflow::raster {
 
-// In which order a pixel blends: by depth of the surfels' centres, as 2DGS does, or by depth of the hits, exact per pixel.
+// In which order a pixel blends: by depth of the surfels' centres, as 2DGS does, or by depth of the hits,
+// exact per pixel.
 enum class SortOrder { centre, hit };
+constexpr std::array<std::string_view, 2> enum_names(SortOrder) { return {"centre", "hit"}; }
 
 struct Options {
   SortOrder sort = SortOrder::centre;
-  float near_plane = 0.01F;  // camera z under which a hit (and, for sort = centre, a centre) is dropped; scene units
-  float far_plane = 100;     // only for the distortion's depth mapping
+  float near_plane =
+      0.01F;  // camera z under which a hit (and, for sort = centre, a centre) is dropped; scene units
+  float far_plane = 100;  // only for the distortion's depth mapping
   bool low_pass = true;
   float alpha_min = 1.0F / 255;
   float alpha_max = 0.99F;
@@ -29,11 +34,13 @@ struct Options {
   void visit(Visitor& v) {
     v.field("sort", sort, "", "Blending order: centre (as 2DGS) or hit (exact per pixel) (method §3.3).");
     v.field("near_plane", near_plane, "scene units", "Nearest camera depth that is drawn (method §3.4).");
-    v.field("far_plane", far_plane, "scene units", "Far end of the distortion's depth mapping (method §3.5).");
+    v.field("far_plane", far_plane, "scene units",
+            "Far end of the distortion's depth mapping (method §3.5).");
     v.field("low_pass", low_pass, "", "Screen-space low-pass of 2DGS (method §3.2).");
     v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
     v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
-    v.field("transmittance_min", transmittance_min, "", "A pixel ends before its transmittance falls under this.");
+    v.field("transmittance_min", transmittance_min, "",
+            "A pixel ends before its transmittance falls under this.");
   }
   void validate() const;
 };
@@ -41,13 +48,15 @@ struct Options {
 // All H×W (×3). w_i = α_i T_i (method §3.5).
 template <class T>
 struct BasicOutput {
-  Tensor<T> colour;        // H×W×3, Σ w c + background · remaining transmittance
-  Tensor<T> alpha;         // H×W, Σ w
-  Tensor<T> tint;          // H×W, Σ w s_tint (α_spec); zero when the surfels have no tint
-  Tensor<T> normal;        // H×W×3, world axes, Σ w n with n turned to the camera; not renormalised
-  Tensor<T> depth;         // H×W, expected camera z: Σ w z / Σ w; 0 where alpha is 0
-  Tensor<T> median_depth;  // H×W, camera z of the hit where the transmittance crosses 0.5; 0 where there is none
-  Tensor<T> distortion;    // H×W, Σ_i Σ_j w_i w_j (m_i − m_j)² over pairs i > j counted as 2DGS does (each pair once)
+  Tensor<T> colour;  // H×W×3, Σ w c + background · remaining transmittance
+  Tensor<T> alpha;   // H×W, Σ w
+  Tensor<T> tint;    // H×W, Σ w s_tint (α_spec); zero when the surfels have no tint
+  Tensor<T> normal;  // H×W×3, world axes, Σ w n with n turned to the camera; not renormalised
+  Tensor<T> depth;   // H×W, expected camera z: Σ w z / Σ w; 0 where alpha is 0
+  Tensor<T>
+      median_depth;  // H×W, camera z of the hit where the transmittance crosses 0.5; 0 where there is none
+  Tensor<T>
+      distortion;  // H×W, Σ_i Σ_j w_i w_j (m_i − m_j)² over pairs i > j counted as 2DGS does (each pair once)
 };
 using Output = BasicOutput<float>;
 
@@ -62,8 +71,8 @@ template <class T>
 struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
   CameraGradient<T> camera;
-  // M, the density-control signal (method §3.6): the norm of dL/d(projected centre) in normalised device units (pixels
-  // times half the image size, as 2DGS), low-pass part included. The reference leaves it empty.
+  // M, the density-control signal (method §3.6): the norm of dL/d(projected centre) in normalised device
+  // units (pixels times half the image size, as 2DGS), low-pass part included. The reference leaves it empty.
   Tensor<T> screen_gradient;
 };
 using InputGradient = BasicInputGradient<float>;
@@ -76,21 +85,22 @@ struct SavedDeleter {
 using SavedPtr = std::unique_ptr<Saved, SavedDeleter>;
 SavedPtr make_saved();
 
-// Draws. Output tensors are resized. saved may be null when no backward follows. Surfels that are not finite, have no area or
-// lie behind the near plane are skipped.
+// Draws. Output tensors are resized. saved may be null when no backward follows. Surfels that are not finite,
+// have no area or lie behind the near plane are skipped.
 void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Output& output,
              Saved* saved);
 
 // Sets (does not add to) `gradient`. Sums in a fixed order: the same bytes at any thread count.
-void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, const Saved& saved,
-              const OutputGradient& grad_output, InputGradient& gradient);
+void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
+              const Saved& saved, const OutputGradient& grad_output, InputGradient& gradient);
 
 // After forward with `saved`: M flags, 1 where the surfel touched at least one pixel's blend.
 std::vector<uint8_t> visible(const Saved& saved);
 
-// The plain truth: double precision, every pixel against every surfel, both sort orders, the cut-offs of the contract only.
-void forward_reference(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera, const Options& options,
-                       BasicOutput<double>& output);
+// The plain truth: double precision, every pixel against every surfel, both sort orders, the cut-offs of the
+// contract only.
+void forward_reference(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera,
+                       const Options& options, BasicOutput<double>& output);
 void backward_reference(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera,
                         const Options& options, const BasicOutputGradient<double>& grad_output,
                         BasicInputGradient<double>& gradient);
