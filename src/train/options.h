@@ -191,7 +191,6 @@ struct InitialOptions {
 // What happens to a gradient that is not a number.
 enum class NonFinite { stop, drop };
 constexpr std::array<std::string_view, 2> enum_names(NonFinite) { return {"stop", "drop"}; }
-constexpr std::array<std::string_view, 2> enum_names(NonFinite) { return {"stop", "drop"}; }
 
 struct TrainOptions {
   int iterations = 60000;
