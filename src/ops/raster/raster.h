@@ -21,8 +21,9 @@ constexpr std::array<std::string_view, 2> enum_names(SortOrder) { return {"centr
 
 struct Options {
   SortOrder sort = SortOrder::centre;
-  float near_plane =
-      0.01F;  // camera z under which a hit (and, for sort = centre, a centre) is dropped; scene units
+  // Camera z under which a hit (and, for sort = centre, a whole surfel by its centre) is dropped; scene
+  // units.
+  float near_plane = 0.01F;
   float far_plane = 100;  // only for the distortion's depth mapping
   bool low_pass = true;
   float alpha_min = 1.0F / 255;
@@ -48,15 +49,13 @@ struct Options {
 // All H×W (×3). w_i = α_i T_i (method §3.5).
 template <class T>
 struct BasicOutput {
-  Tensor<T> colour;  // H×W×3, Σ w c + background · remaining transmittance
-  Tensor<T> alpha;   // H×W, Σ w
-  Tensor<T> tint;    // H×W, Σ w s_tint (α_spec); zero when the surfels have no tint
-  Tensor<T> normal;  // H×W×3, world axes, Σ w n with n turned to the camera; not renormalised
-  Tensor<T> depth;   // H×W, expected camera z: Σ w z / Σ w; 0 where alpha is 0
-  Tensor<T>
-      median_depth;  // H×W, camera z of the hit where the transmittance crosses 0.5; 0 where there is none
-  Tensor<T>
-      distortion;  // H×W, Σ_i Σ_j w_i w_j (m_i − m_j)² over pairs i > j counted as 2DGS does (each pair once)
+  Tensor<T> colour;        // H×W×3, Σ w c + background · remaining transmittance
+  Tensor<T> alpha;         // H×W, Σ w
+  Tensor<T> tint;          // H×W, Σ w s_tint (α_spec); zero when the surfels have no tint
+  Tensor<T> normal;        // H×W×3, world axes, Σ w n with n turned to the camera; not renormalised
+  Tensor<T> depth;         // H×W, expected camera z: Σ w z / Σ w; 0 where alpha is 0
+  Tensor<T> median_depth;  // H×W, camera z of the hit where the transmittance crosses 0.5; 0 where none does
+  Tensor<T> distortion;  // H×W, Σ w_i w_j (m_i − m_j)² over pairs i > j, as 2DGS counts (each pair once)
 };
 using Output = BasicOutput<float>;
 
