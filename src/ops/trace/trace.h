@@ -24,7 +24,8 @@ struct Options {
     v.field("t_min", t_min, "scene units", "Hits nearer than this are ignored (method §5.2).");
     v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
     v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
-    v.field("transmittance_min", transmittance_min, "", "A ray ends before its transmittance falls under this.");
+    v.field("transmittance_min", transmittance_min, "",
+            "A ray ends before its transmittance falls under this.");
     v.field("hits_per_pass", hits_per_pass, "hits", "Hits held at a time; changes speed, not the image.");
   }
   void validate() const;
@@ -50,20 +51,22 @@ struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
   Tensor<T> origins;     // R×3
   Tensor<T> directions;  // R×3
-  // M, the density-control signal: Σ over hits of |dL/dposition| · t / 2 as EnvGS has it. The reference leaves it empty.
+  // M, the density-control signal: Σ over hits of |dL/dposition| · t / 2 as EnvGS has it. The reference
+  // leaves it empty.
   Tensor<T> position_gradient;
 };
 using InputGradient = BasicInputGradient<float>;
 
-// A bounding volume hierarchy over the surfels' disks, each out to where its α falls under alpha_min (method §5.1).
+// A bounding volume hierarchy over the surfels' disks, each out to where its α falls under alpha_min (method
+// §5.1).
 class Bvh;
 struct BvhDeleter {
   void operator()(Bvh* bvh) const;
 };
 using BvhPtr = std::unique_ptr<Bvh, BvhDeleter>;
 BvhPtr make_bvh();
-// (Re)builds; reuse one object across iterations. Surfels that are not finite, have no area or whose opacity is under
-// alpha_min are left out. The result does not depend on the number of threads.
+// (Re)builds; reuse one object across iterations. Surfels that are not finite, have no area or whose opacity
+// is under alpha_min are left out. The result does not depend on the number of threads.
 void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh);
 
 // The hit lists that forward keeps for backward. Reuse one object across iterations.
@@ -76,14 +79,16 @@ SavedPtr make_saved();
 // How many hits were blended, over all rays.
 int64_t blended_hits(const Saved& saved);
 
-// origins, directions: R×3, world; directions need not have unit length (SH uses the unit one). Rays that are not finite or
-// have a zero direction see the background. `bvh` was built from these surfels. saved may be null.
+// origins, directions: R×3, world; directions need not have unit length (SH uses the unit one). Rays that are
+// not finite or have a zero direction see the background. `bvh` was built from these surfels. saved may be
+// null.
 void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
              const Tensor<float>& directions, const Options& options, Output& output, Saved* saved);
 
 // Sets (does not add to) `gradient`. Sums in a fixed order: the same bytes at any thread count.
 void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
-              const Options& options, const Saved& saved, const OutputGradient& grad_output, InputGradient& gradient);
+              const Options& options, const Saved& saved, const OutputGradient& grad_output,
+              InputGradient& gradient);
 
 // The plain truth: double precision, every ray against every surfel, sorted.
 void forward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,

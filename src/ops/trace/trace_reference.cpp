@@ -1,0 +1,206 @@
+#include <algorithm>
+#include <vector>
+
+#include "base/parallel.h"
+#include "math/blend.h"
+#include "math/rotation.h"
+#include "math/spherical_harmonics.h"
+#include "math/surfel_hit.h"
+#include "ops/trace/trace.h"
+#include "ops/trace/trace_usable.h"
+
+// Every ray against every surfel. A ray's hits are sorted by distance, then blended (method §5.2).
+namespace traceflow::trace {
+
+namespace {
+
+using Frame = SurfelFrame<double>;
+
+struct Hit {
+  int64_t surfel;
+  SurfelHit<double> at;
+  BlendAlpha<double> alpha;
+};
+
+struct Ray {
+  Vec3<double> origin, direction;
+  Vec3<double> unit() const { return glm::normalize(direction); }
+};
+
+BlendRules<double> rules(const Options& o) { return {o.alpha_min, o.alpha_max, o.transmittance_min}; }
+
+// What blending a ray's hits leaves behind.
+struct Blend {
+  std::vector<Hit> hits;              // those blended, front to back
+  std::vector<Vec3<double>> colour;   // of each
+  std::vector<double> transmittance;  // before each
+  double remaining = 1;
+  double alpha = 0;
+  double distance_sum = 0;
+};
+
+std::vector<Frame> make_frames(const BasicPosedSurfels<double>& surfels) {
+  std::vector<Frame> frames(static_cast<size_t>(surfels.count()));
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    frames[static_cast<size_t>(i)] = {load3<double>(surfels.position.row(i)),
+                                      rotation_from_quaternion(load4<double>(surfels.rotation.row(i))),
+                                      {surfels.scale(i, 0), surfels.scale(i, 1)}};
+  }
+  return frames;
+}
+
+std::vector<Hit> find_hits(const BasicPosedSurfels<double>& surfels, const std::vector<Frame>& frames,
+                           const Ray& ray, const Options& options) {
+  std::vector<Hit> hits;
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    if (!is_usable(surfels, i, static_cast<double>(options.alpha_min))) continue;
+    const SurfelHit<double> at = intersect(frames[static_cast<size_t>(i)], ray.origin, ray.direction);
+    if (!at.valid || !(at.t * length(ray.direction) >= options.t_min)) continue;
+    const double gaussian = std::exp(-0.5 * (at.u * at.u + at.v * at.v));
+    const BlendAlpha<double> alpha = blend_alpha(rules(options), surfels.opacity[i], gaussian);
+    if (alpha.value > 0) hits.push_back({i, at, alpha});
+  }
+  std::stable_sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.at.t < b.at.t; });
+  return hits;
+}
+
+Blend blend(const BasicPosedSurfels<double>& surfels, const std::vector<Frame>& frames, const Ray& ray,
+            const Options& options) {
+  const int degree = sh_degree(surfels.sh.dim(1));
+  Blend result;
+  for (const Hit& hit : find_hits(surfels, frames, ray, options)) {
+    if (blend_ends(rules(options), result.remaining, hit.alpha.value)) break;
+    const double weight = hit.alpha.value * result.remaining;
+    result.hits.push_back(hit);
+    result.colour.push_back(sh_colour(degree, surfels.sh.row(hit.surfel), ray.unit()));
+    result.transmittance.push_back(result.remaining);
+    result.alpha += weight;
+    result.distance_sum += weight * hit.at.t;
+    result.remaining *= 1 - hit.alpha.value;
+  }
+  return result;
+}
+
+// dL/doutput of one ray; zero where the caller left a tensor empty.
+struct RayGradient {
+  Vec3<double> colour{0};
+  double alpha = 0, distance = 0;
+};
+
+RayGradient load_gradient(const BasicOutputGradient<double>& grad, int64_t ray) {
+  RayGradient g;
+  if (!grad.colour.empty()) g.colour = load3<double>(grad.colour.row(ray));
+  if (!grad.alpha.empty()) g.alpha = grad.alpha[ray];
+  if (!grad.distance.empty()) g.distance = grad.distance[ray];
+  return g;
+}
+
+// dL/dalpha of every hit, back to front: what a hit takes from all behind it is kept in one running sum.
+std::vector<double> alpha_gradients(const Blend& b, const RayGradient& grad, const Vec3<double>& background) {
+  const double distance = b.distance_sum / b.alpha;
+  std::vector<double> result(b.hits.size());
+  double behind = b.remaining * dot(grad.colour, background);
+  for (size_t i = b.hits.size(); i-- > 0;) {
+    const Hit& hit = b.hits[i];
+    const double grad_weight =
+        dot(grad.colour, b.colour[i]) + grad.alpha + grad.distance * (hit.at.t - distance) / b.alpha;
+    result[i] = blend_alpha_gradient(b.transmittance[i], hit.alpha.value, grad_weight, behind);
+    behind += hit.alpha.value * b.transmittance[i] * grad_weight;
+  }
+  return result;
+}
+
+struct HitGradient {
+  SurfelHitGradient<double> geometry;
+  double opacity = 0;
+};
+
+HitGradient hit_backward(const Frame& frame, const Ray& ray, const Hit& hit, double opacity,
+                         double grad_alpha, double grad_t) {
+  const double grad_exponent =
+      grad_alpha * hit.alpha.slope * hit.alpha.value;  // alpha = opacity · exp(-(u² + v²) / 2)
+  return {intersect_backward(frame, ray.origin, ray.direction, hit.at, grad_t, -grad_exponent * hit.at.u,
+                             -grad_exponent * hit.at.v),
+          grad_exponent / opacity};
+}
+
+void add_surfel(const HitGradient& hit, int64_t i, const Vec4<double>& quaternion,
+                BasicPosedSurfels<double>& grad) {
+  add3(grad.position.row(i), hit.geometry.position);
+  const Vec4<double> rotation = rotation_from_quaternion_backward(quaternion, hit.geometry.rotation);
+  for (int k = 0; k < 4; ++k) grad.rotation(i, k) += rotation[k];
+  for (int k = 0; k < 2; ++k) grad.scale(i, k) += hit.geometry.scale[k];
+  grad.opacity[i] += hit.opacity;
+}
+
+// dL/d(direction) from dL/d(unit direction).
+Vec3<double> normalise_backward(const Vec3<double>& direction, const Vec3<double>& grad_unit) {
+  const Vec3<double> unit = glm::normalize(direction);
+  return (grad_unit - unit * dot(unit, grad_unit)) / length(direction);
+}
+
+void ray_backward(const BasicPosedSurfels<double>& surfels, const std::vector<Frame>& frames, const Ray& ray,
+                  const Options& options, const RayGradient& grad_output,
+                  BasicPosedSurfels<double>& grad_surfels, double* grad_origin, double* grad_direction) {
+  const int degree = sh_degree(surfels.sh.dim(1));
+  const Blend b = blend(surfels, frames, ray, options);
+  const std::vector<double> grad_alpha = alpha_gradients(b, grad_output, Vec3<double>(options.background));
+  Vec3<double> grad_unit(0);
+  for (size_t i = 0; i < b.hits.size(); ++i) {
+    const Hit& hit = b.hits[i];
+    const double weight = hit.alpha.value * b.transmittance[i];
+    const HitGradient g =
+        hit_backward(frames[static_cast<size_t>(hit.surfel)], ray, hit, surfels.opacity[hit.surfel],
+                     grad_alpha[i], grad_output.distance * weight / b.alpha);
+    add_surfel(g, hit.surfel, load4<double>(surfels.rotation.row(hit.surfel)), grad_surfels);
+    add3(grad_origin, g.geometry.origin);
+    add3(grad_direction, g.geometry.direction);
+    grad_unit += sh_colour_backward(degree, surfels.sh.row(hit.surfel), ray.unit(),
+                                    weight * grad_output.colour, grad_surfels.sh.row(hit.surfel));
+  }
+  add3(grad_direction, normalise_backward(ray.direction, grad_unit));
+}
+
+}  // namespace
+
+void forward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
+                       const Tensor<double>& directions, const Options& options,
+                       BasicOutput<double>& output) {
+  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
+  output.colour.reset({rays, 3});
+  output.alpha.reset({rays});
+  output.distance.reset({rays});
+  const std::vector<Frame> frames = make_frames(surfels);
+  parallel_for("trace reference", rays, [&](int64_t r) {
+    const Vec3<double> background(options.background);
+    store3(output.colour.row(r), background);
+    if (!is_traceable(origins.row(r), directions.row(r))) return;
+    const Ray ray{load3<double>(origins.row(r)), load3<double>(directions.row(r))};
+    const Blend b = blend(surfels, frames, ray, options);
+    Vec3<double> colour = b.remaining * background;
+    for (size_t i = 0; i < b.hits.size(); ++i)
+      colour += b.hits[i].alpha.value * b.transmittance[i] * b.colour[i];
+    store3(output.colour.row(r), colour);
+    output.alpha[r] = b.alpha;
+    output.distance[r] = b.hits.empty() ? 0 : b.distance_sum / b.alpha;
+  });
+}
+
+void backward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
+                        const Tensor<double>& directions, const Options& options,
+                        const BasicOutputGradient<double>& grad_output,
+                        BasicInputGradient<double>& gradient) {
+  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
+  gradient.surfels.reset_like(surfels);
+  gradient.origins.reset({rays, 3});
+  gradient.directions.reset({rays, 3});
+  const std::vector<Frame> frames = make_frames(surfels);
+  for (int64_t r = 0; r < rays; ++r) {
+    if (!is_traceable(origins.row(r), directions.row(r))) continue;
+    const Ray ray{load3<double>(origins.row(r)), load3<double>(directions.row(r))};
+    ray_backward(surfels, frames, ray, options, load_gradient(grad_output, r), gradient.surfels,
+                 gradient.origins.row(r), gradient.directions.row(r));
+  }
+}
+
+}  // namespace traceflow::trace

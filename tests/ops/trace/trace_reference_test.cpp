@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "ops/trace/trace.h"
+#include "ops/trace/trace_scene.h"
+
+namespace traceflow::trace {
+namespace {
+
+struct Problem {
+  BasicPosedSurfels<double> surfels;
+  Tensor<double> origins, directions;
+  Options options;
+};
+
+Problem make_problem(uint64_t seed, const SceneOptions& scene_options) {
+  const TestScene scene = random_scene(seed, scene_options);
+  Problem p{
+      convert<double>(scene.surfels), convert<double>(scene.origins), convert<double>(scene.directions), {}};
+  // The cut-off at alpha_min is a step in the image: far enough down, differences do not meet it.
+  p.options.alpha_min = 1e-12F;
+  p.options.transmittance_min = 0;
+  p.options.background = {0.3F, 0.5F, 0.2F};
+  return p;
+}
+
+double loss(const Problem& p, const BasicOutputGradient<double>& weights) {
+  BasicOutput<double> out;
+  forward_reference(p.surfels, p.origins, p.directions, p.options, out);
+  double sum = 0;
+  for (int64_t i = 0; i < out.colour.size(); ++i) sum += weights.colour[i] * out.colour[i];
+  for (int64_t i = 0; i < out.alpha.size(); ++i) sum += weights.alpha[i] * out.alpha[i];
+  for (int64_t i = 0; i < out.distance.size(); ++i) sum += weights.distance[i] * out.distance[i];
+  return sum;
+}
+
+void expect_matches_differences(Problem& p, Tensor<double>& values, const Tensor<double>& gradient,
+                                const BasicOutputGradient<double>& weights, const std::string& name) {
+  const double step = 1e-6;
+  const int64_t stride = std::max<int64_t>(1, values.size() / 60);
+  double largest = 0;
+  for (const double g : gradient.values()) largest = std::max(largest, std::abs(g));
+  ASSERT_GT(largest, 0) << name;
+  for (int64_t i = 0; i < values.size(); i += stride) {
+    const double kept = values[i];
+    values[i] = kept + step;
+    const double above = loss(p, weights);
+    values[i] = kept - step;
+    const double below = loss(p, weights);
+    values[i] = kept;
+    EXPECT_NEAR(gradient[i], (above - below) / (2 * step), 1e-6 * largest + 1e-7) << name << " " << i;
+  }
+}
+
+void expect_all_gradients(Problem p, uint64_t seed) {
+  const BasicOutputGradient<double> weights = random_output_gradient(seed, p.origins.dim(0));
+  BasicInputGradient<double> g;
+  backward_reference(p.surfels, p.origins, p.directions, p.options, weights, g);
+  expect_matches_differences(p, p.surfels.position, g.surfels.position, weights, "position");
+  expect_matches_differences(p, p.surfels.scale, g.surfels.scale, weights, "scale");
+  expect_matches_differences(p, p.surfels.rotation, g.surfels.rotation, weights, "rotation");
+  expect_matches_differences(p, p.surfels.opacity, g.surfels.opacity, weights, "opacity");
+  expect_matches_differences(p, p.surfels.sh, g.surfels.sh, weights, "sh");
+  expect_matches_differences(p, p.origins, g.origins, weights, "origins");
+  expect_matches_differences(p, p.directions, g.directions, weights, "directions");
+}
+
+// Few, wide, faint surfels: every ray meets each far from where a hit would come or go.
+SceneOptions smooth_scene(int degree) {
+  SceneOptions o;
+  o.surfels = 6;
+  o.rays = 5;
+  o.sh_degree = degree;
+  o.scale_min = 0.9;
+  o.scale_max = 1.5;
+  o.box = 0.5;
+  return o;
+}
+
+TEST(TraceReference, GradientsMatchCentralDifferencesAtEveryDegree) {
+  for (int degree = 0; degree <= 3; ++degree) {
+    SCOPED_TRACE("degree " + std::to_string(degree));
+    expect_all_gradients(make_problem(7 + static_cast<uint64_t>(degree), smooth_scene(degree)), 100);
+  }
+}
+
+TEST(TraceReference, GradientOfAClampedAlphaIsZero) {
+  Problem p = make_problem(3, smooth_scene(0));
+  p.options.alpha_max = 0.2F;
+  expect_all_gradients(p, 4);
+}
+
+TEST(TraceReference, OneFacingSurfelIsWhatTheFormulaSays) {
+  PosedSurfels s = make_surfels(1, 0);
+  set_facing(s, 0, 2, 0.5F, 0.8F);
+  for (int c = 0; c < 3; ++c) s.sh.row(0)[c] = static_cast<float>(0.1 * (c + 1) / sh_c0);
+  Tensor<double> origins({1, 3}), directions({1, 3});
+  origins(0, 0) = 0.25;
+  directions(0, 2) = 4;
+  BasicOutput<double> out;
+  Options options;
+  options.background = {1, 0, 0};
+  forward_reference(convert<double>(s), origins, directions, options, out);
+  const double alpha = 0.8 * std::exp(-0.125);
+  EXPECT_NEAR(out.alpha[0], alpha, 1e-7);
+  EXPECT_NEAR(out.distance[0], 0.5, 1e-12);
+  EXPECT_NEAR(out.colour(0, 0), alpha * 0.6 + (1 - alpha), 1e-7);
+  EXPECT_NEAR(out.colour(0, 1), alpha * 0.7, 1e-7);
+  EXPECT_NEAR(out.colour(0, 2), alpha * 0.8, 1e-7);
+}
+
+TEST(TraceReference, BlendsByDistanceWhateverTheOrderOfTheSurfels) {
+  PosedSurfels s = make_surfels(3, 0);
+  const float depth[3] = {3, 1, 2};
+  for (int64_t i = 0; i < 3; ++i) {
+    set_facing(s, i, depth[i], 1, 0.5F);
+    for (int c = 0; c < 3; ++c) s.sh.row(i)[c] = static_cast<float>((c == i ? 0.5 : -0.5) / sh_c0);
+  }
+  Tensor<double> origins({1, 3}), directions({1, 3});
+  directions(0, 2) = 1;
+  BasicOutput<double> out;
+  forward_reference(convert<double>(s), origins, directions, {}, out);
+  EXPECT_NEAR(out.colour(0, 1), 0.5, 1e-7);
+  EXPECT_NEAR(out.colour(0, 2), 0.25, 1e-7);
+  EXPECT_NEAR(out.colour(0, 0), 0.125, 1e-7);
+  EXPECT_NEAR(out.distance[0], (0.5 * 1 + 0.25 * 2 + 0.125 * 3) / 0.875, 1e-12);
+}
+
+TEST(TraceReference, EndsBeforeTheTransmittanceFallsUnderTheMinimum) {
+  PosedSurfels s = make_surfels(4, 0);
+  for (int64_t i = 0; i < 4; ++i) set_facing(s, i, static_cast<float>(i + 1), 1, 0.95F);
+  Tensor<double> origins({1, 3}), directions({1, 3});
+  directions(0, 2) = 1;
+  BasicOutput<double> out;
+  forward_reference(convert<double>(s), origins, directions, {}, out);
+  EXPECT_NEAR(out.alpha[0], 1 - 0.05 * 0.05 * 0.05, 1e-7);  // a fourth hit would leave 6e-6
+}
+
+TEST(TraceReference, IgnoresHitsNearerThanTheMinimum) {
+  PosedSurfels s = make_surfels(2, 0);
+  set_facing(s, 0, 0.01F, 1, 0.5F);
+  set_facing(s, 1, 1, 1, 0.25F);
+  Tensor<double> origins({1, 3}), directions({1, 3});
+  directions(0, 2) = 10;
+  Options options;
+  options.t_min = 0.02F;
+  BasicOutput<double> out;
+  forward_reference(convert<double>(s), origins, directions, options, out);
+  EXPECT_NEAR(out.alpha[0], 0.25, 1e-7);
+}
+
+}  // namespace
+}  // namespace traceflow::trace
