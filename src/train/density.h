@@ -1,0 +1,47 @@
+#pragma once
+
+#include <string>
+
+#include "base/random.h"
+#include "files/safetensors.h"
+#include "scene/rows.h"
+#include "train/events.h"
+#include "train/optimiser.h"
+#include "train/options.h"
+
+namespace traceflow {
+
+// Density control of one set of surfels (method §7.7): surfels whose centre gradient is large multiply, the
+// faint and the oversized go, and the count never passes the cap.
+class DensityControl {
+ public:
+  // set: "main" or "environment", for events and checkpoints.
+  DensityControl(std::string set, const DensityOptions& options, int64_t count)
+      : set_(std::move(set)), options_(options), sum_({count}), seen_({count}) {}
+
+  // Adds an iteration's signal (N) of the surfels that it touched (N flags).
+  void accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched);
+
+  // Clones, splits and prunes; forgets the statistics. `extent` in scene units; `cap` the most surfels there
+  // may be.
+  events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, float extent, int64_t cap,
+                                Random& random);
+
+  // Lowers every opacity to at most options.opacity_reset and clears that group's moments.
+  void reset_opacity(Surfels& surfels, SurfelMoments& moments) const;
+
+  void put(Safetensors& file) const;
+  void get(const Safetensors& file);
+
+ private:
+  enum class Fate : uint8_t { keep, clone, split, prune_transparent, prune_large };
+  std::vector<Fate> fates(const Surfels& surfels, float extent, int64_t cap, bool& at_cap) const;
+  float mean_signal(int64_t i) const { return seen_[i] > 0 ? sum_[i] / seen_[i] : 0; }
+
+  std::string set_;
+  DensityOptions options_;
+  Tensor<float> sum_;   // N, sum of the signal
+  Tensor<float> seen_;  // N, iterations that touched the surfel
+};
+
+}  // namespace traceflow

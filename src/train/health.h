@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+
+#include "train/objective.h"
+#include "train/optimiser.h"
+
+namespace traceflow {
+
+// Watches a run for divergence: losses or gradients that are not numbers, and a PSNR that collapses.
+class Health {
+ public:
+  Health(NonFinite policy, float collapse_decibels)
+      : policy_(policy), collapse_decibels_(collapse_decibels) {}
+
+  // After each iteration. Returns why the run must stop, or nothing.
+  std::string check(const LossTerms& terms, const NonFiniteGradients& gradients);
+  // An opacity reset makes the PSNR fall on purpose: the best seen so far is forgotten.
+  void expect_fall();
+
+  double smoothed_psnr() const { return smoothed_; }
+  // The run may be saved: its PSNR is not far under its best.
+  bool sound() const;
+  int64_t dropped() const { return dropped_; }
+
+  struct State {
+    double smoothed = 0;
+    double best = 0;
+    int64_t steps = 0;
+  };
+  State state() const { return {smoothed_, best_, steps_}; }
+  void set_state(const State& state);
+
+ private:
+  NonFinite policy_;
+  float collapse_decibels_;
+  double smoothed_ = 0;
+  double best_ = 0;
+  int64_t steps_ = 0;    // since the last expected fall
+  int64_t dropped_ = 0;  // gradient entries that were not finite and not applied
+};
+
+}  // namespace traceflow

@@ -1,0 +1,186 @@
+#include "train/optimiser.h"
+
+#include <cmath>
+
+namespace traceflow {
+
+namespace {
+
+optimize::AdamState zero_state(const Tensor<float>& parameter) {
+  return {Tensor<float>(parameter.shape()), Tensor<float>(parameter.shape()), 0};
+}
+
+std::vector<optimize::AdamState> zero_states(const Field& field) {
+  std::vector<optimize::AdamState> states;
+  field.for_each(
+      [&](const std::string&, const Tensor<float>& tensor) { states.push_back(zero_state(tensor)); });
+  return states;
+}
+
+// One Adam step per tensor, with one note of what was not finite.
+class Stepper {
+ public:
+  Stepper(const optimize::AdamOptions& options, NonFiniteGradients& report)
+      : options_(options), report_(report) {}
+
+  void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
+                  optimize::AdamState& state, double rate) {
+    note(name, gradient, optimize::adam_step(parameter, gradient, state, static_cast<float>(rate), options_));
+  }
+  // A rate for each column of a row.
+  void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
+                  optimize::AdamState& state, const std::vector<float>& rates) {
+    note(name, gradient,
+         optimize::adam_step(parameter, gradient, state, std::span<const float>(rates), options_));
+  }
+
+ private:
+  void note(const std::string& name, const Tensor<float>& gradient, int64_t count) {
+    if (count > 0 && report_.count == 0) {
+      const auto values = gradient.values();
+      const auto bad = std::find_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v); });
+      const int64_t row = gradient.row_size() > 0 ? (bad - values.begin()) / gradient.row_size() : 0;
+      report_.first = name + ", row " + std::to_string(row);
+    }
+    report_.count += count;
+  }
+
+  optimize::AdamOptions options_;
+  NonFiniteGradients& report_;
+};
+
+void step_surfels(Stepper& step, const std::string& set, Surfels& surfels, const Surfels& gradient,
+                  SurfelMoments& moments, double position_rate, const RateOptions& rates) {
+  step(set + ".position", surfels.position, gradient.position, moments.position, position_rate);
+  step(set + ".log_scale", surfels.log_scale, gradient.log_scale, moments.log_scale, rates.log_scale);
+  step(set + ".rotation", surfels.rotation, gradient.rotation, moments.rotation, rates.rotation);
+  step(set + ".opacity_logit", surfels.opacity_logit, gradient.opacity_logit, moments.opacity_logit,
+       rates.opacity);
+  std::vector<float> sh_rates(static_cast<size_t>(surfels.sh.row_size()), rates.sh / rates.sh_rest_divisor);
+  std::fill_n(sh_rates.begin(), std::min<size_t>(3, sh_rates.size()), rates.sh);
+  step(set + ".sh", surfels.sh, gradient.sh, moments.sh, sh_rates);
+}
+
+void step_field(Stepper& step, const std::string& name, Field& field, const Field& gradient,
+                std::vector<optimize::AdamState>& states, double rate) {
+  std::vector<const Tensor<float>*> gradients;
+  gradient.for_each([&](const std::string&, const Tensor<float>& tensor) { gradients.push_back(&tensor); });
+  size_t k = 0;
+  field.for_each([&](const std::string& tensor_name, Tensor<float>& tensor) {
+    step(name + "." + tensor_name, tensor, *gradients[k], states[k], rate);
+    ++k;
+  });
+}
+
+}  // namespace
+
+void SurfelMoments::reset_like(const Surfels& surfels) {
+  position = zero_state(surfels.position);
+  log_scale = zero_state(surfels.log_scale);
+  rotation = zero_state(surfels.rotation);
+  opacity_logit = zero_state(surfels.opacity_logit);
+  sh = zero_state(surfels.sh);
+  tint_logit = zero_state(surfels.tint_logit);
+}
+
+void SurfelMoments::edit(const RowEdit& edit) {
+  for_each([&](const char*, optimize::AdamState& state) {
+    if (state.first.empty()) return;
+    state.first = edited_rows(state.first, edit, true);
+    state.second = edited_rows(state.second, edit, true);
+  });
+}
+
+Optimiser::Optimiser(const Scene& scene) {
+  main_.reset_like(scene.main);
+  environment_.reset_like(scene.environment);
+  if (scene.main_field) main_field_ = zero_states(*scene.main_field);
+  if (scene.environment_field) environment_field_ = zero_states(*scene.environment_field);
+  if (scene.environment_map) {
+    map_ = zero_state(scene.environment_map->logit);
+    if (scene.environment_map->field) map_field_ = zero_states(*scene.environment_map->field);
+  }
+}
+
+NonFiniteGradients Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
+                                   const Schedule& schedule, const RateOptions& rates, int iteration) {
+  NonFiniteGradients report;
+  Stepper step(rates.adam(), report);
+  const double position_rate = schedule.position_rate(iteration) * scene.extent;
+  const double field_rate = schedule.field_rate(iteration);
+
+  if (trainable.main) step_surfels(step, "main", scene.main, gradient.main, main_, position_rate, rates);
+  if (trainable.tint && scene.main.has_tint()) {
+    step("main.tint_logit", scene.main.tint_logit, gradient.main.tint_logit, main_.tint_logit, rates.tint);
+  }
+  if (trainable.main_field && scene.main_field) {
+    step_field(step, "main_field", *scene.main_field, gradient.main_field, main_field_, field_rate);
+  }
+  if (trainable.environment && scene.environment.count() > 0) {
+    step_surfels(step, "environment", scene.environment, gradient.environment, environment_, position_rate,
+                 rates);
+  }
+  if (trainable.environment_field && scene.environment_field) {
+    step_field(step, "environment_field", *scene.environment_field, gradient.environment_field,
+               environment_field_, field_rate);
+  }
+  if (trainable.environment && scene.environment_map) {
+    EnvironmentMap& map = *scene.environment_map;
+    step("environment_map.logit", map.logit, gradient.environment_map.logit, map_,
+         schedule.map_rate(iteration));
+    if (trainable.environment_field && map.field) {
+      step_field(step, "environment_map.field", *map.field, *gradient.environment_map.field, map_field_,
+                 field_rate);
+    }
+  }
+  return report;
+}
+
+template <class Self, class F>
+void Optimiser::for_each(Self& self, F&& f) {
+  const auto surfels = [&](const std::string& set, auto& moments) {
+    moments.for_each([&](const char* name, auto& state) { f("adam/" + set + "/" + name, state); });
+  };
+  const auto fields = [&](const std::string& name, auto& states) {
+    for (size_t k = 0; k < states.size(); ++k) f("adam/" + name + "/" + std::to_string(k), states[k]);
+  };
+  surfels("main", self.main_);
+  surfels("environment", self.environment_);
+  fields("main_field", self.main_field_);
+  fields("environment_field", self.environment_field_);
+  fields("map_field", self.map_field_);
+  f(std::string("adam/map"), self.map_);
+}
+
+void Optimiser::put(Safetensors& file) const {
+  // for_each visits without changing anything when its function does not.
+  for_each(const_cast<Optimiser&>(*this), [&](const std::string& name, const optimize::AdamState& state) {
+    if (state.first.empty()) return;
+    file.add(name + "/first", state.first);
+    file.add(name + "/second", state.second);
+    Tensor<int64_t> step(Shape{1});
+    step[0] = state.step;
+    file.add(name + "/step", step);
+  });
+}
+
+void Optimiser::get(const Safetensors& file) {
+  const auto read = [&](const std::string& name, Tensor<float>& into) {
+    Tensor<float> stored = file.tensor<float>(name);
+    if (stored.shape() != into.shape()) {
+      throw InputError("checkpoint", name, "shape " + stored.shape().to_string(), into.shape().to_string());
+    }
+    into = std::move(stored);
+  };
+  for_each(*this, [&](const std::string& name, optimize::AdamState& state) {
+    if (state.first.empty()) return;
+    read(name + "/first", state.first);
+    read(name + "/second", state.second);
+    const Tensor<int64_t> step = file.tensor<int64_t>(name + "/step");
+    if (step.size() != 1)
+      throw InputError("checkpoint", name + "/step", step.shape().to_string(), "one number");
+    state.step = step[0];
+  });
+}
+
+}  // namespace traceflow

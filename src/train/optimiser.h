@@ -1,0 +1,65 @@
+#pragma once
+
+#include <string>
+
+#include "files/safetensors.h"
+#include "ops/optimize/adam.h"
+#include "render/frame.h"
+#include "scene/rows.h"
+#include "train/schedule.h"
+
+namespace traceflow {
+
+// Adam's state for every group of one set of surfels.
+struct SurfelMoments {
+  optimize::AdamState position, log_scale, rotation, opacity_logit, sh, tint_logit;
+
+  // f(name, state) in the order of Surfels::for_each.
+  template <class F>
+  void for_each(F&& f) {
+    f("position", position);
+    f("log_scale", log_scale);
+    f("rotation", rotation);
+    f("opacity_logit", opacity_logit);
+    f("sh", sh);
+    f("tint_logit", tint_logit);
+  }
+  void reset_like(const Surfels& surfels);
+  // Fresh rows get zero moments (method §7.7).
+  void edit(const RowEdit& edit);
+};
+
+// Gradients that were not finite: how many, and where the first one was ("main.position, surfel 17").
+struct NonFiniteGradients {
+  int64_t count = 0;
+  std::string first;
+};
+
+// Updates a scene by Adam with the schedule's rates (method §7.6).
+class Optimiser {
+ public:
+  // Zero moments in the shapes of the scene.
+  explicit Optimiser(const Scene& scene);
+
+  // One step on whatever is trainable. Entries that are not finite are left alone and reported.
+  NonFiniteGradients step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
+                          const Schedule& schedule, const RateOptions& rates, int iteration);
+
+  SurfelMoments& main() { return main_; }
+  SurfelMoments& environment() { return environment_; }
+
+  void put(Safetensors& file) const;
+  // Throws InputError where the file's moments do not fit the scene that this optimiser was made for.
+  void get(const Safetensors& file);
+
+ private:
+  // f(name, state) for all.
+  template <class Self, class F>
+  static void for_each(Self& self, F&& f);
+
+  SurfelMoments main_, environment_;
+  std::vector<optimize::AdamState> main_field_, environment_field_, map_field_;
+  optimize::AdamState map_;
+};
+
+}  // namespace traceflow

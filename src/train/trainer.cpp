@@ -1,0 +1,271 @@
+#include "train/trainer.h"
+
+#include <bit>
+#include <chrono>
+#include <cmath>
+
+#include "files/options_json.h"
+#include "scene/scene_file.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr int checkpoint_version = 1;
+
+using Clock = std::chrono::steady_clock;
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+template <size_t N>
+Tensor<double> row_of(const std::array<double, N>& values) {
+  Tensor<double> row(Shape{static_cast<int64_t>(N)});
+  std::copy(values.begin(), values.end(), row.data());
+  return row;
+}
+
+int64_t metadata_number(const Safetensors& file, const std::string& key) {
+  const auto found = file.metadata.find(key);
+  if (found == file.metadata.end() || found->second.find_first_not_of("0123456789") != std::string::npos ||
+      found->second.empty() || found->second.size() > 9) {
+    throw InputError("checkpoint", key, found == file.metadata.end() ? "nothing" : found->second, "a number");
+  }
+  return std::stoll(found->second);
+}
+
+Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
+
+}  // namespace
+
+int32_t ViewOrder::draw(Random& random) {
+  if (next_ >= order_.size()) {
+    for (int64_t i = order_.size() - 1; i > 0; --i) std::swap(order_[i], order_[random.below(i + 1)]);
+    next_ = 0;
+  }
+  return order_[next_++];
+}
+
+void ViewOrder::set_state(Tensor<int32_t> order, int64_t next) {
+  bool fits = order.size() == order_.size() && next >= 0 && next <= order_.size();
+  for (const int32_t view : order.values()) fits = fits && view >= 0 && view < order_.size();
+  if (!fits) {
+    throw InputError("checkpoint", "views", std::to_string(order.size()) + " views",
+                     std::to_string(order_.size()), "resume with the capture that the run was started with");
+  }
+  order_ = std::move(order);
+  next_ = next;
+}
+
+Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run)
+    : options_(options),
+      capture_(std::move(capture)),
+      run_{std::move(run)},
+      schedule_(options),
+      random_(seeded(options.seed)),
+      scene_(initial_scene(capture_, options, random_)),
+      optimiser_(scene_),
+      main_density_("main", options.density, scene_.main.count()),
+      environment_density_("environment", options.environment_density, scene_.environment.count()),
+      caps_(surfel_caps(options, capture_.train.at(0).camera.width, capture_.train.at(0).camera.height)),
+      views_(static_cast<int64_t>(capture_.train.size())),
+      health_(options.non_finite, options.collapse_decibels),
+      renderer_(options.render) {}
+
+FrameRequest Trainer::request_for(const View& view) {
+  FrameRequest request;
+  request.camera = view.camera;
+  const double noise =
+      schedule_.time_jitter(iteration_) * random_.normal() / static_cast<double>(capture_.train.size());
+  request.time = std::clamp(view.time + static_cast<float>(noise), 0.0F, 1.0F);
+  request.sh_degree_main = schedule_.sh_degree_main(iteration_);
+  request.sh_degree_environment = schedule_.sh_degree_environment(iteration_);
+  request.deform_main = schedule_.deforms_main(iteration_);
+  request.deform_environment = schedule_.deforms_environment(iteration_);
+  request.specular = schedule_.phase(iteration_) != Phase::diffuse;
+  request.pseudo_normals = schedule_.uses_normal_losses(iteration_) && options_.loss.normal > 0;
+  request.probes = true;
+  request.probe_seed = random_.next();
+  request.cull = true;
+  return request;
+}
+
+LossTerms Trainer::step() {
+  const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
+  const std::shared_ptr<const ViewImages> target = load_images(capture_, view);
+  const FrameRequest request = request_for(view);
+  const Trainable trainable = schedule_.trainable(iteration_);
+
+  const Frame& frame = renderer_.forward(scene_, request, true);
+  const LossTerms terms = evaluate_objective(
+      frame, *target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_);
+  non_finite_ = {};
+  if (std::isfinite(terms.total)) {
+    gradient_.reset(scene_);
+    renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
+    if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
+    if (trainable.environment && scene_.environment.count() > 0) {
+      environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
+    }
+    non_finite_ = optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
+    // The reach follows the field at once when it grows and slowly when it shrinks.
+    scene_.main_reach = std::max(frame.reach, 0.995F * scene_.main_reach);
+  }
+  ++iteration_;
+  control_density(iteration_);
+  return terms;
+}
+
+void Trainer::control_density(int done) {
+  const auto tell = [&](events::DensityChanged change, bool reset) {
+    change.iteration = done;
+    change.opacity_reset = reset;
+    stream_.emit(change);
+  };
+  if (schedule_.densifies_main(done)) {
+    const bool reset = schedule_.resets_main_opacity(done);
+    tell(main_density_.update(scene_.main, optimiser_.main(), scene_.extent, caps_.main, random_), reset);
+  }
+  if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
+    const bool reset = schedule_.resets_environment_opacity(done);
+    tell(environment_density_.update(scene_.environment, optimiser_.environment(), scene_.extent,
+                                     caps_.environment, random_),
+         reset);
+  }
+  if (schedule_.resets_main_opacity(done)) {
+    main_density_.reset_opacity(scene_.main, optimiser_.main());
+    health_.expect_fall();
+  }
+  if (scene_.environment.count() > 0 && schedule_.resets_environment_opacity(done)) {
+    environment_density_.reset_opacity(scene_.environment, optimiser_.environment());
+    health_.expect_fall();
+  }
+}
+
+events::Step Trainer::step_event(const LossTerms& terms, double seconds) {
+  events::Step event;
+  event.iteration = iteration_;
+  event.iterations = options_.iterations;
+  event.phase = to_string(schedule_.phase(iteration_ - 1));
+  event.loss = terms.total;
+  event.terms = {{"l1", terms.l1},
+                 {"ssim", terms.ssim},
+                 {"normal", terms.normal},
+                 {"normal_prior", terms.normal_prior},
+                 {"distortion", terms.distortion}};
+  event.psnr = health_.smoothed_psnr();
+  event.seconds = seconds;
+  event.surfels = counts();
+  return event;
+}
+
+events::Finished Trainer::finish(events::Ending ending, const std::string& reason, double seconds) {
+  const events::Finished event{ending, iteration_, seconds, health_.smoothed_psnr(), counts(), reason};
+  stream_.emit(event);
+  return event;
+}
+
+events::Finished Trainer::run(const std::atomic<bool>& stop) {
+  stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations, thread_count(),
+                               static_cast<uint64_t>(options_.seed), counts()});
+  for (const std::string& warning : capture_.warnings) stream_.emit(events::Warning{iteration_, warning});
+  if (caps_.lowered) {
+    stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(caps_.main) +
+                                                 " main and " + std::to_string(caps_.environment) +
+                                                 " environment surfels at most"});
+  }
+  const Clock::time_point start = Clock::now();
+  const double before = seconds_;
+  double rate = 0;
+  Clock::time_point last = start;
+  while (iteration_ < options_.iterations && !stop) {
+    const Phase phase = schedule_.phase(iteration_);
+    if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
+      stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
+    }
+    const LossTerms terms = step();
+    const std::string trouble = health_.check(terms, non_finite_);
+    seconds_ = before + seconds_since(start);
+
+    events::Step event = step_event(terms, seconds_);
+    const double now = 1.0 / std::max(1e-9, seconds_since(last));
+    last = Clock::now();
+    rate = rate > 0 ? 0.95 * rate + 0.05 * now : now;
+    event.rate = rate;
+    stream_.emit(event);
+
+    if (!trouble.empty()) {
+      // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
+      // still good.
+      if (health_.sound() || !std::filesystem::exists(run_.checkpoint())) save();
+      return finish(events::Ending::diverged, trouble, seconds_);
+    }
+    if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && health_.sound()) save();
+  }
+  save();
+  const bool done = iteration_ >= options_.iterations;
+  return finish(done ? events::Ending::completed : events::Ending::interrupted,
+                done ? "" : "stopped on request", seconds_);
+}
+
+Safetensors Trainer::checkpoint() const {
+  Safetensors file;
+  put_scene(scene_, file);
+  optimiser_.put(file);
+  main_density_.put(file);
+  environment_density_.put(file);
+  file.add("views/order", views_.order());
+  Tensor<int64_t> random(Shape{4});
+  for (size_t i = 0; i < 4; ++i) random[static_cast<int64_t>(i)] = std::bit_cast<int64_t>(random_.state()[i]);
+  file.add("random", random);
+  const Health::State health = health_.state();
+  file.add("health", row_of<3>({health.smoothed, health.best, static_cast<double>(health.steps)}));
+  file.metadata["version"] = std::to_string(checkpoint_version);
+  file.metadata["iteration"] = std::to_string(iteration_);
+  file.metadata["views_next"] = std::to_string(views_.next());
+  file.metadata["options"] = options_json(options_);
+  file.metadata["capture"] = capture_.name;
+  file.metadata["capture_folder"] = std::filesystem::absolute(capture_.folder).lexically_normal().string();
+  return file;
+}
+
+void Trainer::save() {
+  const Clock::time_point start = Clock::now();
+  std::filesystem::create_directories(run_.folder);
+  Safetensors file = checkpoint();
+  file.metadata["train_seconds"] = std::to_string(seconds_);
+  write_checkpoint(run_, file);
+  stream_.emit(events::Saved{iteration_, run_.checkpoint(), seconds_since(start)});
+}
+
+void Trainer::resume() {
+  std::string note;
+  const Safetensors file = read_checkpoint(run_, note);
+  if (!note.empty()) stream_.emit(events::Warning{0, note});
+  if (metadata_number(file, "version") != checkpoint_version) {
+    throw InputError("checkpoint", "version", file.metadata.at("version"),
+                     std::to_string(checkpoint_version));
+  }
+  scene_ = get_scene(file);
+  optimiser_ = Optimiser(scene_);
+  optimiser_.get(file);
+  main_density_ = DensityControl("main", options_.density, scene_.main.count());
+  main_density_.get(file);
+  environment_density_ =
+      DensityControl("environment", options_.environment_density, scene_.environment.count());
+  environment_density_.get(file);
+  views_.set_state(file.tensor<int32_t>("views/order"), metadata_number(file, "views_next"));
+  const Tensor<int64_t> random = file.tensor<int64_t>("random");
+  const Tensor<double> health = file.tensor<double>("health");
+  if (random.size() != 4 || health.size() != 3) {
+    throw InputError("checkpoint", "random", random.shape().to_string(), "4 words of state");
+  }
+  Random::State state{};
+  for (size_t i = 0; i < 4; ++i) state[i] = std::bit_cast<uint64_t>(random[static_cast<int64_t>(i)]);
+  random_.set_state(state);
+  health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
+  iteration_ = static_cast<int>(metadata_number(file, "iteration"));
+  seconds_ = std::stod(file.metadata.at("train_seconds"));
+}
+
+}  // namespace traceflow

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+
+#include "base/random.h"
+#include "capture/capture.h"
+#include "render/renderer.h"
+#include "scene/run_folder.h"
+#include "train/density.h"
+#include "train/events.h"
+#include "train/health.h"
+#include "train/memory.h"
+#include "train/objective.h"
+#include "train/optimiser.h"
+#include "train/schedule.h"
+
+namespace traceflow {
+
+// Draws training views in random order, each once before any comes again.
+class ViewOrder {
+ public:
+  explicit ViewOrder(int64_t views) : order_({views}), next_(views) {
+    for (int64_t i = 0; i < views; ++i) order_[i] = static_cast<int32_t>(i);
+  }
+  int32_t draw(Random& random);
+
+  const Tensor<int32_t>& order() const { return order_; }
+  int64_t next() const { return next_; }
+  void set_state(Tensor<int32_t> order, int64_t next);
+
+ private:
+  Tensor<int32_t> order_;
+  int64_t next_;
+};
+
+// One training run (method §7): the scene, everything that changes it, and the loop. Emits events and prints
+// nothing.
+class Trainer {
+ public:
+  // Starts a scene from the capture. The run's folder is made when the first checkpoint is saved.
+  Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run);
+
+  // Continues from the run's checkpoint; call before run(). Throws InputError when it does not fit.
+  void resume();
+
+  // Trains to the last iteration, or until `stop` is set; saves in either case.
+  events::Finished run(const std::atomic<bool>& stop);
+
+  // One iteration of the loop, without saving; returns the loss.
+  LossTerms step();
+
+  events::Stream& stream() { return stream_; }
+  const Scene& scene() const { return scene_; }
+  int iteration() const { return iteration_; }
+
+ private:
+  FrameRequest request_for(const View& view);
+  void control_density(int done);
+  void save();
+  Safetensors checkpoint() const;
+  events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
+  events::Step step_event(const LossTerms& terms, double seconds);
+  events::Finished finish(events::Ending ending, const std::string& reason, double seconds);
+
+  TrainOptions options_;
+  Capture capture_;
+  RunFolder run_;
+  Schedule schedule_;
+  Random random_;
+  Scene scene_;
+  Optimiser optimiser_;
+  DensityControl main_density_, environment_density_;
+  SurfelCaps caps_;
+  ViewOrder views_;
+  Health health_;
+  Renderer renderer_;
+  SceneGradient gradient_;
+  FrameGradient grad_frame_;
+  NonFiniteGradients non_finite_;
+  events::Stream stream_;
+  int iteration_ = 0;   // done so far
+  double seconds_ = 0;  // of training, earlier sessions included
+};
+
+}  // namespace traceflow

@@ -1,0 +1,163 @@
+#include "render/reference_graph.h"
+
+#include <numeric>
+
+#include "ops/deform/deform.h"
+#include "ops/environment_map/environment_map.h"
+#include "ops/raster/raster.h"
+#include "ops/shade/shade.h"
+#include "ops/surface/surface.h"
+#include "ops/trace/trace.h"
+
+namespace traceflow::reference {
+
+namespace {
+
+std::vector<int32_t> all_pixels(const Camera<double>& camera) {
+  std::vector<int32_t> pixels(static_cast<size_t>(camera.width * camera.height));
+  std::iota(pixels.begin(), pixels.end(), 0);
+  return pixels;
+}
+
+// One evaluation: every intermediate value, then the way back.
+class Graph {
+ public:
+  Graph(const Parameters& parameters, const Setting& setting) : p_(parameters), s_(setting) {}
+
+  double forward() {
+    deform::forward_reference(p_.main, s_.deform ? &p_.main_field : nullptr, s_.main_points, s_.time,
+                              s_.sh_degree, main_);
+    raster::forward_reference(main_, p_.camera, s_.raster, raster_);
+    surface::pseudo_normals(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha, s_.depth_ratio,
+                            pseudo_);
+    specular_.reset({0, 3});
+    if (s_.specular) forward_specular();
+    shade::forward(raster_.colour, raster_.tint, std::span<const int32_t>(pixels_), specular_, colour_);
+    return losses();
+  }
+
+  void backward(Gradient& g) {
+    g.main = zeros_like<double>(p_.main);
+    g.main_field = zeros_like<double>(p_.main_field);
+    g.environment = zeros_like<double>(p_.environment);
+    g.environment_field = zeros_like<double>(p_.environment_field);
+    g.camera = {};
+    grad_.depth.reset(raster_.depth.shape());
+    grad_.median_depth.reset(raster_.depth.shape());
+    grad_.tint.reset(raster_.tint.shape());
+    const std::vector<float> weights(pixels_.size(), 1.0F);
+    Tensor<double> grad_specular;
+    shade::backward(raster_.colour, raster_.tint, std::span<const int32_t>(pixels_),
+                    std::span<const float>(weights), specular_, grad_colour_, grad_.colour, grad_.tint,
+                    grad_specular);
+    if (s_.specular) backward_specular(grad_specular, g);
+    surface::pseudo_normals_backward(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha,
+                                     s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth, g.camera);
+    raster::BasicInputGradient<double> input;
+    raster::backward_reference(main_, p_.camera, s_.raster, grad_, input);
+    g.camera.camera_from_world += input.camera.camera_from_world;
+    g.camera.position += input.camera.position;
+    deform::backward_reference(p_.main, s_.deform ? &p_.main_field : nullptr, s_.main_points, s_.time,
+                               input.surfels, g.main, s_.deform ? &g.main_field : nullptr);
+  }
+
+  void reflect() {
+    pixels_ = all_pixels(p_.camera);
+    surface::reflection_rays(p_.camera, std::span<const int32_t>(pixels_), raster_.depth,
+                             raster_.median_depth, raster_.normal, s_.depth_ratio, origins_, directions_);
+  }
+  const Tensor<double>& directions() const { return directions_; }
+
+ private:
+  void forward_specular() {
+    reflect();
+    if (p_.map) {
+      moved_ = directions_;
+      if (s_.deform) {
+        Tensor<double> residuals;
+        field::forward_reference(*p_.map->field, s_.map_directions, s_.time, residuals);
+        for (int64_t i = 0; i < moved_.size(); ++i) moved_[i] += residuals[i];
+      }
+      environment_map::forward(p_.map->logit, moved_, specular_);
+      return;
+    }
+    deform::forward_reference(p_.environment, s_.deform ? &p_.environment_field : nullptr,
+                              s_.environment_points, s_.time, s_.sh_degree, environment_);
+    trace::forward_reference(environment_, origins_, directions_, s_.trace, trace_);
+    specular_ = trace_.colour;
+  }
+
+  void backward_specular(const Tensor<double>& grad_specular, Gradient& g) {
+    trace::BasicInputGradient<double> input;
+    if (p_.map) {
+      g.map.logit.reset(p_.map->logit.shape());
+      g.map.field = zeros_like<double>(*p_.map->field);
+      input.origins.reset(origins_.shape());
+      input.directions.reset(directions_.shape());
+      environment_map::backward(p_.map->logit, moved_, grad_specular, g.map.logit, input.directions);
+      if (s_.deform) {
+        field::backward_reference(*p_.map->field, s_.map_directions, s_.time, input.directions, *g.map.field);
+      }
+    } else {
+      trace::BasicOutputGradient<double> grad_trace;
+      grad_trace.colour = grad_specular;
+      trace::backward_reference(environment_, origins_, directions_, s_.trace, grad_trace, input);
+      deform::backward_reference(p_.environment, s_.deform ? &p_.environment_field : nullptr,
+                                 s_.environment_points, s_.time, input.surfels, g.environment,
+                                 s_.deform ? &g.environment_field : nullptr);
+    }
+    surface::reflection_rays_backward(p_.camera, std::span<const int32_t>(pixels_), raster_.depth,
+                                      raster_.median_depth, raster_.normal, s_.depth_ratio, input.origins,
+                                      input.directions, grad_.depth, grad_.median_depth, grad_.normal,
+                                      g.camera);
+  }
+
+  double losses() {
+    grad_colour_.reset(colour_.shape());
+    grad_.normal.reset(raster_.normal.shape());
+    grad_pseudo_.reset(raster_.normal.shape());
+    const Weights& w = s_.weights;
+    double total = w.l1 * loss::l1_reference(colour_, s_.target, w.l1, grad_colour_);
+    total += w.ssim * loss::ssim_loss_reference(colour_, s_.target, w.ssim, grad_colour_);
+    total += w.normal * loss::normal_consistency_reference(raster_.normal, pseudo_, w.normal, grad_.normal,
+                                                           grad_pseudo_);
+    total +=
+        w.normal_prior * loss::normal_prior_reference(raster_.normal, s_.prior, w.normal_prior, grad_.normal);
+    const auto pixels = static_cast<double>(raster_.distortion.size());
+    grad_.distortion.reset(raster_.distortion.shape());
+    grad_.distortion.fill(w.distortion / pixels);
+    double distortion = 0;
+    for (const double d : raster_.distortion.values()) distortion += d / pixels;
+    return total + w.distortion * distortion;
+  }
+
+  const Parameters& p_;
+  const Setting& s_;
+  BasicPosedSurfels<double> main_, environment_;
+  raster::BasicOutput<double> raster_;
+  trace::BasicOutput<double> trace_;
+  std::vector<int32_t> pixels_;
+  Tensor<double> pseudo_, origins_, directions_, moved_, specular_, colour_;
+  Tensor<double> grad_colour_, grad_pseudo_;
+  raster::BasicOutputGradient<double> grad_;
+};
+
+}  // namespace
+
+double loss(const Parameters& parameters, const Setting& setting, Gradient* gradient) {
+  Graph graph(parameters, setting);
+  const double value = graph.forward();
+  if (gradient) graph.backward(*gradient);
+  return value;
+}
+
+Tensor<double> reflection_directions(const Parameters& parameters, const Setting& setting) {
+  Setting still = setting;
+  still.specular = false;
+  Graph graph(parameters, still);
+  graph.forward();
+  graph.reflect();
+  return graph.directions();
+}
+
+}  // namespace traceflow::reference
