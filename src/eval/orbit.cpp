@@ -1,0 +1,169 @@
+#include "eval/orbit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace traceflow::eval {
+
+namespace {
+
+using V = Vec3<double>;
+constexpr double pi = std::numbers::pi;
+
+// A circle (or an arc of it) that looks at its target.
+struct Circle {
+  V target{0}, up{0, -1, 0};
+  V start{0, 0, -1};  // unit, at right angles to up: where angle 0 is
+  double radius = 1, height = 0;
+  double swing = pi;  // largest angle to either side; pi goes round
+};
+
+V unit(const V& v, const V& otherwise) {
+  const double length = std::sqrt(dot(v, v));
+  return length > 1e-9 && std::isfinite(length) ? v / length : otherwise;
+}
+
+// Any unit vector at right angles to the unit vector v.
+V perpendicular(const V& v) {
+  const V axis = std::abs(v.x) < 0.5 ? V{1, 0, 0} : V{0, 0, 1};
+  return unit(cross(v, cross(axis, v)), V{0, 0, 1});
+}
+
+// Rows of camera_from_world are the camera's axes in world.
+V axis_of(const Camera<float>& camera, int row) {
+  const Mat3<float>& r = camera.camera_from_world;
+  return {r[0][row], r[1][row], r[2][row]};
+}
+
+// The point nearest to all optical axes in the least-squares sense; a little ridge keeps parallel axes
+// solvable.
+V point_looked_at(const std::vector<Camera<float>>& cameras, double spread) {
+  Mat3<double> a(1e-6);
+  V middle(0), b(0);
+  for (const Camera<float>& c : cameras) middle += V(c.position) / static_cast<double>(cameras.size());
+  V forward(0);
+  for (const Camera<float>& c : cameras) {
+    const V d = axis_of(c, 2);
+    const Mat3<double> project = Mat3<double>(1.0) - outerProduct(d, d);
+    a += project;
+    b += project * (V(c.position) - middle);
+    forward += d;
+  }
+  const V point = middle + inverse(a) * b;
+  double ahead = 0;
+  for (const Camera<float>& c : cameras) ahead += dot(point - V(c.position), axis_of(c, 2));
+  if (ahead > 0 && std::isfinite(ahead)) return point;
+  return middle + unit(forward, V{0, 0, 1}) * spread;
+}
+
+Circle circle_from(const std::vector<Camera<float>>& cameras) {
+  V middle(0), down(0);
+  for (const Camera<float>& c : cameras) {
+    middle += V(c.position) / static_cast<double>(cameras.size());
+    down += axis_of(c, 1);
+  }
+  double spread = 0;
+  for (const Camera<float>& c : cameras) spread = std::max(spread, length(V(c.position) - middle));
+  Circle circle;
+  circle.up = unit(-down, V{0, -1, 0});
+  circle.target = point_looked_at(cameras, std::max(1.0, spread));
+
+  double radius = 0, height = 0;
+  for (const Camera<float>& c : cameras) {
+    const V offset = V(c.position) - circle.target;
+    const double above = dot(offset, circle.up);
+    height += above / static_cast<double>(cameras.size());
+    radius += length(offset - above * circle.up) / static_cast<double>(cameras.size());
+  }
+  circle.radius = std::max(radius, 1e-6);
+  circle.height = height;
+  const V mean_offset = middle - circle.target;
+  circle.start = unit(mean_offset - dot(mean_offset, circle.up) * circle.up, perpendicular(circle.up));
+
+  const V side = cross(circle.up, circle.start);
+  double left = 0, right = 0;
+  for (const Camera<float>& c : cameras) {
+    const V offset = V(c.position) - circle.target;
+    const double angle = std::atan2(dot(offset, side), dot(offset, circle.start));
+    left = std::min(left, angle);
+    right = std::max(right, angle);
+  }
+  circle.swing = right - left > 4 * pi / 3 ? pi : std::max((right - left) / 2, pi / 12);
+  return circle;
+}
+
+Camera<float> look(Camera<float> camera, const Circle& circle, double angle) {
+  const V side = cross(circle.up, circle.start);
+  const V offset =
+      circle.radius * (std::cos(angle) * circle.start + std::sin(angle) * side) + circle.height * circle.up;
+  const V z = unit(-offset, circle.start);
+  const V x = unit(cross(z, circle.up), perpendicular(z));
+  const V y = cross(z, x);
+  camera.position = Vec3<float>(circle.target + offset);
+  camera.camera_from_world = Mat3<float>(transpose(Mat3<double>(x, y, z)));
+  return camera;
+}
+
+std::vector<Shot> path(const Camera<float>& like, const Circle& circle, int frames) {
+  std::vector<Shot> shots;
+  for (int i = 0; i < frames; ++i) {
+    const double turn = 2 * pi * i / frames;
+    const double angle = circle.swing >= pi ? turn : circle.swing * std::sin(turn);
+    shots.push_back({fmt::format("{:05}", i), std::nullopt, look(like, circle, angle)});
+  }
+  return shots;
+}
+
+// Middle value per axis, which a few strays do not move.
+V median_point(const Tensor<float>& points) {
+  V median(0);
+  std::vector<float> values;
+  for (int axis = 0; axis < 3; ++axis) {
+    values.clear();
+    for (int64_t i = 0; i < points.dim(0); ++i) {
+      if (std::isfinite(points(i, axis))) values.push_back(points(i, axis));
+    }
+    if (values.empty()) continue;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    median[axis] = *middle;
+  }
+  return median;
+}
+
+}  // namespace
+
+std::vector<Shot> orbit_around_cameras(const std::vector<Camera<float>>& cameras, int frames) {
+  require(!cameras.empty(), "an orbit has cameras to go by");
+  return path(cameras.front(), circle_from(cameras), frames);
+}
+
+std::vector<Shot> orbit_around_points(const Tensor<float>& points, int width, int height, int frames) {
+  Circle circle;
+  circle.target = points.empty() ? V(0) : median_point(points);
+  std::vector<double> distances;
+  for (int64_t i = 0; i < (points.empty() ? 0 : points.dim(0)); ++i) {
+    const double d = length(load3<double>(points.row(i)) - circle.target);
+    if (std::isfinite(d)) distances.push_back(d);
+  }
+  double reach = 1;
+  if (!distances.empty()) {
+    const auto most = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
+    std::nth_element(distances.begin(), most, distances.end());
+    if (*most > 0) reach = *most;
+  }
+  circle.radius = 2.5 * reach;
+  circle.height = 0.75 * reach;
+  Camera<float> like;
+  like.width = width;
+  like.height = height;
+  like.focal_x = like.focal_y = static_cast<float>(height / 2.0 / std::tan(pi / 8));
+  like.centre_x = static_cast<float>(width) / 2;
+  like.centre_y = static_cast<float>(height) / 2;
+  return path(like, circle, frames);
+}
+
+}  // namespace traceflow::eval
