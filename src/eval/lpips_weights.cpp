@@ -1,0 +1,58 @@
+#include <string>
+
+#include "eval/lpips.h"
+#include "files/safetensors.h"
+
+namespace traceflow::lpips {
+
+namespace {
+
+constexpr const char* remedy = "write the file with scripts/export_lpips.py";
+// Places of the convolutions in torchvision's vgg16().features; the numbers between are ReLU and pooling.
+constexpr int places[] = {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28};
+
+Weights::Convolution read_convolution(const Safetensors& file, const std::string& where, int place,
+                                      int64_t inputs) {
+  const std::string name = "features." + std::to_string(place);
+  Weights::Convolution c{file.tensor<float>(name + ".weight"), file.tensor<float>(name + ".bias")};
+  const Shape& shape = c.weight.shape();
+  if (shape.rank() != 4 || shape[0] < 1 || shape[1] != inputs || shape[2] != 3 || shape[3] != 3) {
+    throw InputError(where, name + ".weight", shape.to_string(), "Nx" + std::to_string(inputs) + "x3x3",
+                     remedy);
+  }
+  if (c.bias.shape() != Shape{shape[0]}) {
+    throw InputError(where, name + ".bias", c.bias.shape().to_string(), std::to_string(shape[0]), remedy);
+  }
+  return c;
+}
+
+Tensor<float> read_linear(const Safetensors& file, const std::string& where, int stage, int64_t channels) {
+  const std::string name = "lin" + std::to_string(stage) + ".model.1.weight";
+  const Tensor<float> stored = file.tensor<float>(name);
+  if (stored.size() != channels) {
+    throw InputError(where, name, stored.shape().to_string(), "1x" + std::to_string(channels) + "x1x1",
+                     remedy);
+  }
+  Tensor<float> linear(Shape{channels});
+  std::copy(stored.data(), stored.data() + channels, linear.data());
+  return linear;
+}
+
+}  // namespace
+
+Weights read_weights(const std::filesystem::path& path) {
+  const Safetensors file = Safetensors::read(path);
+  Weights weights;
+  int64_t channels = 3;
+  size_t next = 0;
+  for (int stage = 0; stage < stages; ++stage) {
+    for (int i = 0; i < convolutions_in_stage[stage]; ++i) {
+      weights.convolutions.push_back(read_convolution(file, path.string(), places[next++], channels));
+      channels = weights.convolutions.back().bias.size();
+    }
+    weights.linear.push_back(read_linear(file, path.string(), stage, channels));
+  }
+  return weights;
+}
+
+}  // namespace traceflow::lpips
