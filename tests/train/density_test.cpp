@@ -1,0 +1,163 @@
+#include "train/density.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace traceflow {
+namespace {
+
+constexpr float extent = 1;
+
+// Surfels of one size and opacity in a row, with moments that are not zero.
+struct Set {
+  Surfels surfels;
+  SurfelMoments moments;
+
+  Set(int64_t count, float scale, float opacity) {
+    surfels.position.reset({count, 3});
+    surfels.log_scale.reset({count, 2});
+    surfels.log_scale.fill(std::log(scale));
+    surfels.rotation.reset({count, 4});
+    surfels.opacity_logit.reset({count});
+    surfels.opacity_logit.fill(std::log(opacity / (1 - opacity)));
+    surfels.sh.reset({count, 4, 3});
+    surfels.tint_logit.reset({count});
+    for (int64_t i = 0; i < count; ++i) {
+      surfels.position(i, 0) = static_cast<float>(i);
+      surfels.rotation(i, 0) = 1;
+      surfels.tint_logit[i] = static_cast<float>(i);
+    }
+    moments.reset_like(surfels);
+    moments.for_each([](const char*, optimize::AdamState& state) {
+      state.first.fill(1);
+      state.second.fill(2);
+    });
+  }
+};
+
+DensityOptions options() {
+  DensityOptions o;
+  o.gradient_threshold = 1;
+  o.clone_below = 0.01F;
+  return o;
+}
+
+// Signals every surfel once; `strong` ones above the threshold.
+void signal(DensityControl& control, int64_t count, const std::vector<int64_t>& strong) {
+  Tensor<float> value(Shape{count});
+  Tensor<uint8_t> touched(Shape{count});
+  touched.fill(1);
+  value.fill(0.1F);
+  for (const int64_t i : strong) value[i] = 5.0F + static_cast<float>(i);
+  control.accumulate(value, touched);
+}
+
+TEST(Density, ClonesSmallSurfelsWithAStrongSignal) {
+  Set set(10, 0.001F, 0.5F);
+  DensityControl control("main", options(), 10);
+  signal(control, 10, {3, 7});
+  Random random(1);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, extent, 1000, random);
+  EXPECT_EQ(change.cloned, 2);
+  EXPECT_EQ(change.split, 0);
+  EXPECT_EQ(set.surfels.count(), 12);
+  EXPECT_EQ(set.surfels.position(10, 0), 3);
+  EXPECT_EQ(set.surfels.position(11, 0), 7);
+  EXPECT_EQ(set.surfels.tint_logit[11], 7);
+}
+
+TEST(Density, SplitsLargeSurfelsIntoTwoSmallerOnesInTheirPlane) {
+  Set set(5, 0.05F, 0.5F);
+  DensityControl control("main", options(), 5);
+  signal(control, 5, {2});
+  Random random(1);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, extent, 1000, random);
+  EXPECT_EQ(change.split, 1);
+  ASSERT_EQ(set.surfels.count(), 6);
+  for (const int64_t child : {4, 5}) {
+    EXPECT_NEAR(set.surfels.log_scale(child, 0), std::log(0.05F / 1.6F), 1e-5F);
+    EXPECT_EQ(set.surfels.position(child, 2), 0) << "the identity frame's plane is z = 0";
+    EXPECT_NE(set.surfels.position(child, 0), 2);
+  }
+  for (int64_t i = 0; i < 4; ++i) EXPECT_NE(set.surfels.position(i, 0), 2) << "the parent is gone";
+}
+
+TEST(Density, NewSurfelsHaveZeroMomentsAndOldOnesKeepTheirs) {
+  Set set(4, 0.001F, 0.5F);
+  DensityControl control("main", options(), 4);
+  signal(control, 4, {0});
+  Random random(1);
+  control.update(set.surfels, set.moments, extent, 1000, random);
+  set.moments.for_each([](const char* name, optimize::AdamState& state) {
+    const int64_t row = state.first.row_size();
+    for (int64_t k = 0; k < row; ++k) {
+      EXPECT_EQ(state.first[3 * row + k], 1) << name;
+      EXPECT_EQ(state.first[4 * row + k], 0) << name;
+      EXPECT_EQ(state.second[4 * row + k], 0) << name;
+    }
+  });
+}
+
+TEST(Density, PrunesTheFaintTheOversizedAndTheBroken) {
+  Set set(6, 0.02F, 0.5F);
+  set.surfels.opacity_logit[1] = -10;
+  set.surfels.log_scale(2, 1) = std::log(0.5F);
+  set.surfels.opacity_logit[3] = std::nanf("");
+  DensityControl control("main", options(), 6);
+  Random random(1);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, extent, 1000, random);
+  EXPECT_EQ(change.pruned_transparent, 2);
+  EXPECT_EQ(change.pruned_large, 1);
+  ASSERT_EQ(set.surfels.count(), 3);
+  EXPECT_EQ(set.surfels.position(0, 0), 0);
+  EXPECT_EQ(set.surfels.position(1, 0), 4);
+  EXPECT_EQ(set.surfels.position(2, 0), 5);
+}
+
+TEST(Density, TheCapHoldsAndTheStrongestSignalsGoFirst) {
+  Set set(10, 0.001F, 0.5F);
+  DensityControl control("main", options(), 10);
+  signal(control, 10, {1, 2, 3, 4, 5});
+  Random random(1);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, extent, 12, random);
+  EXPECT_TRUE(change.at_cap);
+  EXPECT_EQ(change.cloned, 2);
+  ASSERT_EQ(set.surfels.count(), 12);
+  EXPECT_EQ(set.surfels.position(10, 0) + set.surfels.position(11, 0), 4 + 5);
+}
+
+TEST(Density, NeverEmptiesASet) {
+  Set set(3, 0.02F, 0.001F);
+  DensityControl control("main", options(), 3);
+  Random random(1);
+  control.update(set.surfels, set.moments, extent, 100, random);
+  EXPECT_EQ(set.surfels.count(), 3);
+}
+
+TEST(Density, SignalsThatWereNotTouchedOrNotFiniteDoNotCount) {
+  Set set(2, 0.001F, 0.5F);
+  DensityControl control("main", options(), 2);
+  Tensor<float> value(Shape{2});
+  Tensor<uint8_t> touched(Shape{2});
+  value[0] = 100;
+  value[1] = std::nanf("");
+  touched[1] = 1;
+  control.accumulate(value, touched);
+  Random random(1);
+  EXPECT_EQ(control.update(set.surfels, set.moments, extent, 100, random).cloned, 0);
+}
+
+TEST(Density, OpacityResetLowersTheLogitAndForgetsItsMoments) {
+  Set set(2, 0.001F, 0.9F);
+  set.surfels.opacity_logit[1] = -8;
+  const DensityControl control("main", options(), 2);
+  control.reset_opacity(set.surfels, set.moments);
+  EXPECT_NEAR(1 / (1 + std::exp(-set.surfels.opacity_logit[0])), 0.01F, 1e-6F);
+  EXPECT_EQ(set.surfels.opacity_logit[1], -8);
+  EXPECT_EQ(set.moments.opacity_logit.first[0], 0);
+  EXPECT_EQ(set.moments.position.first[0], 1);
+}
+
+}  // namespace
+}  // namespace traceflow
