@@ -9,6 +9,7 @@
 #include "math/rotation.h"
 #include "math/spherical_harmonics.h"
 #include "math/surfel_hit.h"
+#include "math/surfel_projection.h"
 #include "ops/raster/raster.h"
 
 // The plain truth of method §3: double precision, every pixel against every surfel.
@@ -312,7 +313,7 @@ class Backward {
     const Prepared& p = scene_.prepared(i);
     PreparedGradient& g = prepared_[static_cast<size_t>(i)];
     const Vector3 from_camera = p.frame.position - camera_.position;
-    if (p.has_low_pass) g.centre += projection_gradient(p.centre, g.pixel);
+    if (p.has_low_pass) g.centre += project_backward(camera_, p.centre, g.pixel);
     const Vector3 grad_direction = sh_colour_backward(scene_.sh_degree(), surfels_.sh.row(i), p.direction,
                                                       g.colour, gradient_.surfels.sh.row(i));
     Vector3 grad_from_camera = g.centre * camera_.camera_from_world;
@@ -331,11 +332,6 @@ class Backward {
     for (int k = 0; k < 4; ++k) to.rotation(i, k) = grad_rotation[k];
     to.opacity[i] = g.opacity;
     if (surfels_.has_tint()) to.tint[i] = g.tint;
-  }
-
-  Vector3 projection_gradient(const Vector3& point, const Vector2& grad_pixel) const {
-    const Vector2 g(grad_pixel.x * camera_.focal_x / point.z, grad_pixel.y * camera_.focal_y / point.z);
-    return {g.x, g.y, -(g.x * point.x + g.y * point.y) / point.z};
   }
 
   const Surfels& surfels_;
