@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+
+#include "capture/lens.h"
+
+namespace traceflow {
+
+// camera/ID.json as it stands: lengths in the capture's units, pixels of image_size.
+struct CapturedCamera {
+  Lens lens;
+  Mat3<double> camera_from_world{1};
+  Vec3<double> position{0};
+};
+
+// Throws InputError for fields that are missing or make no camera.
+CapturedCamera read_camera(const std::filesystem::path& path);
+
+}  // namespace traceflow

@@ -1,0 +1,146 @@
+#include "capture/decode.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "capture/resample.h"
+#include "files/png.h"
+
+namespace traceflow {
+
+namespace {
+
+// The view's grid over an image of the view that is stored at another size.
+Grid grid_over(const ViewSource& view, const Tensor<float>& image) {
+  return {view.width(), view.height(), static_cast<double>(image.dim(1)) / view.lens.width * view.factor,
+          static_cast<double>(image.dim(0)) / view.lens.height * view.factor};
+}
+
+Tensor<float> to_view_grid(const ViewSource& view, Tensor<float> image) {
+  if (!view.lens.is_pinhole()) {
+    const Lens lens = view.lens.resized(static_cast<double>(image.dim(1)), static_cast<double>(image.dim(0)));
+    image = straighten(image, lens, view.zoom);
+  }
+  return resample(image, grid_over(view, image));
+}
+
+// Normals whose length says nothing become zero, the others unit.
+void normalise(Tensor<float>& normals) {
+  constexpr float shortest = 0.1F;
+  for (int64_t i = 0; i < normals.size(); i += 3) {
+    const Vec3<float> n = load3<float>(&normals[i]);
+    const float length = glm::length(n);
+    // Also false for a NaN.
+    const bool is_direction = length > shortest && std::isfinite(length);
+    store3(&normals[i], is_direction ? n / length : Vec3<float>(0));
+  }
+}
+
+Tensor<float> normals_on_view_grid(const ViewSource& view, Tensor<float> normals) {
+  normalise(normals);
+  normals = to_view_grid(view, std::move(normals));
+  normalise(normals);
+  return normals;
+}
+
+Tensor<float> read_normal_png(const std::filesystem::path& path) {
+  // A unit vector never comes near such a length: black and white say "no value".
+  constexpr float longest = 1.5F;
+  const Tensor<uint8_t> pixels = read_png(path);
+  if (pixels.dim(2) < 3) {
+    throw InputError(path.string(), "channels", std::to_string(pixels.dim(2)), "3 (normals as 2v - 1)");
+  }
+  Tensor<float> normals({pixels.dim(0), pixels.dim(1), 3});
+  for (int64_t i = 0; i < normals.size() / 3; ++i) {
+    const Vec3<float> n = 2.0F * load3<float>(&pixels[i * pixels.dim(2)]) / 255.0F - 1.0F;
+    store3(&normals[3 * i], glm::length(n) < longest ? n : Vec3<float>(0));
+  }
+  return normals;
+}
+
+Tensor<float> read_depth(const std::filesystem::path& path) {
+  Tensor<float> depth = read_npy(path);
+  const int rank = depth.shape().rank();
+  if (depth.empty() || !(rank == 2 || (rank == 3 && depth.dim(2) == 1))) {
+    throw InputError(path.string(), "shape", depth.shape().to_string(), "H×W");
+  }
+  constexpr float farthest = 1e6F;
+  Tensor<float> result({depth.dim(0), depth.dim(1), 1});
+  for (int64_t i = 0; i < depth.size(); ++i) {
+    result[i] = depth[i] > 0 && depth[i] < farthest ? depth[i] : 0.0F;
+  }
+  return result;
+}
+
+// Mean of the depths that exist, per pixel of the view.
+Tensor<float> depth_on_view_grid(const ViewSource& view, Tensor<float> depth, float scale) {
+  if (!view.lens.is_pinhole()) {
+    const Lens lens = view.lens.resized(static_cast<double>(depth.dim(1)), static_cast<double>(depth.dim(0)));
+    depth = straighten_nearest(depth, lens, view.zoom);
+  }
+  Tensor<float> exists(depth.shape());
+  for (int64_t i = 0; i < depth.size(); ++i) exists[i] = depth[i] > 0 ? 1.0F : 0.0F;
+  const Tensor<float> sum = resample(depth, grid_over(view, depth));
+  const Tensor<float> share = resample(exists, grid_over(view, depth));
+  Tensor<float> result({view.height(), view.width()});
+  for (int64_t i = 0; i < result.size(); ++i) result[i] = share[i] >= 0.5F ? scale * sum[i] / share[i] : 0.0F;
+  return result;
+}
+
+}  // namespace
+
+Tensor<uint8_t> decode_colour(const ViewSource& view) {
+  const Tensor<uint8_t> pixels = read_png(view.image);
+  if (pixels.dim(1) != static_cast<int64_t>(view.lens.width) ||
+      pixels.dim(0) != static_cast<int64_t>(view.lens.height)) {
+    throw InputError(view.image.string(), "size", pixels.shape().to_string(),
+                     "the size it had when the capture was opened");
+  }
+  const int64_t stored = pixels.dim(2), step = stored >= 3 ? 1 : 0;
+  Tensor<uint8_t> rgb;
+  rgb.resize({pixels.dim(0), pixels.dim(1), 3});
+  for (int64_t i = 0; i < rgb.size() / 3; ++i) {
+    for (int64_t c = 0; c < 3; ++c) rgb[3 * i + c] = pixels[stored * i + c * step];
+  }
+  if (view.lens.is_pinhole() && view.factor == 1) return rgb;
+  return to_8bit(to_view_grid(view, from_8bit(rgb)));
+}
+
+Tensor<uint8_t> decode_mask(const ViewSource& view) {
+  const Tensor<uint8_t> pixels = read_png(view.mask);
+  Tensor<float> mask({pixels.dim(0), pixels.dim(1), 1});
+  for (int64_t i = 0; i < mask.size(); ++i) {
+    const bool white = pixels[i * pixels.dim(2)] >= 128;
+    mask[i] = white != view.mask_is_inverted ? 1.0F : 0.0F;
+  }
+  mask = to_view_grid(view, std::move(mask));
+  Tensor<uint8_t> result({view.height(), view.width()});
+  for (int64_t i = 0; i < result.size(); ++i) result[i] = mask[i] >= 0.5F ? 1 : 0;
+  return result;
+}
+
+Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture) {
+  return normals_on_view_grid(view, view.prior_slice >= 0 ? capture.prior_array->slice(view.prior_slice)
+                                                          : read_normal_png(view.prior));
+}
+
+ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture) {
+  ViewTruth truth;
+  if (!view.truth_normal.empty())
+    truth.normal = normals_on_view_grid(view, read_normal_png(view.truth_normal));
+  if (!view.truth_depth.empty()) {
+    truth.depth = depth_on_view_grid(view, read_depth(view.truth_depth), static_cast<float>(capture.scale));
+  }
+  return truth;
+}
+
+void turn_to_world(Tensor<float>& normals, const ViewSource& view, const Vec3<double>& signs) {
+  const Mat3<float> world_from_camera(transpose(view.camera_from_world));
+  const Vec3<float> opencv_from_prior(signs);
+  for (int64_t i = 0; i < normals.size(); i += 3) {
+    store3(&normals[i], world_from_camera * (opencv_from_prior * load3<float>(&normals[i])));
+  }
+}
+
+}  // namespace traceflow

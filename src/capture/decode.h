@@ -1,0 +1,20 @@
+#pragma once
+
+#include "base/tensor.h"
+#include "capture/capture.h"
+#include "capture/view_source.h"
+
+// From a view's files to pixels on the view's grid: straightened where the lens is not a pinhole, filtered to
+// its size.
+namespace traceflow {
+
+Tensor<uint8_t> decode_colour(const ViewSource& view);  // H×W×3
+Tensor<uint8_t> decode_mask(const ViewSource& view);    // H×W of 0 and 1
+// H×W×3 in the prior's own axes, unit, zero where there is none.
+Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture);
+ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture);
+
+// Turns unit or zero normals from the prior's axes to world.
+void turn_to_world(Tensor<float>& normals, const ViewSource& view, const Vec3<double>& signs);
+
+}  // namespace traceflow

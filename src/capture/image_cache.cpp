@@ -1,0 +1,124 @@
+#include "capture/image_cache.h"
+
+#include <cmath>
+
+#include "base/parallel.h"
+#include "capture/decode.h"
+#include "files/png.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr float int16_unit = 32767;
+
+Tensor<int16_t> narrow(const Tensor<float>& normals) {
+  Tensor<int16_t> result;
+  result.resize(normals.shape());
+  for (int64_t i = 0; i < normals.size(); ++i) {
+    result[i] = static_cast<int16_t>(std::lround(std::clamp(normals[i], -1.0F, 1.0F) * int16_unit));
+  }
+  return result;
+}
+
+Tensor<float> widen(const Tensor<int16_t>& normals) {
+  Tensor<float> result;
+  result.resize(normals.shape());
+  for (int64_t i = 0; i < normals.size(); i += 3) {
+    const Vec3<float> n = load3<float>(&normals[i]);
+    const float length2 = dot(n, n);
+    store3(&result[i], length2 > 0 ? n / std::sqrt(length2) : Vec3<float>(0));
+  }
+  return result;
+}
+
+}  // namespace
+
+std::shared_ptr<const ViewImages> ImageCache::load(const std::string& id) {
+  const std::shared_ptr<const Pixels> pixels = find_or_decode(id);
+  auto images = std::make_shared<ViewImages>();
+  images->colour = from_8bit(pixels->colour);
+  images->mask = pixels->mask;
+  images->normal_prior = widen(pixels->normal_prior);
+  return images;
+}
+
+ViewTruth ImageCache::load_truth(const std::string& id) const { return decode_truth(source(id), capture_); }
+
+void ImageCache::warm(const std::string& id) { find_or_decode(id); }
+
+const ViewSource& ImageCache::source(const std::string& id) const {
+  const auto found = views_.find(id);
+  require(found != views_.end(), "a view belongs to the capture", id);
+  return found->second;
+}
+
+int64_t ImageCache::bytes() const {
+  const std::lock_guard lock(mutex_);
+  return bytes_;
+}
+
+int64_t ImageCache::bytes_of(const std::string& id) const {
+  const ViewSource& view = source(id);
+  return view.width() * view.height() * (3 + (view.mask.empty() ? 0 : 1) + (view.has_prior() ? 6 : 0));
+}
+
+std::shared_ptr<const ImageCache::Pixels> ImageCache::find_or_decode(const std::string& id) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = by_id_.find(id);
+    if (found != by_id_.end()) {
+      entries_.splice(entries_.begin(), entries_, found->second);
+      return found->second->pixels;
+    }
+  }
+  // Outside the lock: two threads may decode the same view, which costs time but nothing else.
+  auto pixels = std::make_shared<const Pixels>(decode(id));
+  insert(id, pixels);
+  return pixels;
+}
+
+ImageCache::Pixels ImageCache::decode(const std::string& id) const {
+  const ViewSource& view = source(id);
+  Pixels pixels;
+  pixels.colour = decode_colour(view);
+  if (!view.mask.empty()) pixels.mask = decode_mask(view);
+  if (view.has_prior()) {
+    Tensor<float> normals = decode_prior(view, capture_);
+    turn_to_world(normals, view, capture_.prior_signs);
+    pixels.normal_prior = narrow(normals);
+  }
+  return pixels;
+}
+
+void ImageCache::insert(const std::string& id, const std::shared_ptr<const Pixels>& pixels) {
+  const std::lock_guard lock(mutex_);
+  const int64_t size = pixels->bytes();
+  if (size > limit_bytes_ || by_id_.contains(id)) return;
+  while (bytes_ + size > limit_bytes_) {
+    bytes_ -= entries_.back().pixels->bytes();
+    by_id_.erase(entries_.back().id);
+    entries_.pop_back();
+  }
+  entries_.push_front({id, pixels});
+  by_id_[id] = entries_.begin();
+  bytes_ += size;
+}
+
+std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View& view) {
+  return capture.images->load(view.id);
+}
+
+void prefetch(const Capture& capture, std::span<const View> views) {
+  ImageCache& cache = *capture.images;
+  int64_t bytes = 0;
+  size_t count = 0;
+  while (count < views.size() && (bytes += cache.bytes_of(views[count].id)) <= cache.limit_bytes()) ++count;
+  parallel_for(
+      "capture: decode", static_cast<int64_t>(count),
+      [&](int64_t i) { cache.warm(views[static_cast<size_t>(i)].id); }, 1);
+}
+
+ViewTruth load_truth(const Capture& capture, const View& view) { return capture.images->load_truth(view.id); }
+
+}  // namespace traceflow

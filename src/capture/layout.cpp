@@ -1,0 +1,152 @@
+#include "capture/layout.h"
+
+#include <algorithm>
+#include <set>
+
+#include "base/error.h"
+#include "capture/json_file.h"
+
+namespace traceflow {
+
+namespace {
+
+// An id becomes part of file names, and must not lead out of the folder.
+void check_id(const JsonField& field, const std::string& id) {
+  if (id.empty() || id.find('/') != std::string::npos || id.find('\0') != std::string::npos || id == "." ||
+      id == "..") {
+    field.fail("the id \"" + id + "\"", "ids that can name a file");
+  }
+}
+
+std::vector<std::string> read_ids(const JsonFile& dataset, const std::string& key,
+                                  std::vector<std::string>& warnings) {
+  if (!dataset.has(key)) return {};
+  const JsonField field = dataset[key];
+  std::vector<std::string> kept, repeated;
+  std::set<std::string> seen;
+  for (const std::string& id : field.strings()) {
+    check_id(field, id);
+    (seen.insert(id).second ? kept : repeated).push_back(id);
+  }
+  if (!repeated.empty()) {
+    warnings.push_back("dataset.json: " + key + " names " + ids_text(repeated) +
+                       " more than once: used once");
+  }
+  return kept;
+}
+
+// HyperNeRF's interpolation split: of every four frames the first trains and the third tests.
+void split_for_interpolation(CaptureLayout& layout) {
+  const std::vector<std::string>& ids = layout.all_ids.empty() ? layout.train_ids : layout.all_ids;
+  std::vector<std::string> train, test;
+  for (size_t i = 0; i < ids.size(); ++i) {
+    if (i % 4 == 0) train.push_back(ids[i]);
+    if (i % 4 == 2) test.push_back(ids[i]);
+  }
+  layout.all_ids = ids;
+  layout.train_ids = std::move(train);
+  layout.test_ids = std::move(test);
+}
+
+void read_split(const std::filesystem::path& folder, CaptureLayout& layout,
+                std::vector<std::string>& warnings) {
+  const JsonFile dataset(folder / "dataset.json");
+  layout.all_ids = read_ids(dataset, "ids", warnings);
+  layout.train_ids = read_ids(dataset, "train_ids", warnings);
+  layout.test_ids = read_ids(dataset, "val_ids", warnings);
+  if (layout.all_ids.empty() && layout.train_ids.empty()) {
+    dataset.fail("no ids", "train_ids and val_ids, or ids");
+  }
+  if (layout.train_ids.empty() || layout.test_ids.empty()) {
+    layout.format = "hypernerf-interp";
+    split_for_interpolation(layout);
+    if (layout.test_ids.empty())
+      warnings.emplace_back("too few views for a test split: there is nothing to evaluate on");
+    return;
+  }
+  const std::set<std::string> train(layout.train_ids.begin(), layout.train_ids.end());
+  std::vector<std::string> both;
+  std::copy_if(layout.test_ids.begin(), layout.test_ids.end(), std::back_inserter(both),
+               [&](const std::string& id) { return train.contains(id); });
+  if (!both.empty()) {
+    warnings.push_back("dataset.json: " + ids_text(both) +
+                       " in train_ids and in val_ids: the test is of trained views");
+  }
+}
+
+bool has_sides(const std::vector<std::string>& ids, const std::string& side) {
+  return std::any_of(ids.begin(), ids.end(), [&](const std::string& id) { return id.ends_with(side); });
+}
+
+// The families differ in what they leave out; nothing but the name depends on this.
+std::string format_of(const std::filesystem::path& folder, const CaptureLayout& layout, bool has_time_ids) {
+  if (!layout.format.empty()) return layout.format;
+  const std::string parent = folder.parent_path().filename().string(), name = folder.filename().string();
+  if (parent.starts_with("vrig") || name.starts_with("vrig")) return "hypernerf-vrig";
+  if (has_sides(layout.train_ids, "_left") || has_sides(layout.test_ids, "_right") ||
+      std::filesystem::exists(folder / "resized_mask") || std::filesystem::exists(folder / "mask")) {
+    return "nerf-ds";
+  }
+  return has_time_ids ? "hypernerf-vrig" : "nerfies";
+}
+
+void read_times(const std::filesystem::path& folder, CaptureLayout& layout,
+                std::vector<std::string>& warnings) {
+  const JsonFile metadata(folder / "metadata.json");
+  bool has_time_ids = false;
+  std::set<std::string> ids(layout.train_ids.begin(), layout.train_ids.end());
+  ids.insert(layout.test_ids.begin(), layout.test_ids.end());
+  std::vector<std::string> by_warp;
+  for (const std::string& id : ids) {
+    if (!metadata.has(id)) continue;
+    const JsonField entry = metadata[id];
+    const bool has_time = entry.has("time_id");
+    const JsonField field = has_time ? entry["time_id"] : entry["warp_id"];
+    if (field.number() < 0) field.fail(std::to_string(field.number()), "a number of at least zero");
+    layout.time_id[id] = field.number();
+    has_time_ids |= has_time;
+    if (!has_time) by_warp.push_back(id);
+  }
+  if (has_time_ids && !by_warp.empty()) {
+    warnings.push_back("metadata.json: no time_id for " + ids_text(by_warp) + ": warp_id taken in its place");
+  }
+  layout.format = format_of(folder, layout, has_time_ids);
+}
+
+void read_scene(const std::filesystem::path& folder, CaptureLayout& layout) {
+  const JsonFile scene(folder / "scene.json");
+  const std::vector<double> centre = scene["center"].numbers(3);
+  layout.normalisation.centre = load3<double>(centre.data());
+  layout.normalisation.scale = scene["scale"].positive();
+  if (scene.has("near")) layout.near_plane = scene["near"].number();
+  if (scene.has("far")) layout.far_plane = scene["far"].number();
+  if (scene.has("near") && scene.has("far") && !(layout.far_plane > layout.near_plane)) {
+    scene["far"].fail(std::to_string(layout.far_plane),
+                      "more than near (" + std::to_string(layout.near_plane) + ")");
+  }
+}
+
+}  // namespace
+
+CaptureLayout read_layout(const std::filesystem::path& folder, std::vector<std::string>& warnings) {
+  for (const char* name : {"dataset.json", "metadata.json", "scene.json"}) {
+    if (std::filesystem::is_regular_file(folder / name)) continue;
+    throw InputError(folder.string(), name, "no such file",
+                     "a capture in the NeRF-DS, Nerfies or HyperNeRF layout", "see docs/captures.md");
+  }
+  CaptureLayout layout;
+  read_split(folder, layout, warnings);
+  read_times(folder, layout, warnings);
+  read_scene(folder, layout);
+  return layout;
+}
+
+std::string ids_text(const std::vector<std::string>& ids) {
+  constexpr size_t named = 3;
+  std::string text;
+  for (size_t i = 0; i < std::min(named, ids.size()); ++i) text += (i == 0 ? "" : ", ") + ids[i];
+  if (ids.size() > named) text += " and " + std::to_string(ids.size() - named) + " more";
+  return text;
+}
+
+}  // namespace traceflow

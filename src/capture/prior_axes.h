@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/tensor.h"
+#include "capture/capture.h"
+#include "math/camera.h"
+
+// Which way the axes of normal priors point, read off the geometry (docs/captures.md).
+namespace traceflow {
+
+Vec3<double> prior_axis_signs(PriorAxes axes);  // of any but `automatic`, against OpenCV's
+std::string prior_axes_name(PriorAxes axes);
+
+// One view's priors, in their own axes, and the camera that they belong to.
+struct PriorView {
+  Camera<float> camera;
+  Tensor<float> normal;  // H×W×3, unit or zero
+};
+
+// Per axis the correlation of the priors, in their own axes, with the geometry's normals in OpenCV's; 0 where
+// nothing is known.
+struct AxisEvidence {
+  Vec3<double> correlation{0};
+  int64_t samples = 0;
+};
+
+// The geometry's normals are planes through each point's neighbours, turned to the viewer, at points that no
+// nearer one hides. Without points only z is known: what is seen faces the camera.
+AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<PriorView>& views);
+
+// The axes to use for what was asked, and a warning where the evidence speaks against them (empty: none).
+struct AxisChoice {
+  PriorAxes axes = PriorAxes::opengl;
+  std::string warning;
+};
+AxisChoice choose_prior_axes(PriorAxes asked, const AxisEvidence& evidence);
+
+}  // namespace traceflow
