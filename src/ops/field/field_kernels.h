@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+#include "ops/field/products.h"
+
+// The element-wise steps between the network's matrix products, with SIMD. Matrices are dense and row-major,
+// and have a multiple of 16 columns.
+namespace traceflow::field {
+
+// Whether the network is evaluated at a point: every coordinate finite and within coordinate_limit.
+bool evaluated(const float* point);
+
+// γ(point) of `count` points into rows of `columns` numbers, zero-padded on the right; rows up to `rows` are
+// filled as if with points that are not evaluated, which enter as the origin.
+void encode_points(const float* points, int64_t count, int64_t rows, int octaves, int64_t columns,
+                   float* encoding);
+
+// To the nearest bf16, ties to even.
+void round_to_bf16(const float* from, int64_t count, uint16_t* to);
+
+// Backward of ReLU, in place: gradient = 0 where the activation is not > 0. Adds the columns' sums to
+// column_sum. With bf16 activations the result is also written, rounded, to `rounded`.
+void mask_by_activation(const void* activation, Number number, int64_t rows, int64_t columns, float* gradient,
+                        uint16_t* rounded, float* column_sum);
+
+// to[i] += Σ_k from[k·stride + i] for i < count, each sum in the order of k.
+void add_slots(const float* from, int64_t slots, int64_t stride, int64_t count, float* to);
+
+}  // namespace traceflow::field

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <memory>
+
+// Matrix products on one thread, by oneDNN. All matrices are dense and row-major.
+namespace traceflow::field {
+
+enum class Number { fp32, bf16 };
+
+// What a product computes: C = A·B, then the parts that are asked for, in this order. A is m×k, or stored k×m
+// and read transposed; B is k×n; C is m×n. Sums are fp32.
+struct ProductShape {
+  int64_t m, k, n;
+  Number operands = Number::fp32;  // of A and B
+  Number result = Number::fp32;    // of C
+  bool transposed = false;         // A is stored k×m
+  bool bias = false;               // C += bias, one fp32 number per column
+  bool accumulate = false;         // C += what C held before
+  bool relu = false;               // C = max(C, 0)
+  auto operator<=>(const ProductShape&) const = default;
+};
+
+// One compiled product. run() may be called from any number of threads at once and never starts others; its
+// result does not depend on how many the program uses.
+class Product {
+ public:
+  explicit Product(const ProductShape& shape);
+  ~Product();
+  Product(const Product&) = delete;
+  Product& operator=(const Product&) = delete;
+
+  void run(const void* a, const void* b, const float* bias, void* c) const;
+
+ private:
+  struct Compiled;
+  std::unique_ptr<const Compiled> compiled_;
+};
+
+// The product of a shape, compiled when it is first asked for and kept until the program ends.
+const Product& product(const ProductShape& shape);
+
+}  // namespace traceflow::field
