@@ -4,8 +4,10 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "files/options_json.h"
 #include "scene/scene_file.h"
+#include "train/initialise.h"
 
 namespace traceflow {
 
@@ -223,7 +225,7 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["version"] = std::to_string(checkpoint_version);
   file.metadata["iteration"] = std::to_string(iteration_);
   file.metadata["views_next"] = std::to_string(views_.next());
-  file.metadata["options"] = options_json(options_);
+  file.metadata["options"] = options_to_json(options_);
   file.metadata["capture"] = capture_.name;
   file.metadata["capture_folder"] = std::filesystem::absolute(capture_.folder).lexically_normal().string();
   return file;

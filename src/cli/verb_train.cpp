@@ -1,0 +1,113 @@
+#include <atomic>
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <memory>
+
+#include "cli/error_boundary.h"
+#include "cli/option_arguments.h"
+#include "cli/progress.h"
+#include "cli/verbs.h"
+#include "files/options_json.h"
+#include "train/event_log.h"
+#include "train/trainer.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+// Set by Ctrl-C and SIGTERM: the run saves after its current iteration and ends. A second Ctrl-C ends it at
+// once.
+std::atomic<bool> stop_requested{false};
+
+void request_stop(int signal_number) {
+  stop_requested = true;
+  std::signal(signal_number, SIG_DFL);
+}
+
+struct TrainArguments {
+  std::string data;
+  std::string output;
+  std::string preset_name = "paper";
+  std::string device = "auto";
+  bool resume = false;
+  bool quiet = false;
+};
+
+void check_device(const std::string& device) {
+  if (device == "auto" || device == "cpu") return;
+  throw InputError("--device", "", device, "auto or cpu", "this build has no other device");
+}
+
+// The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
+// either.
+TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given,
+                      const Safetensors* checkpoint) {
+  TrainOptions options = preset(arguments.preset_name);
+  if (checkpoint) options_from_json(checkpoint->metadata.at("options"), option_fields(options), "checkpoint");
+  given.apply(option_fields(options));
+  options.validate();
+  return options;
+}
+
+std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& arguments) {
+  const RunFolder run{arguments.output};
+  if (arguments.resume) {
+    std::string note;
+    return std::make_unique<Safetensors>(read_checkpoint(run, note));
+  }
+  if (std::filesystem::exists(run.checkpoint()) || std::filesystem::exists(run.previous_checkpoint())) {
+    throw InputError("--output", "", arguments.output + ", which holds a run", "a new folder",
+                     "add --resume to continue it, or choose another");
+  }
+  return nullptr;
+}
+
+void train(const TrainArguments& arguments, const OptionArguments& given) {
+  check_device(arguments.device);
+  const std::unique_ptr<Safetensors> checkpoint = checkpoint_to_resume(arguments);
+  const TrainOptions options = settings(arguments, given, checkpoint.get());
+  std::string data = arguments.data;
+  if (data.empty() && checkpoint) data = checkpoint->metadata.at("capture_folder");
+  if (data.empty()) throw InputError("--data", "", "nothing", "a capture's folder");
+
+  Trainer trainer(options, load_capture(data, options.capture), arguments.output);
+  std::filesystem::create_directories(arguments.output);
+  if (!arguments.quiet) trainer.stream().listen(Progress::for_stderr());
+  auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
+  trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
+  if (checkpoint) trainer.resume();
+
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  const events::Finished end = trainer.run(stop_requested);
+  if (end.ending == events::Ending::diverged) throw Exit{exit_diverged};
+  if (end.ending == events::Ending::interrupted) throw Exit{exit_interrupted};
+}
+
+}  // namespace
+
+void add_train(CLI::App& program) {
+  CLI::App* verb = program.add_subcommand("train", "Reconstruct a scene from a capture.");
+  auto arguments = std::make_shared<TrainArguments>();
+  verb->add_option("-d,--data", arguments->data, "The capture's folder")->option_text("FOLDER");
+  verb->add_option("-o,--output", arguments->output, "The run's folder: checkpoints and log")
+      ->required()
+      ->option_text("RUN");
+  verb->add_option("--preset", arguments->preset_name,
+                   "paper (60,000 iterations), cpu (a quarter of an hour on two cores at "
+                   "240x135) or demo (minutes)")
+      ->option_text("NAME")
+      ->capture_default_str();
+  verb->add_option("--device", arguments->device, "auto or cpu")
+      ->option_text("DEVICE")
+      ->capture_default_str();
+  verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint");
+  verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
+  // The presets differ in values alone, so any of them names the flags.
+  auto defaults = std::make_shared<TrainOptions>();
+  auto given =
+      std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
+  verb->callback([arguments, given] { train(*arguments, *given); });
+}
+
+}  // namespace traceflow::cli
