@@ -5,8 +5,10 @@
 #include "ops/field/field.h"
 #include "scene/surfels.h"
 
-// Stored surfels → surfels at time t (method §1.2, §1.3): residuals add to the stored values, then activations.
-//   position p + Δp · rotation q + Δr (not normalised here) · scale exp(log s + Δs) · opacity σ(o + Δo) · tint σ(τ + Δτ)
+// Stored surfels → surfels at time t (method §1.2, §1.3): residuals add to the stored values, then
+// activations.
+//   position p + Δp · rotation q + Δr (not normalised here) · scale exp(log s + Δs) · opacity σ(o + Δo) ·
+//   tint σ(τ + Δτ)
 // Differentiable: every stored value and the field's parameters. The position enters the field detached.
 namespace traceflow::deform {
 
@@ -16,20 +18,21 @@ struct Saved {
   field::Saved field;
 };
 
-// Poses the stored surfels whose indices `subset` lists (ascending; empty means all) at `time`. `field` null: F ≡ 0.
-// sh_degree: how many degrees are copied out. saved may be null when no backward follows. A surfel that has a non-finite
-// stored value or residual is posed with opacity 0, so that nothing downstream sees it.
-void forward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset, int sh_degree,
-             field::Precision precision, PosedSurfels& posed, Saved* saved);
+// Poses the stored surfels whose indices `subset` lists (ascending; empty means all) at `time`. `field` null:
+// F ≡ 0. sh_degree: how many degrees are copied out. saved may be null when no backward follows. A surfel
+// that has a non-finite stored value or residual is posed with opacity 0, so that nothing downstream sees it.
+void forward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
+             int sh_degree, field::Precision precision, PosedSurfels& posed, Saved* saved);
 
-// Adds to grad_stored (shapes of stored) and to grad_field (null when the forward pass had none or it is frozen). Reads
-// the activated values back from `posed`, the forward pass's output.
+// Adds to grad_stored (shapes of stored) and to grad_field (null when the forward pass had none or it is
+// frozen). Reads the activated values back from `posed`, the forward pass's output.
 void backward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
-              const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed, Surfels& grad_stored,
-              Field* grad_field);
+              const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
+              Surfels& grad_stored, Field* grad_field);
 
-// The plain truth in double precision, of all surfels. field_points: N×3, where the field is evaluated (the stored positions;
-// separate because p enters detached, so that central differences can hold it still). grad_* may be null in the reverse.
+// The plain truth in double precision, of all surfels. field_points: N×3, where the field is evaluated (the
+// stored positions; separate because p enters detached, so that central differences can hold it still).
+// grad_* may be null in the reverse.
 void forward_reference(const BasicSurfels<double>& stored, const BasicField<double>* field,
                        const Tensor<double>& field_points, double time, int sh_degree,
                        BasicPosedSurfels<double>& posed);
