@@ -1,0 +1,91 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/options.h"
+#include "base/tensor.h"
+#include "math/camera.h"
+#include "scene/scene.h"
+
+// A capture of a scene that never existed, with its truth (docs/synth.md): in memory for tests, or as a
+// folder.
+namespace traceflow {
+
+// balls: a mirror ball and a glazed ball that slide and hop, a box that turns beside them. mirror: a round
+// mirror that turns and nods on its stand between moving boxes.
+enum class SynthScene { balls, mirror };
+constexpr std::array<std::string_view, 2> enum_names(SynthScene) { return {"balls", "mirror"}; }
+
+struct SynthOptions {
+  SynthScene scene = SynthScene::balls;
+  int frames = 40;
+  int width = 240;
+  int height = 135;
+  int64_t seed = 0;
+  int samples = 16;
+  int test_every = 4;
+  float prior_noise = 1;
+  int points = 10000;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("scene", scene, "", "What is seen: balls or mirror.");
+    v.field("frames", frames, "frames", "Times at which the left (training) camera takes a picture.");
+    v.field("width", width, "pixels", "Width of the pictures.");
+    v.field("height", height, "pixels", "Height of the pictures.");
+    v.field("seed", seed, "", "Seed of the picture noise, the priors' errors and the points.");
+    v.field("samples", samples, "paths/pixel", "Light paths for each pixel.");
+    v.field("test_every", test_every, "frames", "The right (test) camera takes every n-th frame.");
+    v.field("prior_noise", prior_noise, "",
+            "Errors of the normal priors: 0 exact, 1 as of a monocular estimator.");
+    v.field("points", points, "points", "Surface points at time 0.");
+  }
+  void validate() const;
+};
+
+// When and where a picture is taken. The camera is in the capture's own world (metres, z up).
+struct SynthView {
+  std::string id;   // 000012_left, 000012_right
+  int frame = 0;    // time_id
+  double time = 0;  // in [0, 1]
+  bool is_test = false;
+  Camera<double> camera;
+};
+
+// All views, in the order of frames, left before right.
+std::vector<SynthView> synth_views(const SynthOptions& options);
+
+// A view's pixels. colour = diffuse + specular, clipped to [0, 1]: diffuse is what the first surface sends
+// back itself, specular what it mirrors, each with its weight.
+struct SynthImages {
+  Tensor<float> colour, diffuse, specular;  // H×W×3
+  Tensor<uint8_t> mask;                     // H×W, 1 where the pixel's centre shows a specular body
+  Tensor<float> normal;                     // H×W×3, world axes, unit, at pixel centres
+  Tensor<float> depth;                      // H×W, camera z at pixel centres
+};
+SynthImages synth_images(const SynthOptions& options, const SynthView& view);
+
+// A view's normals with the errors of a monocular estimator: smoothed, turned, and warped slowly over the
+// picture. H×W×3 in the camera space of normal priors (x right, y up, z to the viewer), unit.
+Tensor<float> synth_normal_prior(const SynthOptions& options, const SynthView& view,
+                                 const Tensor<float>& normal);
+
+// Noisy points, P×3 in world, on the surfaces at time 0 that the left camera sees from somewhere on its way.
+Tensor<float> synth_points(const SynthOptions& options);
+
+// How the capture's scene.json normalises the world, and its depth range in the normalised scene.
+SceneNormalisation synth_normalisation();
+inline constexpr double synth_near = 0.05;
+inline constexpr double synth_far = 4.0;
+
+// Writes the capture in the NeRF-DS layout with priors, points and truth. An empty or absent folder is
+// filled, an earlier synthetic capture replaced; any other folder throws InputError. dataset.json is written
+// last: a folder that has it is whole.
+void write_synthetic_capture(const SynthOptions& options, const std::filesystem::path& folder);
+
+}  // namespace traceflow

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "capture/synth.h"
+#include "capture/synth_scene.h"
+
+namespace traceflow::synth {
+
+// The scenes that have names: a closed room of 3.4 × 3.4 × 2.3 m around the origin, the moving things in its
+// middle.
+AnimatedScene make_scene(SynthScene scene);
+
+}  // namespace traceflow::synth

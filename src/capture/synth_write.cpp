@@ -1,0 +1,159 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/option_fields.h"
+#include "capture/synth.h"
+#include "files/npy.h"
+#include "files/png.h"
+
+namespace traceflow {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// The file that marks a folder as a synthetic capture, which may be written again.
+constexpr const char* marker = "synth.json";
+constexpr std::array<const char*, 5> subfolders{"rgb", "camera", "mask", "normal", "truth"};
+
+[[noreturn]] void refuse(const fs::path& folder, const std::string& found) {
+  throw InputError(folder.string(), "output folder", found, "an empty folder or an earlier synthetic capture",
+                   "choose another folder");
+}
+
+void claim_folder(const fs::path& folder) {
+  if (fs::exists(folder)) {
+    if (!fs::is_directory(folder)) refuse(folder, "a file");
+    if (!fs::is_empty(folder) && !fs::exists(folder / marker)) refuse(folder, "other files in it");
+  }
+  fs::remove(folder / "dataset.json");
+  for (const char* name : subfolders) fs::remove_all(folder / name);
+  for (const char* name : {"rgb/1x", "camera", "mask/1x", "normal/1x", "truth/normal", "truth/depth",
+                           "truth/diffuse", "truth/specular"}) {
+    fs::create_directories(folder / name);
+  }
+}
+
+void prepare_folder(const fs::path& folder) {
+  try {
+    claim_folder(folder);
+  } catch (const fs::filesystem_error& error) {
+    refuse(folder, error.code().message());
+  }
+}
+
+json as_json(const SynthOptions& options) {
+  SynthOptions copy = options;
+  json values = json::object();
+  for (const OptionField& field : option_fields(copy)) {
+    std::visit([&](const auto& value) { values[field.path] = value; }, field.get());
+  }
+  return values;
+}
+
+void write_json(const fs::path& path, const json& value) { write_atomically(path, value.dump(1) + "\n"); }
+
+json as_json(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
+
+json as_json(const Camera<double>& camera) {
+  const Mat3<double> rows = glm::transpose(camera.camera_from_world);
+  return {{"orientation", {as_json(rows[0]), as_json(rows[1]), as_json(rows[2])}},
+          {"position", as_json(camera.position)},
+          {"focal_length", camera.focal_x},
+          {"principal_point", {camera.centre_x, camera.centre_y}},
+          {"skew", 0.0},
+          {"pixel_aspect_ratio", 1.0},
+          {"radial_distortion", {0.0, 0.0, 0.0}},
+          {"tangential_distortion", {0.0, 0.0}},
+          {"image_size", {camera.width, camera.height}}};
+}
+
+// Unit vectors as 8-bit pictures: v = (n + 1) / 2.
+Tensor<uint8_t> normal_picture(const Tensor<float>& normal) {
+  Tensor<float> values = normal;
+  for (float& value : values.values()) value = 0.5F * (value + 1);
+  return to_8bit(values);
+}
+
+Tensor<uint8_t> mask_picture(const Tensor<uint8_t>& mask) {
+  Tensor<uint8_t> picture = mask;
+  for (uint8_t& value : picture.values()) value = value != 0 ? 255 : 0;
+  return picture;
+}
+
+void write_truth(const fs::path& folder, const std::string& id, const SynthImages& images) {
+  write_png(folder / "truth/normal" / (id + ".png"), normal_picture(images.normal));
+  write_npy(folder / "truth/depth" / (id + ".npy"), images.depth);
+  write_png(folder / "truth/diffuse" / (id + ".png"), to_8bit(images.diffuse));
+  write_png(folder / "truth/specular" / (id + ".png"), to_8bit(images.specular));
+}
+
+void write_view(const SynthOptions& options, const SynthView& view, const fs::path& folder) {
+  const SynthImages images = synth_images(options, view);
+  write_json(folder / "camera" / (view.id + ".json"), as_json(view.camera));
+  write_png(folder / "rgb/1x" / (view.id + ".png"), to_8bit(images.colour));
+  write_png(folder / "mask/1x" / (view.id + ".png.png"), mask_picture(images.mask));
+  if (view.is_test) {
+    write_truth(folder, view.id, images);
+  } else {
+    const Tensor<float> prior = synth_normal_prior(options, view, images.normal);
+    write_png(folder / "normal/1x" / (view.id + ".png"), normal_picture(prior));
+  }
+}
+
+json scene_json() {
+  const SceneNormalisation normalisation = synth_normalisation();
+  return {{"scale", normalisation.scale},
+          {"center", as_json(normalisation.centre)},
+          {"bbox", {{-1.7, -1.7, 0.0}, {1.7, 1.7, 2.3}}},
+          {"near", synth_near},
+          {"far", synth_far}};
+}
+
+json metadata_json(const std::vector<SynthView>& views) {
+  json metadata = json::object();
+  for (const SynthView& view : views) {
+    metadata[view.id] = {{"time_id", view.frame},
+                         {"warp_id", view.frame},
+                         {"appearance_id", view.frame},
+                         {"camera_id", view.is_test ? 1 : 0}};
+  }
+  return metadata;
+}
+
+json dataset_json(const std::vector<SynthView>& views) {
+  json ids = json::array();
+  json train_ids = json::array();
+  json val_ids = json::array();
+  for (const SynthView& view : views) {
+    ids.push_back(view.id);
+    (view.is_test ? val_ids : train_ids).push_back(view.id);
+  }
+  return {{"count", views.size()},
+          {"num_exemplars", train_ids.size()},
+          {"ids", ids},
+          {"train_ids", train_ids},
+          {"val_ids", val_ids}};
+}
+
+}  // namespace
+
+void write_synthetic_capture(const SynthOptions& options, const fs::path& folder) {
+  options.validate();
+  prepare_folder(folder);
+  write_json(folder / marker, as_json(options));
+
+  const std::vector<SynthView> views = synth_views(options);
+  for (const SynthView& view : views) write_view(options, view, folder);
+  write_npy(folder / "points.npy", synth_points(options));
+  write_json(folder / "scene.json", scene_json());
+  write_json(folder / "metadata.json", metadata_json(views));
+  write_json(folder / "dataset.json", dataset_json(views));
+}
+
+}  // namespace traceflow
