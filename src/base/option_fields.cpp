@@ -133,6 +133,13 @@ std::string OptionField::expected() const {
   return "";
 }
 
+std::string OptionField::full_help() const {
+  const bool says_all = std::all_of(choices.begin(), choices.end(), [this](const std::string& choice) {
+    return help.find(choice) != std::string::npos;
+  });
+  return says_all ? help : help + " One of " + expected() + ".";
+}
+
 const OptionField& find_option(const std::vector<OptionField>& fields, const std::string& path,
                                const std::string& where) {
   const std::string wanted = with_underscores(path);

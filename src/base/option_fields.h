@@ -36,6 +36,8 @@ struct OptionField {
   std::string name() const;
   // What the field takes, in words: "a whole number".
   std::string expected() const;
+  // The help, followed by the names of the choices where it does not say them itself.
+  std::string full_help() const;
 };
 
 // Fields of `options` in the order of its visit(). `prefix` comes before every path.

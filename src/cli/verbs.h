@@ -4,8 +4,10 @@ namespace CLI {
 class App;
 }
 
-// The program's verbs, one file each (verb_NAME.cpp). Every function adds its subcommand to the program; the subcommand's
-// callback does the work. Errors travel as exceptions to main.cpp, which prints one line and chooses the exit code.
+// The program's verbs, one file each: verb_NAME.cpp defines add_NAME and is thereby part of the program (the
+// build writes add_verbs from the files that are there). Every function adds its subcommand; the subcommand's
+// callback does the work. Errors travel as exceptions to the error boundary (error_boundary.h), which prints
+// one line and chooses the exit code.
 namespace traceflow::cli {
 
 void add_train(CLI::App& program);
@@ -15,5 +17,8 @@ void add_trace(CLI::App& program);
 void add_export(CLI::App& program);
 void add_synth(CLI::App& program);
 void add_inspect(CLI::App& program);
+
+// All verbs that are there, in alphabetical order.
+void add_verbs(CLI::App& program);
 
 }  // namespace traceflow::cli

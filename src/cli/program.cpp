@@ -1,0 +1,89 @@
+#include "cli/program.h"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <iostream>
+
+#include "base/option_fields.h"
+#include "base/parallel.h"
+#include "base/profile.h"
+#include "cli/error_boundary.h"
+#include "cli/option_page.h"
+#include "cli/verbs.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+// What holds for every verb.
+struct GlobalArguments {
+  int threads = 0;
+  bool profile = false;
+  bool help_options = false;
+};
+
+void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
+  program.set_version_flag("--version", "traceflow " TRACEFLOW_VERSION);
+  program.add_flag("--help-options", arguments.help_options,
+                   "Print every option of --set and --config, and exit");
+  program
+      .add_option("--threads", arguments.threads,
+                  "Threads to use; 0 for all cores. The results do not depend on it")
+      ->check(CLI::Range(0, 4096))
+      ->option_text("N");
+  program.add_flag("--profile", arguments.profile, "Print where the time went");
+}
+
+void print_profile() {
+  fmt::print(stderr, "{:<40} {:>10} {:>12} {:>12}\n", "step", "calls", "seconds", "ms/call");
+  for (const profile::Entry& e : profile::entries()) {
+    fmt::print(stderr, "{:<40} {:>10} {:>12.3f} {:>12.3f}\n", e.name, e.calls, e.seconds,
+               1e3 * e.seconds / static_cast<double>(std::max<int64_t>(1, e.calls)));
+  }
+}
+
+// Help and version are no errors; the others become one line.
+int finish_parse(const CLI::App& program, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return program.exit(error);
+  const auto verbs = program.get_subcommands();
+  const std::string name = verbs.empty() ? "traceflow" : "traceflow " + verbs.front()->get_name();
+  std::cerr << "traceflow: " << error.what() << "; see `" << name << " --help`" << std::endl;
+  return exit_input;
+}
+
+int run_program(int argc, const char* const* argv) {
+  CLI::App program("Reconstructs moving specular scenes from video with 2D Gaussian surfels.", "traceflow");
+  program.fallthrough();
+  program.require_subcommand(0, 1);
+  GlobalArguments arguments;
+  add_global_arguments(program, arguments);
+  program.parse_complete_callback([&arguments] {
+    set_threads(arguments.threads);
+    profile::enable(arguments.profile);
+  });
+  add_verbs(program);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return finish_parse(program, error);
+  }
+  if (arguments.help_options) {
+    std::cout << option_page();
+    return exit_done;
+  }
+  if (program.get_subcommands().empty()) {
+    std::cerr << program.help();
+    return exit_input;
+  }
+  if (arguments.profile) print_profile();
+  return exit_done;
+}
+
+}  // namespace
+
+int run(int argc, const char* const* argv) {
+  return guarded([&] { return run_program(argc, argv); }, std::cerr);
+}
+
+}  // namespace traceflow::cli

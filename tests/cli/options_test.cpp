@@ -1,0 +1,171 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <sstream>
+
+#include "base/error.h"
+#include "cli/option_arguments.h"
+#include "cli/option_page.h"
+#include "cli/option_toml.h"
+#include "files/options_json.h"
+#include "train/options.h"
+
+namespace traceflow::cli {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::filesystem::path toml_file(const std::string& text) {
+  const auto path = std::filesystem::path(testing::TempDir()) / "traceflow_options.toml";
+  std::ofstream(path) << text;
+  return path;
+}
+
+template <class F>
+std::string refusal(F&& f) {
+  try {
+    f();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TrainOptions parsed(std::vector<std::string> arguments) {
+  std::reverse(arguments.begin(), arguments.end());
+  CLI::App verb;
+  TrainOptions options;
+  const OptionArguments given(verb, option_fields(options), {"capture"});
+  verb.parse(arguments);
+  given.apply(option_fields(options));
+  return options;
+}
+
+std::string toml_refusal(const std::string& text) {
+  TrainOptions options;
+  const auto path = toml_file(text);
+  std::string message = refusal([&] { options_from_toml(path, option_fields(options)); });
+  const size_t at = message.find(path.string());
+  return at == std::string::npos ? message : message.replace(at, path.string().size(), "FILE");
+}
+
+TEST(OptionToml, ReadsEveryKindOfValue) {
+  TrainOptions options;
+  options_from_toml(toml_file(R"(
+iterations = 1_200
+specular = "environment-map"
+[loss]
+normal = 0
+ssim = 0.25
+[render]
+low_pass = false
+background = [1, 0.5, 0.0]
+[render.select]
+probe_share = 0.5
+)"),
+                    option_fields(options));
+  EXPECT_EQ(options.iterations, 1200);
+  EXPECT_EQ(options.specular, Specular::environment_map);
+  EXPECT_EQ(options.loss.normal, 0);
+  EXPECT_EQ(options.loss.ssim, 0.25F);
+  EXPECT_FALSE(options.render.low_pass);
+  EXPECT_EQ(options.render.background, Vec3<float>(1, 0.5F, 0));
+  EXPECT_EQ(options.render.select.probe_share, 0.5F);
+  EXPECT_EQ(options.seed, TrainOptions{}.seed);
+}
+
+TEST(OptionToml, RefusalsNameFileAndLine) {
+  EXPECT_THAT(toml_refusal("iterations = 5\n[loss]\nnromal = 0\n"),
+              HasSubstr("FILE:3: loss.nromal: found no option"));
+  EXPECT_THAT(toml_refusal("iterations = 5\n[loss]\nnromal = 0\n"), HasSubstr("did you mean loss.normal?"));
+  EXPECT_EQ(toml_refusal("\niterations = 1.5\n"), "FILE:2: iterations: found 1.5, expected a whole number");
+  EXPECT_EQ(toml_refusal("iterations = 2000-01-01\n"),
+            "FILE:1: iterations: found a value of another type, expected a whole number");
+  EXPECT_EQ(toml_refusal("loss = 3\n").substr(0, 52), "FILE:1: loss: found a group of options, expected one");
+  EXPECT_THAT(toml_refusal("a = 1\nb = \n"), HasSubstr("FILE:2"));
+  EXPECT_THAT(refusal([] { options_from_toml("/nowhere.toml", {}); }), HasSubstr("/nowhere.toml"));
+}
+
+TEST(OptionArguments, FlagsReachFieldsOutsideGroupsAndInPromotedOnes) {
+  const TrainOptions options = parsed({"--save-every", "77", "--specular", "none", "--downscale", "4",
+                                       "--set", "loss.normal=0", "--set", "rates.position=1e-3"});
+  EXPECT_EQ(options.save_every, 77);
+  EXPECT_EQ(options.specular, Specular::none);
+  EXPECT_EQ(options.capture.downscale, 4);
+  EXPECT_EQ(options.loss.normal, 0);
+  EXPECT_EQ(options.rates.position, 1e-3F);
+}
+
+TEST(OptionArguments, TheFileComesFirstThenSetThenFlags) {
+  const std::string file = toml_file("iterations = 1\nseed = 1\nsave_every = 1\n").string();
+  const TrainOptions options =
+      parsed({"--iterations", "3", "--set", "iterations=2", "--set", "seed=2", "--config", file});
+  EXPECT_EQ(options.iterations, 3);
+  EXPECT_EQ(options.seed, 2);
+  EXPECT_EQ(options.save_every, 1);
+}
+
+TEST(OptionArguments, RefusalsNameTheFlag) {
+  EXPECT_EQ(refusal([] {
+              parsed({"--iterations", "many"});
+            }),
+            "--iterations: iterations: found many, expected a whole number");
+  EXPECT_THAT(refusal([] { parsed({"--set", "los.normal=1"}); }), HasSubstr("did you mean loss.normal?"));
+  EXPECT_THAT(refusal([] { parsed({"--set", "loss.normal"}); }), HasSubstr("expected an assignment"));
+}
+
+struct Switch {
+  bool fine_detail = true;
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("fine_detail", fine_detail, "", "Detail.");
+  }
+};
+
+TEST(OptionArguments, BooleansHaveTwoFlags) {
+  const auto parsed_switch = [](const std::string& argument) {
+    CLI::App verb;
+    Switch options;
+    const OptionArguments given(verb, option_fields(options));
+    verb.parse(std::vector<std::string>{argument});
+    given.apply(option_fields(options));
+    return options.fine_detail;
+  };
+  EXPECT_FALSE(parsed_switch("--no-fine-detail"));
+  EXPECT_FALSE(parsed_switch("--fine-detail=false"));
+  EXPECT_TRUE(parsed_switch("--fine-detail"));
+}
+
+TEST(TrainOptions, EveryPresetSurvivesACheckpoint) {
+  for (const char* name : {"paper", "cpu", "demo"}) {
+    TrainOptions there = preset(name);
+    TrainOptions back;
+    options_from_json(options_to_json(there), option_fields(back), "test");
+    const auto wanted = option_fields(there);
+    const auto got = option_fields(back);
+    for (size_t i = 0; i < wanted.size(); ++i)
+      EXPECT_EQ(got[i].get(), wanted[i].get()) << name << wanted[i].path;
+  }
+}
+
+TEST(TrainOptions, EveryOptionHasHelpAndAPathOfItsOwn) {
+  TrainOptions options;
+  std::set<std::string> paths;
+  for (const OptionField& field : option_fields(options)) {
+    EXPECT_TRUE(paths.insert(field.path).second) << field.path;
+    EXPECT_THAT(field.help, testing::EndsWith(".")) << field.path;
+    EXPECT_EQ(field.help.find('|'), std::string::npos) << field.path;
+  }
+}
+
+TEST(OptionPage, DocsHoldWhatTheProgramPrints) {
+  std::ifstream file(TRACEFLOW_SOURCE_FOLDER "/docs/options.md");
+  std::ostringstream text;
+  text << file.rdbuf();
+  EXPECT_EQ(text.str(), option_page()) << "run: build/release/traceflow --help-options > docs/options.md";
+}
+
+}  // namespace
+}  // namespace traceflow::cli
