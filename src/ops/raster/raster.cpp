@@ -1,6 +1,10 @@
 #include "ops/raster/raster.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "ops/raster/raster_kernels.h"
 
 namespace traceflow::raster {
 
@@ -15,6 +19,47 @@ void Options::validate() const {
   for (int c = 0; c < 3; ++c) {
     check_option(std::isfinite(background[c]), "background", background[c], "finite numbers");
   }
+}
+
+void SavedDeleter::operator()(Saved* saved) const { delete saved; }
+SavedPtr make_saved() { return SavedPtr(new Saved); }
+
+namespace {
+
+void check_input(const PosedSurfels& surfels, const Camera<float>& camera) {
+  const int64_t n = surfels.count();
+  require(n < (int64_t{1} << 31), "the count of surfels fits 31 bits", std::to_string(n));
+  require(surfels.scale.size() == 2 * n && surfels.rotation.size() == 4 * n && surfels.opacity.size() == n,
+          "surfels of one count", std::to_string(n));
+  require(n == 0 || (surfels.sh.shape().rank() == 3 && surfels.sh.dim(0) == n && surfels.sh.dim(2) == 3),
+          "sh is N×K×3", surfels.sh.shape().to_string());
+  require(!surfels.has_tint() || surfels.tint.size() == n, "a tint for every surfel",
+          surfels.tint.shape().to_string());
+  require(camera.width >= 0 && camera.height >= 0 && camera.width < (1 << 20) && camera.height < (1 << 20),
+          "an image size from 0 to 2^20", std::to_string(camera.width) + "×" + std::to_string(camera.height));
+}
+
+}  // namespace
+
+void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Output& output,
+             Saved* saved) {
+  options.validate();
+  check_input(surfels, camera);
+  Saved local;
+  Saved& kept = saved != nullptr ? *saved : local;
+  prepare(surfels, camera, options, kept);
+  bin(options.sort, kept);
+  blend(options, output, kept);
+}
+
+std::vector<uint8_t> visible(const Saved& saved) {
+  std::vector<uint8_t> flags(static_cast<size_t>(saved.count));
+  for (int64_t i = 0; i < saved.count; ++i) {
+    const auto begin = saved.touched.data() + saved.entry_begin[i];
+    const auto end = saved.touched.data() + saved.entry_begin[i + 1];
+    flags[static_cast<size_t>(i)] = std::any_of(begin, end, [](uint16_t blocks) { return blocks != 0; });
+  }
+  return flags;
 }
 
 }  // namespace traceflow::raster

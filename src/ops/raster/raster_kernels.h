@@ -1,0 +1,145 @@
+#pragma once
+
+#include <cstdint>
+
+#include "math/surfel_hit.h"
+#include "ops/raster/raster.h"
+
+// What the stages of the fast path share. The image is cut into tiles of 16×16 pixels and these into blocks
+// of 4×4, in which the pixels of a vector stand. Forward: prepare() projects every surfel, bin() lists the
+// surfels of each tile front to back, then every tile is blended alone. Backward: every tile alone, its sums
+// kept per (tile, surfel); then these are added up per surfel in tile order and chained to the surfel's
+// values.
+namespace traceflow::raster {
+
+inline constexpr int tile_edge = 16;
+inline constexpr int block_edge = 4;
+inline constexpr int blocks_per_row = tile_edge / block_edge;
+inline constexpr int blocks_per_tile = blocks_per_row * blocks_per_row;
+inline constexpr int pixels_per_block = block_edge * block_edge;
+inline constexpr int pixels_per_tile = tile_edge * tile_edge;
+
+// A surfel on the screen. Positions are relative to the anchor, a whole pixel near the projected centre, so
+// that single precision suffices; the forms are those of math/surfel_projection.h.
+struct alignas(64) Splat {
+  float anchor_x, anchor_y;  // pixels
+  float centre_x, centre_y;  // the projected centre
+  float u_x, u_y, u_1;       // u·w = u_x x + u_y y + u_1
+  float v_x, v_y, v_1;
+  float w_x, w_y, w_1;
+  float w_max;         // hits in front of the near plane have 0 < w ≤ w_max
+  float rho_screen_1;  // 0, or so much that the low-pass never wins
+  float rho_max;       // ρ where α reaches alpha_min
+  float log2_opacity;
+  float z_plane, inverse_z_plane;    // of a hit in the plane: z = z_plane / w
+  float z_centre, inverse_z_centre;  // of a hit by the low-pass
+  float colour[3];
+  float tint;
+  float normal[3];  // world axes, turned to the camera
+  float unused[4];
+};
+static_assert(sizeof(Splat) == 128);
+
+// Where on the screen a surfel can be seen: a range of tiles (none when empty), and within it the ellipse of
+// the plane's hits, relative to the splat's anchor.
+struct Bounds {
+  int32_t tile_x0 = 0, tile_x1 = 0, tile_y0 = 0, tile_y1 = 0;  // half open
+  bool is_ellipse = false;                                     // false: anywhere in the range
+  float ellipse_x = 0, ellipse_y = 0;
+  // The lowest point of the ellipse's quadratic form along a vertical line: y - ellipse_y = slope_y (x -
+  // ellipse_x).
+  float slope_x = 0, slope_y = 0;
+
+  int64_t tiles() const { return int64_t{tile_x1 - tile_x0} * (tile_y1 - tile_y0); }
+};
+
+// A surfel in a tile's list.
+struct TileEntry {
+  uint32_t surfel;
+  uint32_t
+      entry;  // its place when entries are counted surfel by surfel: entry_begin[surfel] + tile within bounds
+};
+
+// dL/d what the tiles of one surfel add up to. The order in which backward's kernel reduces its sums.
+struct SplatGradient {
+  float u_x, u_y, u_1;
+  float v_x, v_y, v_1;
+  float w_x, w_y, w_1;
+  float z_plane;
+  float centre_x, centre_y, z_centre;
+  float log_opacity;  // opacity · dL/dopacity
+  float colour[3];
+  float tint;
+  float normal[3];
+  float unused[3];
+};
+static_assert(sizeof(SplatGradient) == 24 * sizeof(float));
+
+// What forward leaves at a pixel for backward; blocks of 16 numbers each, so that a vector is one load.
+struct SavedBlock {
+  alignas(64) float transmittance[pixels_per_block];
+  alignas(64) float alpha[pixels_per_block];
+  alignas(64) float depth[pixels_per_block];
+  alignas(64) float m[pixels_per_block];          // Σ w m', m' = far·near/(far-near) · (1/z_first - 1/z)
+  alignas(64) float m2[pixels_per_block];         // Σ w m'²
+  alignas(64) float inverse_z[pixels_per_block];  // 1/z_first: m is measured from the first hit, else squares
+                                                  // cancel
+  alignas(
+      64) int32_t last[pixels_per_block];  // place in the tile's list of the last blended hit, -1 for none
+  alignas(64) int32_t median[pixels_per_block];  // place of the median hit, -1 for none
+};
+
+struct Saved {
+  int width = 0, height = 0;
+  int tile_columns = 0, tile_rows = 0;
+  int64_t count = 0;
+
+  Tensor<Splat> splats;          // by surfel; unspecified where the bounds are empty
+  Tensor<Bounds> bounds;         // by surfel
+  Tensor<uint32_t> entry_begin;  // by surfel, and one more
+  Tensor<uint32_t> tile_begin;   // by tile, and one more
+  Tensor<TileEntry> entries;     // by tile; front to back for sort = centre, by index for sort = hit
+  Tensor<uint16_t> touched;      // by entry: bit b where a pixel of block b blended the surfel
+  Tensor<SavedBlock> blocks;     // by tile, then block
+
+  // Memory of bin() and backward, kept for the next call.
+  struct Scratch {
+    Tensor<uint64_t> keys, keys_sorted;
+    Tensor<uint32_t> tile_counts;
+    Tensor<SplatGradient> gradients;  // by entry
+  };
+  mutable Scratch scratch;
+
+  int64_t tiles() const { return int64_t{tile_columns} * tile_rows; }
+};
+
+// The limits of the kernels' loops, as they stand in Options.
+struct KernelOptions {
+  float alpha_max;
+  float transmittance_min;
+  float m_scale;  // far·near/(far - near)
+  Vec3<float> background;
+
+  explicit KernelOptions(const Options& o)
+      : alpha_max(o.alpha_max),
+        transmittance_min(o.transmittance_min),
+        m_scale(o.far_plane * o.near_plane / (o.far_plane - o.near_plane)),
+        background(o.background) {}
+};
+
+// A surfel's frame in double precision.
+SurfelFrame<double> surfel_frame(const PosedSurfels& surfels, int64_t i);
+
+// Fills splats and bounds.
+void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved);
+// Fills entry_begin, tile_begin and entries.
+void bin(SortOrder order, Saved& saved);
+// Blends every tile.
+void blend(const Options& options, Output& output, Saved& saved);
+// Fills scratch.gradients where touched is not zero.
+void blend_backward(const Options& options, const Saved& saved, const OutputGradient& grad_output);
+// From scratch.gradients to the surfels' values and the camera.
+void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved& saved,
+           InputGradient& gradient);
+
+}  // namespace traceflow::raster

@@ -1,0 +1,238 @@
+// What the vector kernels of the fast path share; compiled once per instruction set, so without a plain
+// include guard.
+#if defined(TRACEFLOW_RASTER_SIMD_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRACEFLOW_RASTER_SIMD_INL_H
+#undef TRACEFLOW_RASTER_SIMD_INL_H
+#else
+#define TRACEFLOW_RASTER_SIMD_INL_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <vector>
+
+#include "ops/raster/raster_kernels.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace traceflow::raster::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// As many pixels of a block as a vector holds; blocks have 16.
+using Pixels = hn::CappedTag<float, pixels_per_block>;
+using OnePixel = hn::CappedTag<float, 1>;
+
+template <class D>
+using V = hn::Vec<D>;
+template <class D>
+using M = hn::Mask<D>;
+template <class D>
+using Int = hn::RebindToSigned<D>;
+
+// 1/x to the last bit or two.
+template <class D>
+HWY_INLINE V<D> reciprocal(D d, V<D> x) {
+  const auto guess = hn::ApproximateReciprocal(x);
+  return hn::Mul(guess, hn::NegMulAdd(x, guess, hn::Set(d, 2.0F)));
+}
+
+// 2^x for -126 < x < 127, relative error 2e-7. Anything else gives some number.
+template <class D>
+HWY_INLINE V<D> exp2(D d, V<D> x) {
+  const Int<D> di;
+  // Adding 1.5·2^23 leaves the nearest whole number in the low bits.
+  const auto magic = hn::Set(d, 12582912.0F);
+  const auto shifted = hn::Add(x, magic);
+  const auto f = hn::Sub(x, hn::Sub(shifted, magic));
+  auto p = hn::Set(d, 0.00132764719F);
+  p = hn::MulAdd(p, f, hn::Set(d, 0.00967554133F));
+  p = hn::MulAdd(p, f, hn::Set(d, 0.0555071327F));
+  p = hn::MulAdd(p, f, hn::Set(d, 0.240221197F));
+  p = hn::MulAdd(p, f, hn::Set(d, 0.693146967F));
+  p = hn::MulAdd(p, f, hn::Set(d, 1.00000007F));
+  return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
+}
+
+// A surfel at the pixels of a vector (method §3.1, §3.2). Outside, z is still finite, u and v may be
+// anything.
+template <class D>
+struct Footprint {
+  V<D> x, y;       // pixels from the anchor
+  V<D> dx, dy;     // pixels from the projected centre
+  V<D> nu, nv, w;  // u = nu/w, v = nv/w
+  V<D> inverse_w;
+  V<D> opacity;   // o·G, before the clamp
+  M<D> on_plane;  // the plane's hit wins; elsewhere the low-pass
+  M<D> inside;    // o·G ≥ alpha_min
+
+  HWY_INLINE V<D> z(D d, const Splat& s) const {
+    return hn::IfThenElse(on_plane, hn::Mul(hn::Set(d, s.z_plane), inverse_w), hn::Set(d, s.z_centre));
+  }
+  HWY_INLINE V<D> inverse_z(D d, const Splat& s) const {
+    return hn::IfThenElse(on_plane, hn::Mul(hn::Set(d, s.inverse_z_plane), w),
+                          hn::Set(d, s.inverse_z_centre));
+  }
+};
+
+template <class D>
+HWY_INLINE Footprint<D> evaluate(D d, const Splat& s, V<D> pixel_x, V<D> pixel_y) {
+  const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
+  Footprint<D> f;
+  f.x = hn::Sub(pixel_x, set(s.anchor_x));
+  f.y = hn::Sub(pixel_y, set(s.anchor_y));
+  f.nu = hn::MulAdd(set(s.u_x), f.x, hn::MulAdd(set(s.u_y), f.y, set(s.u_1)));
+  f.nv = hn::MulAdd(set(s.v_x), f.x, hn::MulAdd(set(s.v_y), f.y, set(s.v_1)));
+  f.w = hn::MulAdd(set(s.w_x), f.x, hn::MulAdd(set(s.w_y), f.y, set(s.w_1)));
+  f.inverse_w = reciprocal(d, f.w);
+  f.dx = hn::Sub(f.x, set(s.centre_x));
+  f.dy = hn::Sub(f.y, set(s.centre_y));
+  const auto distance2 = hn::MulAdd(f.dx, f.dx, hn::Mul(f.dy, f.dy));
+  const auto rho_screen = hn::MulAdd(set(2.0F), distance2, set(s.rho_screen_1));
+  const auto rho_plane =
+      hn::Mul(hn::MulAdd(f.nu, f.nu, hn::Mul(f.nv, f.nv)), hn::Mul(f.inverse_w, f.inverse_w));
+  const auto in_front = hn::And(hn::Gt(f.w, hn::Zero(d)), hn::Le(f.w, set(s.w_max)));
+  const auto rho_max = set(s.rho_max);
+  f.on_plane = hn::And(in_front, hn::Le(rho_plane, hn::Min(rho_screen, rho_max)));
+  const auto rho = hn::IfThenElse(f.on_plane, rho_plane, rho_screen);
+  f.inside = hn::Le(rho, rho_max);
+  f.opacity = exp2(d, hn::MulAdd(rho, set(-0.72134752F), set(s.log2_opacity)));
+  return f;
+}
+
+// Pixel centres of the lanes from `lane` on of a block whose upper left corner is (x, y).
+template <class D>
+struct PixelCentres {
+  V<D> x, y;
+};
+template <class D>
+HWY_INLINE PixelCentres<D> pixel_centres(D d, int x, int y, size_t lane) {
+  const Int<D> di;
+  const auto i = hn::Add(hn::Iota(di, static_cast<int32_t>(lane)), hn::Zero(di));
+  const auto column = hn::And(i, hn::Set(di, block_edge - 1));
+  const auto row = hn::ShiftRight<2>(i);
+  const auto half = hn::Set(d, 0.5F);
+  return {hn::Add(hn::ConvertTo(d, hn::Add(column, hn::Set(di, x))), half),
+          hn::Add(hn::ConvertTo(d, hn::Add(row, hn::Set(di, y))), half)};
+}
+
+// The blocks of a tile in which a splat may reach a pixel, as bits. Exact for the ellipse and the low-pass
+// disk against the square of each block's pixel centres, up to a margin for rounding.
+HWY_INLINE uint32_t reached_blocks(const Splat& s, const Bounds& bounds, int tile_x, int tile_y) {
+  if (!bounds.is_ellipse) return 0xffff;
+  const Pixels d;
+  const Int<Pixels> di;
+  const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
+  const auto clamp = [](auto x, auto low, auto high) HWY_ATTR { return hn::Min(hn::Max(x, low), high); };
+  const auto rho = set(s.rho_max * 1.002F + 0.02F);
+  const auto margin = set(0.01F);
+  const auto span = set(block_edge - 1 + 0.02F);
+  const auto inside = [&](auto x, auto y) HWY_ATTR {
+    const auto nu = hn::MulAdd(set(s.u_x), x, hn::MulAdd(set(s.u_y), y, set(s.u_1)));
+    const auto nv = hn::MulAdd(set(s.v_x), x, hn::MulAdd(set(s.v_y), y, set(s.v_1)));
+    const auto w = hn::MulAdd(set(s.w_x), x, hn::MulAdd(set(s.w_y), y, set(s.w_1)));
+    return hn::Le(hn::MulAdd(nu, nu, hn::Mul(nv, nv)), hn::Mul(rho, hn::Mul(w, w)));
+  };
+  uint32_t reached = 0;
+  for (size_t b = 0; b < blocks_per_tile; b += hn::Lanes(d)) {
+    const auto block = hn::Add(hn::Iota(di, static_cast<int32_t>(b)), hn::Zero(di));
+    const auto column = hn::ConvertTo(d, hn::And(block, hn::Set(di, blocks_per_row - 1)));
+    const auto row = hn::ConvertTo(d, hn::ShiftRight<2>(block));
+    const auto low_x = hn::MulAdd(column, set(block_edge),
+                                  hn::Sub(set(static_cast<float>(tile_x) + 0.5F - s.anchor_x), margin));
+    const auto low_y = hn::MulAdd(row, set(block_edge),
+                                  hn::Sub(set(static_cast<float>(tile_y) + 0.5F - s.anchor_y), margin));
+    const auto high_x = hn::Add(low_x, span);
+    const auto high_y = hn::Add(low_y, span);
+    // The convex form is lowest in a rectangle on the sides that face its centre.
+    const auto centre_x = set(bounds.ellipse_x);
+    const auto centre_y = set(bounds.ellipse_y);
+    const auto side_x = clamp(centre_x, low_x, high_x);
+    const auto side_y = clamp(centre_y, low_y, high_y);
+    const auto on_side_x = hn::MulAdd(set(bounds.slope_y), hn::Sub(side_x, centre_x), centre_y);
+    const auto on_side_y = hn::MulAdd(set(bounds.slope_x), hn::Sub(side_y, centre_y), centre_x);
+    const auto ellipse = hn::Or(inside(side_x, clamp(on_side_x, low_y, high_y)),
+                                inside(clamp(on_side_y, low_x, high_x), side_y));
+    const auto dx = hn::Sub(clamp(set(s.centre_x), low_x, high_x), set(s.centre_x));
+    const auto dy = hn::Sub(clamp(set(s.centre_y), low_y, high_y), set(s.centre_y));
+    const auto distance2 = hn::MulAdd(dx, dx, hn::Mul(dy, dy));
+    const auto disk = hn::Le(hn::MulAdd(set(2.0F), distance2, set(s.rho_screen_1)), rho);
+    uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, hn::Or(ellipse, disk), bits);
+    reached |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << b;
+  }
+  return reached;
+}
+
+// A tile of the image and the places in its list that each of its blocks has to look at.
+struct TileLists {
+  int x, y;                  // upper left pixel
+  const TileEntry* entries;  // front to back
+  uint32_t count;
+  const uint32_t* of_block[blocks_per_tile];
+  uint32_t counts[blocks_per_tile];
+};
+
+HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, Tensor<uint32_t>& memory) {
+  TileLists lists{};
+  lists.x = static_cast<int>(tile % saved.tile_columns) * tile_edge;
+  lists.y = static_cast<int>(tile / saved.tile_columns) * tile_edge;
+  lists.entries = saved.entries.data() + saved.tile_begin[tile];
+  lists.count = saved.tile_begin[tile + 1] - saved.tile_begin[tile];
+  memory.resize({blocks_per_tile, lists.count});
+  for (int b = 0; b < blocks_per_tile; ++b) lists.of_block[b] = memory.data() + int64_t{b} * lists.count;
+  uint32_t in_image = 0;
+  for (int b = 0; b < blocks_per_tile; ++b) {
+    const int block_x = lists.x + b % blocks_per_row * block_edge;
+    const int block_y = lists.y + b / blocks_per_row * block_edge;
+    if (block_x < saved.width && block_y < saved.height) in_image |= 1U << b;
+  }
+  for (uint32_t place = 0; place < lists.count; ++place) {
+    const uint32_t surfel = lists.entries[place].surfel;
+    uint32_t reached =
+        in_image & reached_blocks(saved.splats[surfel], saved.bounds[surfel], lists.x, lists.y);
+    for (; reached != 0; reached &= reached - 1) {
+      const int b = std::countr_zero(reached);
+      memory(b, lists.counts[b]++) = place;
+    }
+  }
+  return lists;
+}
+
+// For sort = hit: the hits of each pixel of a block, front to back.
+struct SortedHits {
+  struct Hit {
+    float z;
+    uint32_t place;
+  };
+  std::vector<Hit> of_pixel[pixels_per_block];
+
+  HWY_INLINE void collect(const Saved& saved, const TileLists& lists, int block, int x, int y) {
+    const Pixels d;
+    for (auto& hits : of_pixel) hits.clear();
+    for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
+      const auto at = pixel_centres(d, x, y, lane);
+      for (uint32_t i = 0; i < lists.counts[block]; ++i) {
+        const uint32_t place = lists.of_block[block][i];
+        const Splat& splat = saved.splats[lists.entries[place].surfel];
+        const auto f = evaluate(d, splat, at.x, at.y);
+        HWY_ALIGN float z[pixels_per_block];
+        HWY_ALIGN float inside[pixels_per_block];
+        hn::Store(f.z(d, splat), d, z);
+        hn::Store(hn::IfThenElseZero(f.inside, hn::Set(d, 1.0F)), d, inside);
+        for (size_t j = 0; j < hn::Lanes(d); ++j) {
+          if (inside[j] != 0) of_pixel[lane + j].push_back({z[j], place});
+        }
+      }
+    }
+    for (auto& hits : of_pixel) {
+      std::sort(hits.begin(), hits.end(),
+                [](const Hit& a, const Hit& b) { return a.z != b.z ? a.z < b.z : a.place < b.place; });
+    }
+  }
+};
+
+}  // namespace traceflow::raster::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
