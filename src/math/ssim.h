@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+
+#include "base/device.h"
+
+// Structural similarity of two pictures at one pixel (method §7.5), with the derivative beside it.
+namespace traceflow {
+
+inline constexpr int ssim_radius = 5;
+
+// The one-dimensional Gaussian window of 11 taps, σ 1.5, sum 1. The two-dimensional window is its product
+// with itself.
+inline std::array<double, 2 * ssim_radius + 1> ssim_window() {
+  std::array<double, 2 * ssim_radius + 1> window{};
+  double sum = 0;
+  for (int k = -ssim_radius; k <= ssim_radius; ++k) {
+    sum += window[static_cast<size_t>(k + ssim_radius)] = std::exp(-k * k / (2 * 1.5 * 1.5));
+  }
+  for (double& tap : window) tap /= sum;
+  return window;
+}
+
+// Windowed sums around a pixel: of x, of y, of x² + y², of x·y. All that SSIM needs.
+template <class T>
+struct SsimMoments {
+  T mean_x, mean_y, squares, product;
+};
+
+// SSIM and its derivative by the moments. mean_y's is left out: the target is constant.
+template <class T>
+struct SsimDerivative {
+  T value, by_mean_x, by_squares, by_product;
+};
+
+template <class T>
+TRACEFLOW_HD TRACEFLOW_ALWAYS_INLINE SsimDerivative<T> ssim_with_derivative(const SsimMoments<T>& m) {
+  constexpr T c1 = T(0.01 * 0.01), c2 = T(0.03 * 0.03);
+  const T means = m.mean_x * m.mean_y;
+  const T mean_squares = m.mean_x * m.mean_x + m.mean_y * m.mean_y;
+  const T a1 = T(2) * means + c1, a2 = T(2) * (m.product - means) + c2;
+  const T b1 = mean_squares + c1, b2 = m.squares - mean_squares + c2;
+  const T inv = T(1) / (b1 * b2);
+  const T value = a1 * a2 * inv;
+  return {value, T(2) * inv * (m.mean_y * (a2 - a1) + m.mean_x * value * (b1 - b2)), -value * b1 * inv,
+          T(2) * a1 * inv};
+}
+
+}  // namespace traceflow

@@ -1,0 +1,95 @@
+#include <cmath>
+
+#include "math/ssim.h"
+#include "ops/loss/loss.h"
+#include "ops/loss/loss_kernels.h"
+
+// The plain truth in double precision: direct sums, the two-dimensional window as it is written.
+namespace traceflow::loss {
+
+namespace {
+
+struct Pixel {
+  int64_t row, column, channel;
+};
+
+// Calls f(weight, neighbour) for the neighbours in the image within the window of a pixel.
+template <class F>
+void over_window(const Tensor<double>& image, const Pixel& centre, F&& f) {
+  static const auto window = ssim_window();
+  for (int dy = -ssim_radius; dy <= ssim_radius; ++dy) {
+    for (int dx = -ssim_radius; dx <= ssim_radius; ++dx) {
+      const int64_t row = centre.row + dy, column = centre.column + dx;
+      if (row < 0 || row >= image.dim(0) || column < 0 || column >= image.dim(1)) continue;
+      f(window[static_cast<size_t>(dy + ssim_radius)] * window[static_cast<size_t>(dx + ssim_radius)],
+        Pixel{row, column, centre.channel});
+    }
+  }
+}
+
+double at(const Tensor<double>& image, const Pixel& p) { return image(p.row, p.column, p.channel); }
+
+SsimMoments<double> moments_at(const Tensor<double>& image, const Tensor<double>& target,
+                               const Pixel& centre) {
+  SsimMoments<double> m{};
+  over_window(image, centre, [&](double weight, const Pixel& p) {
+    const double x = at(image, p), y = at(target, p);
+    m.mean_x += weight * x;
+    m.mean_y += weight * y;
+    m.squares += weight * (x * x + y * y);
+    m.product += weight * x * y;
+  });
+  return m;
+}
+
+}  // namespace
+
+double l1_reference(const Tensor<double>& image, const Tensor<double>& target, double weight,
+                    Tensor<double>& grad_image) {
+  check_same_shape(image, target, grad_image);
+  if (image.empty()) return 0;
+  const auto count = static_cast<double>(image.size());
+  double sum = 0;
+  for (int64_t i = 0; i < image.size(); ++i) {
+    const double difference = image[i] - target[i];
+    sum += std::abs(difference);
+    grad_image[i] += weight / count * sign(difference);
+  }
+  return sum / count;
+}
+
+double ssim_loss_reference(const Tensor<double>& image, const Tensor<double>& target, double weight,
+                           Tensor<double>& grad_image) {
+  check_same_shape(image, target, grad_image);
+  check_is_image(image);
+  if (image.empty()) return 0;
+  const auto count = static_cast<double>(image.size());
+  double sum = 0;
+  for (int64_t row = 0; row < image.dim(0); ++row) {
+    for (int64_t column = 0; column < image.dim(1); ++column) {
+      for (int64_t channel = 0; channel < image.dim(2); ++channel) {
+        const Pixel centre{row, column, channel};
+        const SsimDerivative<double> d = ssim_with_derivative(moments_at(image, target, centre));
+        sum += 1 - d.value;
+        over_window(image, centre, [&](double tap, const Pixel& p) {
+          grad_image(p.row, p.column, p.channel) -=
+              weight / count * tap *
+              (d.by_mean_x + 2 * at(image, p) * d.by_squares + at(target, p) * d.by_product);
+        });
+      }
+    }
+  }
+  return sum / count;
+}
+
+double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& pseudo, double weight,
+                                    Tensor<double>& grad_normal, Tensor<double>& grad_pseudo) {
+  return mean_normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo);
+}
+
+double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>& prior, double weight,
+                              Tensor<double>& grad_normal) {
+  return mean_normal_prior(normal, prior, weight, grad_normal);
+}
+
+}  // namespace traceflow::loss

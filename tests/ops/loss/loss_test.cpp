@@ -1,0 +1,192 @@
+#include "ops/loss/loss.h"
+
+#include <functional>
+#include <limits>
+
+#include "support/gradients.h"
+
+namespace traceflow::loss {
+namespace {
+
+using namespace traceflow::testing;
+
+constexpr float nan_f = std::numeric_limits<float>::quiet_NaN();
+
+// Normals of every length up to one, and unit normals to compare them with; every seventh of either is
+// missing.
+struct Normals {
+  Tensor<double> blended, unit;
+
+  Normals(int64_t height, int64_t width) {
+    Random random(1);
+    blended = random_tensor<double>({height, width, 3}, random, -0.5, 0.5);
+    unit = random_tensor<double>({height, width, 3}, random, -1, 1);
+    for (int64_t i = 0; i < height * width; ++i) {
+      double* u = unit.data() + 3 * i;
+      const double length = std::sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
+      for (int c = 0; c < 3; ++c) u[c] = i % 7 == 3 ? 0 : u[c] / length;
+      if (i % 7 == 5) std::fill_n(blended.data() + 3 * i, 3, 0.0);
+    }
+  }
+};
+
+TEST(L1, IsTheMeanDistance) {
+  Tensor<float> image({2, 1, 3}), target({2, 1, 3}), gradient({2, 1, 3});
+  for (int64_t i = 0; i < 6; ++i) image[i] = static_cast<float>(i);
+  target.fill(2);
+  EXPECT_DOUBLE_EQ(l1(image, target, 12, gradient), 9.0 / 6);
+  for (int64_t i = 0; i < 6; ++i) EXPECT_EQ(gradient[i], i < 2 ? -2 : i == 2 ? 0 : 2);
+}
+
+TEST(L1, FastAgreesWithReference) {
+  for (const int64_t width : {1, 7, 60}) {
+    Random random(2);
+    const Shape shape{31, width, 3};
+    const auto image = random_tensor<double>(shape, random, 0, 1),
+               target = random_tensor<double>(shape, random, 0, 1);
+    Tensor<float> fast(shape);
+    Tensor<double> plain(shape);
+    const double value = l1(convert<float>(image), convert<float>(target), 0.8, fast);
+    EXPECT_NEAR(value, l1_reference(image, target, 0.8, plain), 1e-6);
+    expect_close(fast, plain, 1e-6, "gradient");
+  }
+}
+
+TEST(L1, GradientAgreesWithCentralDifferences) {
+  Random random(3);
+  auto image = random_tensor<double>({3, 4, 3}, random, 0, 1);
+  const auto target = random_tensor<double>({3, 4, 3}, random, 0, 1);
+  Tensor<double> gradient(image.shape()), unused(image.shape());
+  l1_reference(image, target, 0.8, gradient);
+  const auto value = [&] { return 0.8 * l1_reference(image, target, 1, unused); };
+  expect_close(gradient, central_differences(image, value), 1e-8, "image");
+}
+
+TEST(NormalConsistency, IsZeroWhereTheyAgreeAndTwoWhereTheyOppose) {
+  Tensor<float> normal({1, 2, 3}), pseudo({1, 2, 3}), a({1, 2, 3}), b({1, 2, 3});
+  normal[2] = pseudo[2] = 1;
+  EXPECT_DOUBLE_EQ(normal_consistency(normal, pseudo, 1, a, b), 0);  // the second pixel has no pseudo-normal
+  pseudo[2] = -1;
+  EXPECT_DOUBLE_EQ(normal_consistency(normal, pseudo, 1, a, b), 1);  // half of the frame at 2
+}
+
+TEST(NormalConsistency, FastAgreesWithReference) {
+  const Normals n(40, 50);
+  const Shape shape = n.unit.shape();
+  Tensor<float> a(shape), b(shape);
+  Tensor<double> c(shape), d(shape);
+  const double value = normal_consistency(convert<float>(n.blended), convert<float>(n.unit), 0.05, a, b);
+  EXPECT_NEAR(value, normal_consistency_reference(n.blended, n.unit, 0.05, c, d), 1e-6);
+  expect_close(a, c, 1e-6, "normal");
+  expect_close(b, d, 1e-6, "pseudo-normal");
+}
+
+TEST(NormalConsistency, GradientAgreesWithCentralDifferences) {
+  Normals n(5, 6);
+  const Shape shape = n.unit.shape();
+  Tensor<double> grad_normal(shape), grad_pseudo(shape), unused(shape);
+  normal_consistency_reference(n.blended, n.unit, 0.05, grad_normal, grad_pseudo);
+  const auto value = [&] {
+    return 0.05 * normal_consistency_reference(n.blended, n.unit, 1, unused, unused);
+  };
+  expect_close(grad_normal, central_differences(n.blended, value), 1e-7, "normal");
+  // A pixel without a pseudo-normal is left out; giving it one is a discontinuity, not a gradient.
+  auto differences = central_differences(n.unit, value);
+  for (int64_t i = 0; i < 30; ++i) {
+    if (i % 7 == 3) std::fill_n(differences.data() + 3 * i, 3, 0.0);
+  }
+  expect_close(grad_pseudo, differences, 1e-7, "pseudo-normal");
+}
+
+TEST(NormalPrior, IsOneMinusTheMeanCosine) {
+  Tensor<float> normal({1, 3, 3}), prior({1, 3, 3}), gradient({1, 3, 3});
+  normal[2] = 0.25F;  // its length does not matter
+  prior[2] = 0.6F;
+  prior[0] = 0.8F;
+  normal[3] = 1;  // no prior
+  prior[7] = 1;   // no normal
+  EXPECT_NEAR(normal_prior(normal, prior, 1, gradient), 0.4, 1e-7);
+  for (int64_t i = 3; i < 9; ++i) EXPECT_EQ(gradient[i], 0);
+}
+
+TEST(NormalPrior, FastAgreesWithReference) {
+  const Normals n(40, 50);
+  Tensor<float> fast(n.unit.shape());
+  Tensor<double> plain(n.unit.shape());
+  const double value = normal_prior(convert<float>(n.blended), convert<float>(n.unit), 0.05, fast);
+  EXPECT_NEAR(value, normal_prior_reference(n.blended, n.unit, 0.05, plain), 1e-6);
+  expect_close(fast, plain, 1e-5, "normal");
+}
+
+TEST(NormalPrior, GradientAgreesWithCentralDifferences) {
+  Normals n(5, 6);
+  Tensor<double> gradient(n.unit.shape()), unused(n.unit.shape());
+  normal_prior_reference(n.blended, n.unit, 0.05, gradient);
+  const auto value = [&] { return 0.05 * normal_prior_reference(n.blended, n.unit, 1, unused); };
+  auto differences = central_differences(n.blended, value);
+  for (int64_t i = 0; i < 30; ++i) {  // a missing normal is a discontinuity
+    if (i % 7 == 5) std::fill_n(differences.data() + 3 * i, 3, 0.0);
+  }
+  expect_close(gradient, differences, 1e-7, "normal");
+}
+
+TEST(Distortion, IsTheMeanOfItsMap) {
+  Tensor<float> map({3, 4}), gradient({3, 4});
+  for (int64_t i = 0; i < 12; ++i) map[i] = static_cast<float>(i);
+  EXPECT_DOUBLE_EQ(distortion(map, 24, gradient), 5.5);
+  for (const float g : gradient.values()) EXPECT_EQ(g, 2);
+}
+
+TEST(Losses, HostilePixelsShowInTheValueAndGiveNoGradient) {
+  const Normals n(10, 10);
+  const Shape shape = n.unit.shape();
+  const auto unit = convert<float>(n.unit);
+  for (const float bad :
+       {nan_f, std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
+    auto blended = convert<float>(n.blended);
+    blended[3] = bad;
+    Tensor<float> a(shape), b(shape), c(shape), d(shape);
+    EXPECT_FALSE(std::isfinite(l1(blended, unit, 1, a)));
+    EXPECT_FALSE(std::isfinite(normal_consistency(blended, unit, 1, b, c)));
+    EXPECT_FALSE(std::isfinite(normal_prior(blended, unit, 1, d)));
+    EXPECT_TRUE(all_finite(a) && all_finite(b) && all_finite(c) && all_finite(d));
+    for (int k = 3; k < 6; ++k) EXPECT_EQ(d[k], 0);
+    EXPECT_NE(d[6], 0);
+  }
+}
+
+TEST(Losses, NothingWeighsNothing) {
+  Tensor<float> none({0, 0, 3}), gradient({0, 0, 3}), map({0, 0});
+  EXPECT_EQ(l1(none, none, 1, gradient), 0);
+  EXPECT_EQ(normal_consistency(none, none, 1, gradient, gradient), 0);
+  EXPECT_EQ(normal_prior(none, none, 1, gradient), 0);
+  EXPECT_EQ(distortion(map, 1, map), 0);
+  Tensor<float> unset({2, 2, 3});
+  EXPECT_EQ(normal_prior(unset, unset, 1, unset), 0);
+}
+
+TEST(Losses, RefuseShapesThatDoNotFit) {
+  Tensor<float> image({2, 2, 3}), other({2, 3, 3});
+  EXPECT_THROW(l1(image, other, 1, image), InternalError);
+  EXPECT_THROW(l1(image, image, 1, other), InternalError);
+  EXPECT_THROW(normal_consistency(image, image, 1, image, other), InternalError);
+  EXPECT_THROW(normal_prior(image, other, 1, image), InternalError);
+}
+
+TEST(Losses, SameBytesAtAnyThreadCount) {
+  const Normals n(120, 110);
+  const auto blended = convert<float>(n.blended), unit = convert<float>(n.unit);
+  expect_same_bytes_at_any_thread_count([&] {
+    Tensor<float> a(unit.shape()), b(unit.shape()), c(unit.shape()), d(unit.shape());
+    Tensor<double> values({4});
+    values[0] = l1(blended, unit, 1, a);
+    values[1] = normal_consistency(blended, unit, 1, b, c);
+    values[2] = normal_prior(blended, unit, 1, d);
+    values[3] = distortion(blended, 1, d);
+    return std::vector{convert<double>(a), convert<double>(b), convert<double>(c), convert<double>(d),
+                       values};
+  });
+}
+
+}  // namespace
+}  // namespace traceflow::loss
