@@ -1,0 +1,109 @@
+#include "train/initialise.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "math/rotation.h"
+#include "scene/neighbours.h"
+
+namespace traceflow {
+namespace {
+
+// A square grid of points in a tilted plane.
+struct Plane {
+  Vec3<float> normal = normalize(Vec3<float>(0.3F, -0.5F, 0.8F));
+  float spacing = 0.1F;
+  Tensor<float> points;
+
+  explicit Plane(int side) : points({int64_t{side} * side, 3}) {
+    const Vec3<float> u = normalize(cross(normal, Vec3<float>(1, 0, 0)));
+    const Vec3<float> v = cross(normal, u);
+    for (int64_t i = 0; i < points.dim(0); ++i) {
+      store3(points.row(i), spacing * (static_cast<float>(i % side) * u + static_cast<float>(i / side) * v));
+    }
+  }
+};
+
+TEST(Initialise, ScaleIsTheRootMeanSquareDistanceToThreeNeighbours) {
+  const Plane plane(9);
+  Random random(1);
+  const Surfels s = surfels_at_points(plane.points, InitialOptions{}, random);
+  // An inner point has its four neighbours at one spacing.
+  EXPECT_NEAR(std::exp(s.log_scale(4 * 9 + 4, 0)), plane.spacing, 1e-5F);
+  // A corner has two at one spacing and one across the diagonal.
+  EXPECT_NEAR(std::exp(s.log_scale(0, 1)), plane.spacing * std::sqrt((1 + 1 + 2) / 3.0F), 1e-5F);
+}
+
+TEST(Initialise, NormalsFollowTheNeighbours) {
+  const Plane plane(9);
+  Random random(1);
+  const Surfels s = surfels_at_points(plane.points, InitialOptions{}, random);
+  for (int64_t i = 0; i < s.count(); ++i) {
+    const Vec3<float> n = rotation_from_quaternion(load4<float>(s.rotation.row(i)))[2];
+    ASSERT_NEAR(std::abs(dot(n, plane.normal)), 1, 1e-4F) << i;
+  }
+}
+
+TEST(Initialise, OpacityAndTintAreAsTheOptionsSay) {
+  const Plane plane(3);
+  InitialOptions options;
+  options.opacity = 0.25F;
+  options.tint = 0.002F;
+  Random random(1);
+  const Surfels s = surfels_at_points(plane.points, options, random);
+  EXPECT_NEAR(1 / (1 + std::exp(-s.opacity_logit[4])), 0.25F, 1e-6F);
+  EXPECT_NEAR(1 / (1 + std::exp(-s.tint_logit[4])), 0.002F, 1e-6F);
+}
+
+TEST(Initialise, CoincidentAndSinglePointsStayFinite) {
+  Random random(1);
+  for (const int64_t count : {1, 2, 40}) {
+    const Surfels s = surfels_at_points(Tensor<float>({count, 3}), InitialOptions{}, random);
+    s.for_each([](const char* name, const Tensor<float>& t) {
+      for (const float v : t.values()) ASSERT_TRUE(std::isfinite(v)) << name;
+    });
+  }
+}
+
+TEST(Initialise, TheEnvironmentFillsItsBoxEvenly) {
+  const Plane plane(9);
+  View view;
+  view.camera.position = {0, 0, -2};
+  InitialOptions options;
+  options.environment_cells = 4;
+  options.environment_per_cell = 3;
+  options.environment_box = 2;
+  Random random(1);
+  const Surfels s = surfels_around(plane.points, {view}, options, random);
+  ASSERT_EQ(s.count(), 4 * 4 * 4 * 3);
+  EXPECT_FALSE(s.has_tint());
+  float low = 1e9F;
+  float high = -1e9F;
+  for (int64_t i = 0; i < s.count(); ++i) {
+    low = std::min(low, s.position(i, 2));
+    high = std::max(high, s.position(i, 2));
+  }
+  EXPECT_LT(low, -2);
+  EXPECT_GT(high, 0.2F);
+}
+
+TEST(Neighbours, AgreeWithABruteForceSearch) {
+  Random random(3);
+  Tensor<float> points({200, 3});
+  for (float& v : points.values()) v = static_cast<float>(random.normal());
+  const Neighbours found = nearest_neighbours(points, 4);
+  for (int64_t i = 0; i < 200; ++i) {
+    std::vector<float> distances;
+    for (int64_t j = 0; j < 200; ++j) {
+      const Vec3<float> d = load3<float>(points.row(i)) - load3<float>(points.row(j));
+      if (j != i) distances.push_back(dot(d, d));
+    }
+    std::sort(distances.begin(), distances.end());
+    for (int64_t k = 0; k < 4; ++k)
+      ASSERT_NEAR(found.distance2(i, k), distances[static_cast<size_t>(k)], 1e-5F);
+  }
+}
+
+}  // namespace
+}  // namespace traceflow

@@ -1,0 +1,219 @@
+#include "train/trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <fstream>
+
+#include "base/parallel.h"
+#include "capture/synth.h"
+#include "scene/scene_file.h"
+
+namespace traceflow {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A capture small enough that a run of forty iterations takes a second; made once for all tests.
+const fs::path& capture_folder() {
+  static const fs::path folder = [] {
+    const fs::path path = fs::path(testing::TempDir()) / ("trainer_capture_" + std::to_string(::getpid()));
+    SynthOptions options;
+    options.frames = 5;
+    options.width = 40;
+    options.height = 24;
+    options.samples = 2;
+    options.points = 300;
+    options.test_every = 2;
+    write_synthetic_capture(options, path);
+    return path;
+  }();
+  return folder;
+}
+
+TrainOptions small_run(int iterations) {
+  TrainOptions o = preset("demo");
+  o.iterations = iterations;
+  o.schedule.length = 40;
+  o.schedule.deform_from = 4;
+  o.schedule.normal_from = 6;
+  o.schedule.specular_from = 10;
+  o.schedule.joint_from = 16;
+  o.schedule.sh_every = 8;
+  o.schedule.time_jitter_until = 20;
+  o.density.from = 4;
+  o.density.every = 4;
+  o.density.until = 36;
+  o.density.gradient_threshold = 1e-6F;
+  o.density.max_surfels = 330;
+  o.environment_density.from = 12;
+  o.environment_density.every = 6;
+  o.environment_density.until = 36;
+  o.environment_density.gradient_threshold = 1e-8F;
+  o.initial.environment_cells = 5;
+  o.initial.environment_per_cell = 2;
+  o.environment_density.max_surfels = 260;
+  o.deform.network.depth = 3;
+  o.deform.network.width = 16;
+  o.deform.network.skip = 2;
+  o.deform.environment_network = o.deform.network;
+  o.save_every = 1000;
+  return o;
+}
+
+Trainer make_trainer(const TrainOptions& options, const std::string& name) {
+  const fs::path run = fs::path(testing::TempDir()) / (name + "_" + std::to_string(::getpid()));
+  fs::remove_all(run);
+  return Trainer(options, load_capture(capture_folder(), options.capture), run);
+}
+
+// The scene's bytes, as a checkpoint has them.
+std::string scene_bytes(const Scene& scene) {
+  Safetensors file;
+  put_scene(scene, file);
+  const fs::path path = fs::path(testing::TempDir()) / ("scene_" + std::to_string(::getpid()));
+  file.write(path);
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+const std::atomic<bool> never{false};
+
+TEST(Trainer, LearnsTheCapture) {
+  TrainOptions options = small_run(300);
+  options.specular = Specular::none;
+  Trainer trainer = make_trainer(options, "learns");
+  const double before = trainer.step().psnr;
+  const events::Finished end = trainer.run(never);
+  EXPECT_EQ(end.ending, events::Ending::completed);
+  EXPECT_GT(end.psnr, before + 4) << "from " << before;
+}
+
+TEST(Trainer, PhasesAndDensityControlAreToldAndTheCapsHold) {
+  Trainer trainer = make_trainer(small_run(40), "events");
+  std::vector<std::string> phases;
+  int64_t grown = 0;
+  int64_t largest_main = 0;
+  int64_t largest_environment = 0;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* phase = std::get_if<events::PhaseEntered>(&event)) phases.push_back(phase->phase);
+    if (const auto* change = std::get_if<events::DensityChanged>(&event))
+      grown += change->cloned + change->split;
+    if (const auto* step = std::get_if<events::Step>(&event)) {
+      largest_main = std::max(largest_main, step->surfels.main);
+      largest_environment = std::max(largest_environment, step->surfels.environment);
+    }
+  });
+  EXPECT_EQ(trainer.run(never).ending, events::Ending::completed);
+  EXPECT_EQ(phases, (std::vector<std::string>{"diffuse", "specular", "joint"}));
+  EXPECT_GT(grown, 0);
+  EXPECT_LE(largest_main, 330);
+  EXPECT_LE(largest_environment, 260);
+}
+
+TEST(Trainer, SameSeedGivesTheSameBytesAtAnyThreadCount) {
+  std::string bytes[2];
+  for (int threads = 1; threads <= 2; ++threads) {
+    set_threads(threads);
+    Trainer trainer = make_trainer(small_run(40), "threads");
+    trainer.run(never);
+    bytes[threads - 1] = scene_bytes(trainer.scene());
+  }
+  set_threads(0);
+  EXPECT_EQ(bytes[0], bytes[1]);
+}
+
+TEST(Trainer, AnotherSeedGivesOtherBytes) {
+  TrainOptions options = small_run(12);
+  Trainer first = make_trainer(options, "seed1");
+  first.run(never);
+  options.seed = 2;
+  Trainer second = make_trainer(options, "seed2");
+  second.run(never);
+  EXPECT_NE(scene_bytes(first.scene()), scene_bytes(second.scene()));
+}
+
+TEST(Trainer, AResumedRunEndsInTheBytesOfAnUninterruptedOne) {
+  Trainer whole = make_trainer(small_run(40), "whole");
+  whole.run(never);
+
+  // Interrupt once in each phase.
+  const fs::path run = fs::path(testing::TempDir()) / ("resumed_" + std::to_string(::getpid()));
+  fs::remove_all(run);
+  const TrainOptions options = small_run(40);
+  for (const int pause : {7, 13, 29, 40}) {
+    Trainer part(options, load_capture(capture_folder(), options.capture), run);
+    if (fs::exists(run)) part.resume();
+    std::atomic<bool> stop{false};
+    part.stream().listen([&](const events::Event& event) {
+      const auto* step = std::get_if<events::Step>(&event);
+      if (step && step->iteration == pause) stop = true;
+    });
+    part.run(stop);
+    EXPECT_EQ(part.iteration(), pause);
+    if (pause == 40) {
+      EXPECT_EQ(scene_bytes(part.scene()), scene_bytes(whole.scene()));
+    }
+  }
+}
+
+TEST(Trainer, TheCheckpointBeforeTheLastIsKeptAndServesWhenTheLastIsDamaged) {
+  TrainOptions options = small_run(12);
+  options.save_every = 5;
+  Trainer trainer = make_trainer(options, "kept");
+  fs::path run;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* saved = std::get_if<events::Saved>(&event)) run = saved->path.parent_path();
+  });
+  trainer.run(never);
+  const RunFolder folder{run};
+  ASSERT_TRUE(fs::exists(folder.previous_checkpoint()));
+  std::ofstream(folder.checkpoint(), std::ios::trunc) << "damaged";
+  std::string note;
+  EXPECT_EQ(read_checkpoint(folder, note).metadata.at("iteration"), "10");
+  EXPECT_FALSE(note.empty());
+}
+
+TEST(Trainer, ResumingWithAnotherCaptureIsRefused) {
+  TrainOptions options = small_run(3);
+  Trainer trainer = make_trainer(options, "mismatch");
+  trainer.run(never);
+  Capture other = load_capture(capture_folder(), options.capture);
+  other.train.pop_back();
+  const fs::path run = fs::path(testing::TempDir()) / ("mismatch_" + std::to_string(::getpid()));
+  Trainer resumed(options, std::move(other), run);
+  EXPECT_THROW(resumed.resume(), InputError);
+}
+
+TEST(Trainer, EveryAblationAndPeerOfTheMethodTrains) {
+  for (const Specular specular :
+       {Specular::none, Specular::environment_gaussians, Specular::environment_map}) {
+    for (const bool deform : {false, true}) {
+      TrainOptions options = small_run(24);
+      options.specular = specular;
+      options.deform.main = options.deform.environment = deform;
+      options.loss.normal = options.loss.normal_prior = deform ? 0.05F : 0;
+      options.loss.distortion = deform ? 0 : 10;
+      Trainer trainer = make_trainer(options, "ablation");
+      EXPECT_EQ(trainer.run(never).ending, events::Ending::completed);
+      EXPECT_EQ(trainer.scene().main_field.has_value(), deform);
+    }
+  }
+}
+
+TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {
+  TrainOptions options = preset("paper");
+  options.memory_budget = 1 << 20;
+  EXPECT_FALSE(surfel_caps(options, 480, 270).lowered);
+  EXPECT_EQ(surfel_caps(options, 480, 270).main, options.density.max_surfels);
+  options.memory_budget = 3000;
+  const SurfelCaps caps = surfel_caps(options, 480, 270);
+  EXPECT_TRUE(caps.lowered);
+  EXPECT_LE(forecast_bytes(options, caps.main, caps.environment, 480, 270), int64_t{3000} << 20);
+  options.memory_budget = 10;
+  EXPECT_THROW(surfel_caps(options, 480, 270), InputError);
+}
+
+}  // namespace
+}  // namespace traceflow
