@@ -27,5 +27,7 @@ struct RowEdit {
 // copies.
 Tensor<float> edited_rows(const Tensor<float>& tensor, const RowEdit& edit, bool zero_fresh);
 void edit_rows(Surfels& surfels, const RowEdit& edit);
+// Adds the rows of another set, which has the same groups and degree, after those of the first.
+void append_rows(Surfels& surfels, const Surfels& more);
 
 }  // namespace traceflow

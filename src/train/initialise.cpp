@@ -9,6 +9,7 @@
 #include "math/spherical_harmonics.h"
 #include "math/symmetric_eigen.h"
 #include "scene/neighbours.h"
+#include "scene/rows.h"
 
 namespace traceflow {
 
@@ -83,34 +84,59 @@ std::vector<const View*> earliest_views(const Capture& capture) {
   return views;
 }
 
-// The median over the earliest photographs of the colour at which each surfel projects; grey where none sees
-// it. The median forgives the views in which something stands before it.
-void set_colours_from_views(Surfels& s, const Capture& capture) {
+// What the earliest photographs show where surfels project: calls f(surfel, view's images, column, row) for
+// every surfel and every such view that has it in frame. Surfels run in parallel.
+template <class F>
+void for_each_sighting(const Surfels& s, const Capture& capture, const F& f) {
   const std::vector<const View*> views = earliest_views(capture);
   std::vector<std::shared_ptr<const ViewImages>> images;
   images.reserve(views.size());
   for (const View* view : views) images.push_back(load_images(capture, *view));
-  parallel_for("initialise: colours", s.count(), [&](int64_t i) {
-    std::array<std::vector<float>, 3> seen;
+  parallel_for("initialise: look at photographs", s.count(), [&](int64_t i) {
     for (size_t v = 0; v < views.size(); ++v) {
       const Camera<float>& camera = views[v]->camera;
       const Vec3<float> x = camera.point_in_camera(load3<float>(s.position.row(i)));
       if (!(x.z > 0)) continue;
       const Vec2<float> at = camera.project(x);
-      if (!(at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
-            at.y < static_cast<float>(camera.height))) {
-        continue;
-      }
-      const float* pixel = &images[v]->colour(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x), 0);
-      for (size_t c = 0; c < 3; ++c) seen[c].push_back(pixel[c]);
-    }
-    if (seen[0].empty()) return;
-    for (size_t c = 0; c < 3; ++c) {
-      const auto middle = seen[c].begin() + static_cast<std::ptrdiff_t>(seen[c].size() / 2);
-      std::nth_element(seen[c].begin(), middle, seen[c].end());
-      s.sh(i, 0, static_cast<int64_t>(c)) = (*middle - 0.5F) / static_cast<float>(sh_c0);
+      const bool in_frame = at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
+                            at.y < static_cast<float>(camera.height);
+      if (in_frame) f(i, *images[v], static_cast<int64_t>(at.x), static_cast<int64_t>(at.y));
     }
   });
+}
+
+// The median colour of each surfel's sightings; grey where there is none. The median forgives the views in
+// which something stands before it.
+void set_colours_from_views(Surfels& s, const Capture& capture) {
+  std::vector<std::array<std::vector<float>, 3>> seen(static_cast<size_t>(s.count()));
+  for_each_sighting(s, capture, [&](int64_t i, const ViewImages& images, int64_t x, int64_t y) {
+    for (size_t c = 0; c < 3; ++c) {
+      seen[static_cast<size_t>(i)][c].push_back(images.colour(y, x, static_cast<int64_t>(c)));
+    }
+  });
+  for (int64_t i = 0; i < s.count(); ++i) {
+    for (size_t c = 0; c < 3; ++c) {
+      std::vector<float>& values = seen[static_cast<size_t>(i)][c];
+      if (values.empty()) continue;
+      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), middle, values.end());
+      s.sh(i, 0, static_cast<int64_t>(c)) = (*middle - 0.5F) / static_cast<float>(sh_c0);
+    }
+  }
+}
+
+// Surfels of which most sightings lie outside the masks: the still surroundings, which are what a mirror
+// shows.
+RowEdit unmasked_surfels(const Surfels& s, const Capture& capture) {
+  std::vector<int> balance(static_cast<size_t>(s.count()), 0);
+  for_each_sighting(s, capture, [&](int64_t i, const ViewImages& images, int64_t x, int64_t y) {
+    balance[static_cast<size_t>(i)] += !images.mask.empty() && images.mask(y, x) ? -1 : 1;
+  });
+  RowEdit kept;
+  for (int64_t i = 0; i < s.count(); ++i) {
+    if (balance[static_cast<size_t>(i)] > 0) kept.keep(i);
+  }
+  return kept;
 }
 
 // At most `limit` of the points, drawn without replacement, in their order.
@@ -194,6 +220,17 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
   return s;
 }
 
+Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points,
+                               const InitialOptions& options, Random& random) {
+  InitialOptions as_environment = options;
+  as_environment.sh_degree = options.environment_sh_degree;
+  Surfels s = surfels_at_points(thinned(points, options.environment_points, random), as_environment, random);
+  s.tint_logit = {};
+  edit_rows(s, unmasked_surfels(s, capture));
+  set_colours_from_views(s, capture);
+  return s;
+}
+
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
   const Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
   if (points.dim(0) == 0) {
@@ -212,6 +249,9 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
 
   if (options.specular == Specular::environment_gaussians) {
     scene.environment = surfels_around(points, capture.train, options.initial, random);
+    if (options.initial.environment_points > 0 && capture.has_masks) {
+      append_rows(scene.environment, surroundings_at_points(capture, points, options.initial, random));
+    }
     if (options.deform.environment) {
       scene.environment_field =
           make_field(options.deform.environment_network, residual::environment_outputs, random);

@@ -12,11 +12,17 @@ namespace traceflow {
 // from.
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
-// Its two halves. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
+// Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);
 // Surfels drawn uniformly in cells of the box around the points and the cameras, `environment_box` times as
 // large.
 Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views,
                        const InitialOptions& options, Random& random);
+
+// Environment surfels at those of the capture's points that lie outside its masks, coloured as the
+// photographs show them: the surroundings that the camera sees are also what the mirror shows. At most
+// options.environment_points of them.
+Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points,
+                               const InitialOptions& options, Random& random);
 
 }  // namespace traceflow

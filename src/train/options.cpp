@@ -19,7 +19,8 @@ TrainOptions cpu_preset() {
   o.initial.max_points = 12000;
   o.initial.sh_degree = 2;
   o.initial.environment_sh_degree = 1;
-  o.initial.environment_cells = 12;
+  o.initial.environment_cells = 10;
+  o.initial.environment_points = 6000;
   o.initial.map_size = 32;
   o.deform.network.width = 64;
   o.deform.network.depth = 6;
@@ -122,6 +123,7 @@ void InitialOptions::validate() const {
                environment_cells, "1 to 128");
   check_option(environment_per_cell >= 1, "initial.environment_per_cell", environment_per_cell, "1 or more");
   check_option(environment_box > 0, "initial.environment_box", environment_box, "a positive number");
+  check_option(environment_points >= 0, "initial.environment_points", environment_points, "0 or more");
   check_option(map_size >= 2 && map_size <= 4096, "initial.map_size", map_size, "2 to 4096");
 }
 

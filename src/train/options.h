@@ -165,6 +165,7 @@ struct InitialOptions {
   int environment_per_cell = 5;
   float environment_opacity = 0.1F;
   float environment_box = 1.5F;
+  int environment_points = 0;
   int map_size = 64;
 
   template <class Visitor>
@@ -183,6 +184,8 @@ struct InitialOptions {
     v.field("environment_per_cell", environment_per_cell, "surfels", "Environment surfels in each cell.");
     v.field("environment_opacity", environment_opacity, "", "First opacity of environment surfels.");
     v.field("environment_box", environment_box, "", "Size of that box, in boxes around cameras and points.");
+    v.field("environment_points", environment_points, "points",
+            "So many of the capture's points outside its masks start as environment surfels too.");
     v.field("map_size", map_size, "texels", "Side of a face of the environment map.");
   }
   void validate() const;
