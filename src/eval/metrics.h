@@ -1,0 +1,62 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/tensor.h"
+#include "eval/lpips.h"
+
+// How near a rendered view comes to the photograph (method §8). Every figure is absent where it cannot be
+// had.
+namespace traceflow::eval {
+
+struct Metrics {
+  std::optional<double> psnr;  // dB; absent for equal images, whose PSNR has no bound
+  std::optional<double> ssim;
+  std::optional<double> lpips;            // [−1, 1] input, as defined
+  std::optional<double> lpips_published;  // [0, 1] input, as published tables used it
+  std::optional<double> masked_psnr;
+  std::optional<double> masked_ssim;
+  std::optional<double> normal_mae_deg;
+  std::optional<double> masked_normal_mae_deg;
+
+  // f(name, value) for every figure, in the order of the report.
+  template <class Self, class F>
+  static void visit(Self& self, F&& f) {
+    f("psnr", self.psnr);
+    f("ssim", self.ssim);
+    f("lpips", self.lpips);
+    f("lpips_published", self.lpips_published);
+    f("masked_psnr", self.masked_psnr);
+    f("masked_ssim", self.masked_ssim);
+    f("normal_mae_deg", self.normal_mae_deg);
+    f("masked_normal_mae_deg", self.masked_normal_mae_deg);
+  }
+};
+
+// 10·log10(1 / mean squared error) over all channels of all pixels, or of the pixels where the mask (H×W) is
+// not zero when there is one. Absent when the mask holds no pixel, and when the error is zero or not finite.
+std::optional<double> psnr(const Tensor<float>& image, const Tensor<float>& target,
+                           const Tensor<uint8_t>& mask);
+
+// Mean angle in degrees between the rendered normal (any length) and the truth (unit) where truth is not
+// zero, within the mask when there is one. Where nothing was rendered the angle is 90: a hole must not
+// improve the figure.
+std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<float>& truth,
+                                     const Tensor<uint8_t>& mask);
+
+// What a view is judged against. Tensors that the capture lacks are empty.
+struct Truth {
+  const Tensor<float>& colour;
+  const Tensor<uint8_t>& mask;
+  const Tensor<float>& normal;
+};
+
+// All figures of one view. Colours are rounded to 8 bit first. weights may be null: no LPIPS.
+Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
+                const lpips::Weights* weights);
+
+// Each figure's mean over the views that have it.
+Metrics mean(const std::vector<Metrics>& views);
+
+}  // namespace traceflow::eval
