@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+
+#include "eval/picture.h"
+
+namespace traceflow::eval {
+
+// One picture of everything: a row for each view, with photograph, render, difference (three times as
+// strong), diffuse, specular, tint, normal, depth and alpha side by side under their names.
+class ContactSheet {
+ public:
+  // cell_width: columns of one picture, pixels.
+  explicit ContactSheet(int64_t cell_width) : cell_width_(cell_width) {}
+
+  void add(const Tensor<float>& photograph, const Frame& frame);
+  // Written atomically. There must be a row.
+  void write(const std::filesystem::path& path) const;
+
+ private:
+  int64_t cell_width_;
+  Painter painter_;
+  std::vector<std::vector<Tensor<uint8_t>>> rows_;
+};
+
+}  // namespace traceflow::eval

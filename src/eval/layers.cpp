@@ -1,0 +1,64 @@
+#include "eval/layers.h"
+
+#include <algorithm>
+#include <sstream>
+
+namespace traceflow::eval {
+
+namespace {
+
+Tensor<float> divided(const Tensor<float>& depth, double scale) {
+  Tensor<float> result(depth.shape());
+  std::transform(depth.data(), depth.data() + depth.size(), result.data(),
+                 [&](float z) { return static_cast<float>(z / scale); });
+  return result;
+}
+
+}  // namespace
+
+std::vector<Layer> parse_layers(const std::string& list) {
+  std::vector<Layer> layers;
+  std::istringstream words(list);
+  for (std::string word; std::getline(words, word, ',');) {
+    const auto* const found = std::find(layer_names.begin(), layer_names.end(), word);
+    const bool all = word == "all";
+    if (found == layer_names.end() && !all) {
+      std::string expected;
+      for (const char* name : layer_names) expected += std::string(name) + ", ";
+      throw InputError("option", "layers", word, expected + "or all, with commas between");
+    }
+    for (size_t i = 0; i < layer_names.size(); ++i) {
+      const auto layer = static_cast<Layer>(i);
+      const bool wanted = all || layer_names[i] == word;
+      if (wanted && std::find(layers.begin(), layers.end(), layer) == layers.end()) layers.push_back(layer);
+    }
+  }
+  if (layers.empty()) throw InputError("option", "layers", "none", "at least one");
+  return layers;
+}
+
+Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
+  switch (layer) {
+    case Layer::rgb:
+      return frame.colour;
+    case Layer::diffuse:
+      return frame.raster.colour;
+    case Layer::specular:
+      return frame.specular_image();
+    case Layer::tint:
+      return frame.raster.tint;
+    case Layer::alpha:
+      return frame.raster.alpha;
+    case Layer::normal:
+      return frame.raster.normal;
+    case Layer::depth:
+      return divided(frame.raster.depth, scale);
+    case Layer::median_depth:
+      return divided(frame.raster.median_depth, scale);
+    case Layer::distortion:
+      return frame.raster.distortion;
+  }
+  return {};
+}
+
+}  // namespace traceflow::eval

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+
+#include "base/tensor.h"
+
+namespace traceflow::eval {
+
+// A film written by ffmpeg, which is fed frames through a pipe.
+class Video {
+ public:
+  // Throws InputError when there is no ffmpeg: to be called before any work begins.
+  static void require_ffmpeg();
+
+  Video(std::filesystem::path path, double frames_per_second)
+      : path_(std::move(path)), frames_per_second_(frames_per_second) {}
+  ~Video();
+  Video(const Video&) = delete;
+  Video& operator=(const Video&) = delete;
+
+  // H×W×3; every frame has the first one's size, or InputError.
+  void add(const Tensor<uint8_t>& frame);
+  // Ends the film. Throws InputError when ffmpeg could not write it.
+  void finish();
+
+ private:
+  void start();
+  [[noreturn]] void fail() const;
+
+  std::filesystem::path path_;
+  double frames_per_second_;
+  Shape size_;
+  pid_t process_ = -1;
+  int pipe_ = -1;
+};
+
+}  // namespace traceflow::eval
