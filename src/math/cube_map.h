@@ -7,7 +7,8 @@
 // Where a direction meets the faces of a cube (method §9), in the layout that OpenGL has.
 namespace traceflow {
 
-// Face 0..5 is +x −x +y −y +z −z; (s, t) in [0,1] across it, t downwards. Only the direction of d matters.
+// Face 0..5 is +x −x +y −y +z −z; (s, t) in [0,1] across it, t downwards. Only the direction of d matters; d
+// is finite and not zero.
 template <class T>
 struct CubeCoordinates {
   int face;
@@ -43,9 +44,10 @@ TRACEFLOW_HD CubeCoordinates<T> cube_coordinates(const Vec3<T>& d) {
   const int major = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
   const int face = 2 * major + (d[major] < T(0) ? 1 : 0);
   const CubeFace f = cube_face(face);
-  const T inverse = T(1) / std::abs(d[major]);
-  return {face, T(0.5) + T(0.5) * static_cast<T>(f.sign_s) * d[f.axis_s] * inverse,
-          T(0.5) + T(0.5) * static_cast<T>(f.sign_t) * d[f.axis_t] * inverse};
+  // A quotient, not a product with the inverse: that of a tiny number is infinite.
+  const T length = std::abs(d[major]);
+  return {face, T(0.5) + T(0.5) * static_cast<T>(f.sign_s) * (d[f.axis_s] / length),
+          T(0.5) + T(0.5) * static_cast<T>(f.sign_t) * (d[f.axis_t] / length)};
 }
 
 // dL/dd from dL/ds and dL/dt.
