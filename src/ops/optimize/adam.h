@@ -25,9 +25,10 @@ struct BasicAdamState {
 };
 using AdamState = BasicAdamState<float>;
 
-// parameter −= rate · m̂ / (√v̂ + ε). Increments state.step. A gradient entry that is not finite leaves its
-// parameter and moments alone and is counted; returns that count. learning_rates: one rate for all, or one
-// for each column of a row (the harmonics' first coefficient learns faster than the others).
+// parameter −= rate · m̂ / (√v̂ + ε). Increments state.step. A gradient entry that is not finite, or whose
+// square is not, leaves its parameter and moments alone and is counted; returns that count. learning_rates:
+// one rate for all, or one for each column of a row (the harmonics' first coefficient learns faster than the
+// others).
 int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
                   std::span<const float> learning_rates, const AdamOptions& options);
 inline int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,

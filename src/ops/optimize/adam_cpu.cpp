@@ -27,13 +27,14 @@ int64_t UpdateBlock(const AdamBlock& b) {
   for (int64_t i = 0; i < b.count; i += lanes) {
     const auto inside = hn::FirstN(d, static_cast<size_t>(std::min(lanes, b.count - i)));
     const auto g = hn::MaskedLoad(inside, d, b.gradient + i);
-    const auto finite = hn::And(inside, hn::IsFinite(g));
+    const auto squared = hn::Mul(g, g);
+    const auto finite = hn::And(inside, hn::IsFinite(squared));
     const auto m0 = hn::MaskedLoad(inside, d, b.first + i);
     const auto v0 = hn::MaskedLoad(inside, d, b.second + i);
     const auto p0 = hn::MaskedLoad(inside, d, b.parameter + i);
     const auto rate = hn::MaskedLoad(inside, d, b.rates + i);
     const auto m = hn::MulAdd(beta1, m0, hn::Mul(rest1, g));
-    const auto v = hn::MulAdd(beta2, v0, hn::Mul(rest2, hn::Mul(g, g)));
+    const auto v = hn::MulAdd(beta2, v0, hn::Mul(rest2, squared));
     const auto root = hn::Add(hn::Sqrt(hn::Mul(v, scale2)), epsilon);
     const auto p = hn::Sub(p0, hn::Div(hn::Mul(rate, hn::Mul(m, scale1)), root));
     hn::BlendedStore(m, finite, d, b.first + i);

@@ -8,6 +8,9 @@ namespace traceflow::optimize {
 int64_t adam_step_reference(Tensor<double>& parameter, const Tensor<double>& gradient,
                             BasicAdamState<double>& state, std::span<const double> learning_rates,
                             const AdamOptions& options) {
+  require(gradient.size() == parameter.size() && state.first.size() == parameter.size() &&
+              state.second.size() == parameter.size() && !learning_rates.empty(),
+          "gradient and moments fit their parameter", parameter.shape().to_string());
   const auto beta1 = static_cast<double>(options.beta1);
   const auto beta2 = static_cast<double>(options.beta2);
   ++state.step;
@@ -16,7 +19,7 @@ int64_t adam_step_reference(Tensor<double>& parameter, const Tensor<double>& gra
   int64_t not_finite = 0;
   for (int64_t i = 0; i < parameter.size(); ++i) {
     const double g = gradient[i];
-    if (!std::isfinite(g)) {
+    if (!std::isfinite(g * g)) {
       ++not_finite;
       continue;
     }

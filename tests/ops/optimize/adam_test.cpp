@@ -78,6 +78,37 @@ TEST(Adam, LeavesEntriesWithoutAFiniteGradientAloneAndCountsThem) {
   EXPECT_NE(parameter[0], before[0]);
 }
 
+// An infinite second moment would hold its parameter still for ever.
+TEST(Adam, AGradientWhoseSquareOverflowsIsLeftOut) {
+  Tensor<float> parameter(Shape{2}), gradient(Shape{2});
+  AdamState state = zero_state(parameter.shape());
+  gradient[0] = 1e30F;
+  gradient[1] = 1e18F;
+  EXPECT_EQ(adam_step(parameter, gradient, state, 0.1F, {}), 1);
+  EXPECT_EQ(state.second[0], 0);
+  EXPECT_NEAR(parameter[1], -0.1F, 1e-6F);
+}
+
+// Oracle: with a constant gradient m̂ = g and v̂ = g² at every step, so that every step is the learning rate.
+TEST(Adam, AConstantGradientWalksAtTheLearningRate) {
+  Tensor<double> parameter(Shape{1}), gradient(Shape{1});
+  BasicAdamState<double> state{Tensor<double>(Shape{1}), Tensor<double>(Shape{1}), 0};
+  gradient[0] = -0.3;
+  const double rate = 0.01;
+  for (int i = 0; i < 1000; ++i) adam_step_reference(parameter, gradient, state, std::span(&rate, 1), {});
+  EXPECT_NEAR(parameter[0], 10, 1e-7);
+}
+
+TEST(Adam, RefusesShapesThatDoNotFit) {
+  Tensor<float> parameter(Shape{4});
+  AdamState state = zero_state(parameter.shape());
+  EXPECT_THROW(adam_step(parameter, Tensor<float>(Shape{3}), state, 0.1F, {}), InternalError);
+  EXPECT_THROW(adam_step(parameter, Tensor<float>(Shape{4}), state, std::span<const float>(), {}),
+               InternalError);
+  state.second.resize({3});
+  EXPECT_THROW(adam_step(parameter, Tensor<float>(Shape{4}), state, 0.1F, {}), InternalError);
+}
+
 TEST(Adam, EmptyTensorIsFine) {
   Tensor<float> parameter(Shape{0, 3});
   AdamState state = zero_state(parameter.shape());
