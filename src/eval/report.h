@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "capture/capture.h"
+#include "eval/metrics.h"
+#include "eval/subject.h"
+
+namespace traceflow::eval {
+
+struct ViewReport {
+  std::string id;
+  Metrics metrics;
+};
+
+// What is known of a scene's quality: the content of metrics.json.
+struct Report {
+  std::string capture;
+  std::string split;  // "test" or "train"
+  int downscale = 1;
+  std::string device = "cpu";
+  int64_t iterations = 0;
+  double train_seconds = 0;
+  std::optional<double> render_fps;  // frames a second, rendering alone
+  int64_t main_surfels = 0;
+  int64_t environment_surfels = 0;
+  std::vector<ViewReport> views;
+};
+
+// Called with each view's photograph and frame, in order.
+using ViewListener = std::function<void(const View& view, const ViewImages& images, const Frame& frame)>;
+
+// Renders every view, measures it, and adds it to the report; sets render_fps and the surfel counts.
+void evaluate(const Subject& subject, const Capture& capture, const std::vector<View>& views,
+              const lpips::Weights* weights, const ViewListener& listener, Report& report);
+
+// The report as JSON text: figures that cannot be had are null.
+std::string report_json(const Report& report);
+
+// The report as a table: a line for each view and one for the mean.
+std::string report_table(const Report& report);
+
+}  // namespace traceflow::eval
