@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
-#include <zlib.h>
 
 #include <cstring>
 #include <fstream>
@@ -10,6 +9,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "support/temp_folder.h"
+#include "support/zip_writer.h"
 
 namespace traceflow {
 namespace {
@@ -38,48 +38,6 @@ std::string dictionary(const std::string& type, const std::string& shape, bool f
 template <class T>
 std::string raw(std::initializer_list<T> values) {
   return {reinterpret_cast<const char*>(values.begin()), values.size() * sizeof(T)};
-}
-
-std::string little(uint64_t value, int width) {
-  std::string bytes;
-  for (int i = 0; i < width; ++i) bytes += static_cast<char>(value >> (8 * i) & 0xff);
-  return bytes;
-}
-
-std::string deflated(const std::string& data) {
-  z_stream stream{};
-  deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY);
-  std::string out(deflateBound(&stream, data.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(data.data()));
-  stream.avail_in = static_cast<uInt>(data.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  deflate(&stream, Z_FINISH);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
-}
-
-// A zip archive written independently of the reader, after the format's description. `zip64` puts the sizes
-// into the extra field as numpy.savez does.
-std::string zip(const std::vector<std::pair<std::string, std::string>>& members, bool deflate_them,
-                bool zip64 = false) {
-  std::string body, directory;
-  for (const auto& [name, data] : members) {
-    const std::string stored = deflate_them ? deflated(data) : data;
-    const std::string method = little(deflate_them ? 8 : 0, 2);
-    const std::string extra =
-        zip64 ? little(1, 2) + little(16, 2) + little(data.size(), 8) + little(stored.size(), 8) : "";
-    const std::string sizes = zip64 ? little(0xffffffff, 4) + little(0xffffffff, 4)
-                                    : little(stored.size(), 4) + little(data.size(), 4);
-    const std::string common = little(20, 2) + little(0, 2) + method + little(0, 4) + little(0, 4) + sizes +
-                               little(name.size(), 2) + little(extra.size(), 2);
-    directory += "PK\1\2" + little(20, 2) + common + little(0, 2) + little(0, 2) + little(0, 2) +
-                 little(0, 4) + little(body.size(), 4) + name + extra;
-    body += "PK\3\4" + common + name + extra + stored;
-  }
-  return body + directory + "PK\5\6" + little(0, 4) + little(members.size(), 2) + little(members.size(), 2) +
-         little(directory.size(), 4) + little(body.size(), 4) + little(0, 2);
 }
 
 RC_GTEST_PROP(Npy, write_then_read_is_the_same_array, ()) {
@@ -162,8 +120,8 @@ TEST(Npy, slices_are_rows_of_the_whole) {
   Tensor<float> array({5, 3, 2, 3});
   for (int64_t i = 0; i < array.size(); ++i) array[i] = static_cast<float>(i);
   write_npy(folder / "a.npy", array);
-  write_bytes(folder / "stored.npz", zip({{"depth.npy", bytes_of(folder / "a.npy")}}, false));
-  write_bytes(folder / "deflated.npz", zip({{"depth.npy", bytes_of(folder / "a.npy")}}, true));
+  write_bytes(folder / "stored.npz", zip_archive({{"depth.npy", bytes_of(folder / "a.npy")}}, false));
+  write_bytes(folder / "deflated.npz", zip_archive({{"depth.npy", bytes_of(folder / "a.npy")}}, true));
   for (const char* name : {"a.npy", "stored.npz", "deflated.npz"}) {
     const NpyFile file(folder / name);
     ASSERT_EQ(file.shape(), array.shape()) << name;
@@ -181,7 +139,7 @@ TEST(Npz, members_are_found_by_name) {
   const std::string b = npy(dictionary("<f4", "(1,)"), raw<float>({2}));
   for (const bool deflate_them : {false, true}) {
     for (const bool zip64 : {false, true}) {
-      write_bytes(folder / "two.npz", zip({{"a.npy", a}, {"b.npy", b}}, deflate_them, zip64));
+      write_bytes(folder / "two.npz", zip_archive({{"a.npy", a}, {"b.npy", b}}, deflate_them, zip64));
       EXPECT_EQ(read_npz(folder / "two.npz", "a")[0], 1);
       EXPECT_EQ(read_npz(folder / "two.npz", "b.npy")[0], 2);
       EXPECT_THROW(read_npz(folder / "two.npz"), InputError);
@@ -240,7 +198,7 @@ TEST(NpzHostile, truncations_and_flipped_bytes_never_crash) {
   const TempFolder folder;
   const std::string member = npy(dictionary("<f4", "(2, 2)"), raw<float>({1, 2, 3, 4}));
   for (const bool deflate_them : {false, true}) {
-    const std::string whole = zip({{"a.npy", member}}, deflate_them);
+    const std::string whole = zip_archive({{"a.npy", member}}, deflate_them);
     for (size_t at = 0; at < whole.size(); ++at) {
       write_bytes(folder / "cut.npz", whole.substr(0, at));
       EXPECT_THROW(read_npz(folder / "cut.npz"), InputError) << at;

@@ -1,0 +1,196 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "base/error.h"
+#include "capture/capture.h"
+#include "fake_capture.h"
+#include "files/npy.h"
+
+namespace traceflow {
+namespace {
+
+using json = nlohmann::json;
+
+// Loading must fail with an InputError that names the file and the field.
+void expect_refused(const std::filesystem::path& folder, const std::string& file, const std::string& field) {
+  try {
+    load_capture(folder, {});
+    ADD_FAILURE() << file << " " << field << " was accepted";
+  } catch (const InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find(file), std::string::npos) << text;
+    EXPECT_NE(text.find(field), std::string::npos) << text;
+  }
+}
+
+TEST(HostileCapture, missing_folders_and_files) {
+  const TempFolder empty;
+  expect_refused(empty / "nowhere", "nowhere", "");
+  expect_refused(empty.path(), "dataset.json", "no such file");
+  for (const char* name : {"dataset.json", "metadata.json", "scene.json"}) {
+    NerfDsCapture fake(1);
+    fake.save();
+    std::filesystem::remove(fake.path() / name);
+    expect_refused(fake.path(), name, "");
+  }
+}
+
+TEST(HostileCapture, broken_json_in_every_file) {
+  for (const char* name : {"dataset.json", "metadata.json", "scene.json", "camera/000000_left.json"}) {
+    for (const std::string& text :
+         {std::string(), std::string("{"), std::string("[]"), std::string("null"),
+          std::string("{\"a\": NaN}"), std::string("\xff\xfe{}"), std::string(100000, '[')}) {
+      NerfDsCapture fake(1);
+      fake.save();
+      fake.write_text(name, text);
+      expect_refused(fake.path(), name, "");
+    }
+  }
+}
+
+TEST(HostileCapture, every_prefix_of_a_camera_is_refused) {
+  NerfDsCapture fake(1);
+  fake.save();
+  const std::string whole = fake.cameras["000000_left"].dump();
+  for (size_t length = 0; length < whole.size(); length += 5) {
+    fake.write_text("camera/000000_left.json", whole.substr(0, length));
+    expect_refused(fake.path(), "camera/000000_left.json", "");
+  }
+}
+
+TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
+  const std::vector<std::pair<std::string, std::vector<json>>> bad = {
+      {"orientation",
+       {nullptr,
+        3,
+        json::array(),
+        {{1, 0}, {0, 1}},
+        {{2, 0, 0}, {0, 1, 0}, {0, 0, 1}},
+        {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}},
+        {{1, 0, 0}, {0, -1, 0}, {0, 0, 1}},
+        {{1, 0, 0}, {0, 1, 0}, {0, 0, "1"}},
+        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1e308}}}},
+      {"position", {nullptr, "here", {1, 2}, {1, 2, nullptr}, {1, 2, 3, 4}}},
+      {"focal_length", {nullptr, 0, -5, "10", json::array({10})}},
+      {"principal_point", {nullptr, 6, {6}, {"6", "4"}}},
+      {"image_size", {nullptr, 12, {0, 8}, {-12, 8}, {12}}},
+      {"pixel_aspect_ratio", {0, -1, "1"}},
+      {"skew", {"0", {0}}},
+      {"radial_distortion", {0.1, {0.1}, {0.1, 0.1, "0"}, {-50, 0, 0}, {1e300, 0, 0}}},
+      {"tangential_distortion", {0.1, {0.1, 0.1, 0.1}}},
+      {"tangential", {0.1, {0.1}}}};
+  for (const auto& [field, values] : bad) {
+    for (const json& value : values) {
+      NerfDsCapture fake(1);
+      fake.cameras["000000_left"][field] = value;
+      fake.save();
+      const std::string named = field == "tangential_distortion" ? "tangential" : field;
+      expect_refused(fake.path(), "camera/000000_left.json", named);
+    }
+  }
+}
+
+TEST(HostileCapture, scene_fields) {
+  const std::vector<std::pair<std::string, std::vector<json>>> bad = {
+      {"center", {nullptr, 1, {1, 2}, {1, 2, "3"}}},
+      {"scale", {nullptr, 0, -1, "1"}},
+      {"near", {"0.1"}},
+      {"far", {0.05, "2"}}};
+  for (const auto& [field, values] : bad) {
+    for (const json& value : values) {
+      NerfDsCapture fake(1);
+      fake.scene[field] = value;
+      fake.save();
+      expect_refused(fake.path(), "scene.json", field);
+    }
+  }
+}
+
+TEST(HostileCapture, dataset_and_metadata_fields) {
+  const std::vector<std::pair<std::string, json>> bad = {
+      {"train_ids", "all"},     {"train_ids", {1.5}},
+      {"train_ids", {nullptr}}, {"train_ids", {"../../etc/passwd"}},
+      {"train_ids", {""}},      {"train_ids", {".."}},
+      {"val_ids", {{"a", 1}}}};
+  for (const auto& [field, value] : bad) {
+    NerfDsCapture fake(1);
+    fake.dataset[field] = value;
+    fake.save();
+    expect_refused(fake.path(), "dataset.json", field);
+  }
+  for (const json& time : {json("zero"), json(-1), json(nullptr), json::array({0})}) {
+    NerfDsCapture fake(1);
+    fake.metadata["000000_left"] = {{"time_id", time}};
+    fake.save();
+    expect_refused(fake.path(), "metadata.json", "000000_left");
+  }
+  NerfDsCapture fake(1);
+  fake.dataset = json::object();
+  fake.save();
+  expect_refused(fake.path(), "dataset.json", "train_ids");
+}
+
+TEST(HostileCapture, nothing_to_train_on) {
+  NerfDsCapture fake(1);
+  std::filesystem::remove(fake.path() / "rgb/1x/000000_left.png");
+  fake.save();
+  expect_refused(fake.path(), "training views", "");
+  std::filesystem::remove_all(fake.path() / "rgb");
+  expect_refused(fake.path(), "rgb", "no images");
+  std::filesystem::create_directories(fake.path() / "rgb/2x");
+  expect_refused(fake.path(), "rgb", "2x");
+}
+
+TEST(HostileCapture, broken_pixels_and_arrays) {
+  for (const char* name :
+       {"rgb/1x/000000_left.png", "mask/1x/000000_left.png.png", "resized_mask/1x/000000_left.png.png",
+        "normal/1x/000000_left.png", "points.npy", "normal.npy", "normal.npz"}) {
+    for (const std::string& bytes : {std::string(), std::string("text"), std::string("\x89PNG\r\n\x1a\n")}) {
+      NerfDsCapture fake(1);
+      fake.save();
+      fake.write_text(name, bytes);
+      expect_refused(fake.path(), name, "");
+    }
+  }
+}
+
+TEST(HostileCapture, points_of_other_shapes) {
+  for (const Shape& shape : {Shape{5}, Shape{5, 2}, Shape{5, 3, 1}}) {
+    NerfDsCapture fake(1);
+    fake.save();
+    write_npy(fake.path() / "points.npy", Tensor<float>(shape));
+    expect_refused(fake.path(), "points.npy", "shape");
+  }
+  NerfDsCapture fake(1);
+  fake.save();
+  write_npy(fake.path() / "points.npy", Tensor<float>({0, 3}));
+  EXPECT_TRUE(load_capture(fake.path(), {}).points.empty());
+}
+
+TEST(HostileCapture, a_photograph_cut_short_fails_when_it_is_decoded) {
+  NerfDsCapture fake(1);
+  fake.save();
+  const auto path = fake.path() / "rgb/1x/000000_left.png";
+  const Capture capture = load_capture(fake.path(), {});
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) - 20);
+  EXPECT_THROW(load_images(capture, capture.train[0]), InputError);
+  fake.write_image("rgb/1x/000000_left.png", Tensor<uint8_t>({2, 2, 3}));
+  EXPECT_THROW(load_images(capture, capture.train[0]), InputError);
+}
+
+TEST(HostileCapture, options_out_of_range) {
+  NerfDsCapture fake(1);
+  fake.save();
+  for (const int downscale : {0, -1, 65}) {
+    CaptureOptions options;
+    options.downscale = downscale;
+    EXPECT_THROW(load_capture(fake.path(), options), InputError);
+  }
+  CaptureOptions options;
+  options.cache_mebibytes = -1;
+  EXPECT_THROW(load_capture(fake.path(), options), InputError);
+}
+
+}  // namespace
+}  // namespace traceflow
