@@ -10,6 +10,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "base/device.h"
 #include "base/error.h"
@@ -37,8 +38,8 @@ class Shape {
 };
 
 // A contiguous row-major array that owns its memory (64-byte aligned) and knows its device. Copies are deep.
-// T is a plain number. resize() keeps the allocation where it is large enough, so a tensor kept across iterations stops
-// allocating; the content after resize() is unspecified.
+// T is a plain number. resize() keeps the allocation where it is large enough, so a tensor kept across
+// iterations stops allocating; the content after resize() is unspecified.
 template <class T>
 class Tensor {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -50,14 +51,19 @@ class Tensor {
     zero();
   }
   Tensor(const Tensor& other) : device_(other.device_) { *this = other; }
-  Tensor(Tensor&&) noexcept = default;
+  // A tensor that was moved from is empty.
+  Tensor(Tensor&& other) noexcept { swap(other); }
   Tensor& operator=(const Tensor& other) {
     if (this == &other) return *this;
     resize(other.shape_);
     std::copy(other.data(), other.data() + other.size(), data());
     return *this;
   }
-  Tensor& operator=(Tensor&&) noexcept = default;
+  Tensor& operator=(Tensor&& other) noexcept {
+    Tensor taken(std::move(other));
+    swap(taken);
+    return *this;
+  }
   ~Tensor() = default;
 
   const Shape& shape() const { return shape_; }
@@ -79,7 +85,9 @@ class Tensor {
   const T& operator[](int64_t i) const { return memory_.get()[i]; }
   T& operator()(int64_t i, int64_t j) { return memory_.get()[i * shape_[1] + j]; }
   const T& operator()(int64_t i, int64_t j) const { return memory_.get()[i * shape_[1] + j]; }
-  T& operator()(int64_t i, int64_t j, int64_t k) { return memory_.get()[(i * shape_[1] + j) * shape_[2] + k]; }
+  T& operator()(int64_t i, int64_t j, int64_t k) {
+    return memory_.get()[(i * shape_[1] + j) * shape_[2] + k];
+  }
   const T& operator()(int64_t i, int64_t j, int64_t k) const {
     return memory_.get()[(i * shape_[1] + j) * shape_[2] + k];
   }
@@ -101,6 +109,14 @@ class Tensor {
   void fill(T value) { std::fill(data(), data() + size_, value); }
   void zero() { fill(T{}); }
 
+  void swap(Tensor& other) noexcept {
+    std::swap(memory_, other.memory_);
+    std::swap(shape_, other.shape_);
+    std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
+    std::swap(device_, other.device_);
+  }
+
  private:
   static constexpr std::align_val_t alignment{64};
   struct Free {
@@ -117,7 +133,8 @@ class Tensor {
 template <class To, class From>
 Tensor<To> convert(const Tensor<From>& from) {
   Tensor<To> to(from.shape());
-  std::transform(from.data(), from.data() + from.size(), to.data(), [](From v) { return static_cast<To>(v); });
+  std::transform(from.data(), from.data() + from.size(), to.data(),
+                 [](From v) { return static_cast<To>(v); });
   return to;
 }
 
