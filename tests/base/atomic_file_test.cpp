@@ -1,0 +1,82 @@
+#include "base/atomic_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <fstream>
+#include <iterator>
+
+#include "base/error.h"
+#include "support/temp_folder.h"
+
+namespace traceflow {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contents(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+std::string refusal(const fs::path& path) {
+  try {
+    write_atomically(path, "text");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+int64_t entries(const fs::path& folder) {
+  return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
+}
+
+TEST(AtomicFile, HoldsExactlyTheBytesGiven) {
+  const TempFolder folder;
+  const std::array<std::byte, 4> bytes{std::byte{0}, std::byte{255}, std::byte{10}, std::byte{13}};
+  write_atomically(folder / "bytes", std::span<const std::byte>(bytes));
+  EXPECT_EQ(contents(folder / "bytes"), std::string("\0\xFF\n\r", 4));
+  write_atomically(folder / "empty", "");
+  EXPECT_EQ(contents(folder / "empty"), "");
+  EXPECT_TRUE(fs::exists(folder / "empty"));
+  const std::string large(3'000'000, 'x');
+  write_atomically(folder / "large", large);
+  EXPECT_EQ(contents(folder / "large"), large);
+}
+
+TEST(AtomicFile, ReplacesTheOldFileAndLeavesNothingElse) {
+  const TempFolder folder;
+  write_atomically(folder / "file", "a long first version");
+  write_atomically(folder / "file", "second");
+  EXPECT_EQ(contents(folder / "file"), "second");
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(AtomicFile, ARefusalNamesTheFileAndTheReason) {
+  const TempFolder folder;
+  const fs::path missing = folder / "missing" / "file";
+  EXPECT_THAT(refusal(missing), testing::AllOf(testing::HasSubstr(missing.string()),
+                                               testing::HasSubstr("No such file or directory")));
+}
+
+// The name is taken by a folder: the rename fails after all bytes were written.
+TEST(AtomicFile, AFailedRenameLeavesNoPartBehind) {
+  const TempFolder folder;
+  fs::create_directory(folder / "taken");
+  EXPECT_THAT(refusal(folder / "taken"), testing::HasSubstr("rename"));
+  EXPECT_TRUE(fs::is_directory(folder / "taken"));
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(AtomicFile, ARefusalKeepsTheOldFile) {
+  const TempFolder folder;
+  write_atomically(folder / "file", "old");
+  fs::create_directory(folder / "file.partial");  // stands where the temporary file would
+  EXPECT_NE(refusal(folder / "file"), "");
+  EXPECT_EQ(contents(folder / "file"), "old");
+}
+
+}  // namespace
+}  // namespace traceflow
