@@ -1,0 +1,171 @@
+#include <benchmark/benchmark.h>
+
+#include <ctime>
+
+#include "base/parallel.h"
+#include "base/random.h"
+#include "ops/trace/trace.h"
+#include "trace_embree.h"
+
+// The tracer on 100,000 surfels in a shell around a mirror ball, seen by the rays that the ball reflects into
+// a camera. One thread, CPU time. Embree runs in the same program on the same surfels and rays.
+namespace traceflow {
+namespace {
+
+constexpr int64_t surfel_count = 100000;
+
+struct Setting {
+  int sh_degree;
+  double opacity_min, opacity_max;
+};
+constexpr Setting faint{3, 0.05, 0.5};       // rays cross the whole shell
+constexpr Setting faint_flat{0, 0.05, 0.5};  // the same without SH
+constexpr Setting opaque{3, 0.3, 0.99};      // rays end early
+
+PosedSurfels make_shell(const Setting& setting) {
+  Random random(1);
+  PosedSurfels s;
+  s.position.resize({surfel_count, 3});
+  s.scale.resize({surfel_count, 2});
+  s.rotation.resize({surfel_count, 4});
+  s.opacity.resize({surfel_count});
+  s.sh.resize({surfel_count, sh_coefficients(setting.sh_degree), 3});
+  for (int64_t i = 0; i < surfel_count; ++i) {
+    const Vec3<double> out = glm::normalize(Vec3<double>(random.normal(), random.normal(), random.normal()));
+    store3(s.position.row(i), random.uniform(5, 8) * out);
+    for (int k = 0; k < 2; ++k) s.scale(i, k) = static_cast<float>(0.085 * std::exp(0.3 * random.normal()));
+    for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(random.normal());
+    s.opacity[i] = static_cast<float>(random.uniform(setting.opacity_min, setting.opacity_max));
+    for (int64_t k = 0; k < s.sh.row_size(); ++k) s.sh.row(i)[k] = static_cast<float>(0.1 * random.normal());
+  }
+  return s;
+}
+
+struct Rays {
+  Tensor<float> origins, directions;
+};
+
+// A camera at z = -4 looks at a ball of radius 1 whose surface is a little uneven; pixels in rows, as a
+// renderer has them.
+Rays reflect_off_ball(int size, double unevenness) {
+  Random random(2);
+  std::vector<Vec3<double>> origins, directions;
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const double px = 2 * (x + 0.5) / size - 1, py = 2 * (y + 0.5) / size - 1;
+      if (px * px + py * py > 0.9) continue;
+      const Vec3<double> point(px, py, -std::sqrt(1 - px * px - py * py));
+      const Vec3<double> noise(random.normal(), random.normal(), random.normal());
+      const Vec3<double> normal = glm::normalize(point + unevenness * noise);
+      const Vec3<double> in = glm::normalize(point - Vec3<double>(0, 0, -4));
+      origins.push_back(point);
+      directions.push_back(glm::normalize(in - 2 * dot(in, normal) * normal));
+    }
+  }
+  const auto n = static_cast<int64_t>(origins.size());
+  Rays rays{Tensor<float>({n, 3}), Tensor<float>({n, 3})};
+  for (int64_t r = 0; r < n; ++r) {
+    store3(rays.origins.row(r), origins[static_cast<size_t>(r)]);
+    store3(rays.directions.row(r), directions[static_cast<size_t>(r)]);
+  }
+  return rays;
+}
+
+double cpu_seconds() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+template <class F>
+double fastest(int repeats, F&& f) {
+  double best = std::numeric_limits<double>::max();
+  for (int i = 0; i < repeats; ++i) {
+    const double start = cpu_seconds();
+    f();
+    best = std::min(best, cpu_seconds() - start);
+  }
+  return best;
+}
+
+// The share of rays whose colour differs by more than 1/255: how far two tracers agree.
+double share_differing(const trace::Output& a, const trace::Output& b) {
+  int64_t differing = 0;
+  for (int64_t r = 0; r < a.alpha.size(); ++r) {
+    const Vec3<float> d = glm::abs(load3<float>(a.colour.row(r)) - load3<float>(b.colour.row(r)));
+    if (!(std::max({d.x, d.y, d.z}) <= 1.0F / 255)) ++differing;
+  }
+  return static_cast<double>(differing) / static_cast<double>(a.alpha.size());
+}
+
+void against_embree(benchmark::State& state, const Setting& setting, double unevenness) {
+  set_threads(1);
+  const PosedSurfels surfels = make_shell(setting);
+  const Rays rays = reflect_off_ball(256, unevenness);
+  const trace::Options options;
+  const bench::EmbreeTracer<16> embree16(surfels, options);
+  const bench::EmbreeTracer<48> embree48(surfels, options);
+  const trace::BvhPtr bvh = trace::make_bvh();
+  const trace::SavedPtr saved = trace::make_saved();
+  trace::build(surfels, options, *bvh);
+  trace::Output own, other;
+  double own_time = 1e9, time16 = 1e9, time48 = 1e9;
+  for (auto _ : state) {
+    own_time = std::min(own_time, fastest(3, [&] {
+                          trace::forward(surfels, *bvh, rays.origins, rays.directions, options, own, nullptr);
+                        }));
+    time16 = std::min(time16, fastest(2, [&] { embree16.forward(rays.origins, rays.directions, other); }));
+    time48 = std::min(time48, fastest(2, [&] { embree48.forward(rays.origins, rays.directions, other); }));
+  }
+  trace::forward(surfels, *bvh, rays.origins, rays.directions, options, own, saved.get());
+  const auto n = static_cast<double>(rays.origins.dim(0));
+  state.counters["hits_per_ray"] = static_cast<double>(trace::blended_hits(*saved)) / n;
+  state.counters["Mrays/s"] = 1e-6 * n / own_time;
+  state.counters["embree16_Mrays/s"] = 1e-6 * n / time16;
+  state.counters["embree48_Mrays/s"] = 1e-6 * n / time48;
+  state.counters["ratio16"] = time16 / own_time;
+  state.counters["ratio48"] = time48 / own_time;
+  state.counters["differing"] = share_differing(own, other);
+}
+BENCHMARK_CAPTURE(against_embree, faint, faint, 0.0)->Unit(benchmark::kMillisecond)->Iterations(3);
+BENCHMARK_CAPTURE(against_embree, faint_flat, faint_flat, 0.0)->Unit(benchmark::kMillisecond)->Iterations(3);
+BENCHMARK_CAPTURE(against_embree, faint_uneven, faint, 0.2)->Unit(benchmark::kMillisecond)->Iterations(3);
+BENCHMARK_CAPTURE(against_embree, opaque, opaque, 0.0)->Unit(benchmark::kMillisecond)->Iterations(3);
+
+void forward(benchmark::State& state, const Setting& setting, double unevenness) {
+  set_threads(1);
+  const PosedSurfels surfels = make_shell(setting);
+  const Rays rays = reflect_off_ball(256, unevenness);
+  trace::Options options;
+  options.hits_per_pass = static_cast<int>(state.range(0));
+  const trace::BvhPtr bvh = trace::make_bvh();
+  trace::build(surfels, options, *bvh);
+  trace::Output output;
+  for (auto _ : state) {
+    trace::forward(surfels, *bvh, rays.origins, rays.directions, options, output, nullptr);
+  }
+  state.SetItemsProcessed(state.iterations() * rays.origins.dim(0));
+}
+BENCHMARK_CAPTURE(forward, faint, faint, 0.0)
+    ->Unit(benchmark::kMillisecond)
+    ->Arg(4)
+    ->Arg(8)
+    ->Arg(16)
+    ->Arg(64);
+BENCHMARK_CAPTURE(forward, opaque, opaque, 0.0)
+    ->Unit(benchmark::kMillisecond)
+    ->Arg(4)
+    ->Arg(8)
+    ->Arg(16)
+    ->Arg(64);
+
+void build(benchmark::State& state) {
+  set_threads(static_cast<int>(state.range(0)));
+  const PosedSurfels surfels = make_shell(faint);
+  const trace::BvhPtr bvh = trace::make_bvh();
+  for (auto _ : state) trace::build(surfels, {}, *bvh);
+}
+BENCHMARK(build)->Unit(benchmark::kMillisecond)->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime();
+
+}  // namespace
+}  // namespace traceflow

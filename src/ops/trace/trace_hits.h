@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/tensor.h"
+
+namespace traceflow::trace {
+
+// The hits of one ray while it is traced. Arrays apart, with room for a vector beyond the last.
+struct Hits {
+  float* distance = nullptr;
+  float* alpha = nullptr;
+  uint32_t* surfel = nullptr;
+  size_t count = 0;
+
+  void reserve_more(size_t more) {
+    if (count + more + slack > capacity_) grow(count + more + slack);
+  }
+  friend void swap(Hits& a, Hits& b) noexcept;
+
+ private:
+  static constexpr size_t slack = 16;
+  void grow(size_t wanted);
+
+  Tensor<float> distances_, alphas_;
+  Tensor<uint32_t> surfels_;
+  size_t capacity_ = 0;
+};
+
+// Puts hits in order of distance, those of equal distance in order of surfel.
+class HitSorter {
+ public:
+  // Up to so many hits each is placed by counting the ones before it.
+  static constexpr size_t most_ranked = 192;
+
+  void place(const uint32_t* rank, Hits& hits);
+  void sort_many(Hits& hits);
+
+ private:
+  Hits sorted_;
+  Tensor<uint64_t> keys_;
+};
+
+}  // namespace traceflow::trace

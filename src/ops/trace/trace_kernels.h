@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "math/spherical_harmonics.h"
+#include "math/types.h"
+#include "ops/trace/trace.h"
+#include "ops/trace/trace_hits.h"
+#include "ops/trace/trace_usable.h"
+
+// What the tracer's forward and backward passes share.
+namespace traceflow::trace {
+
+inline constexpr int64_t rays_per_block = 256;
+
+// The hits of a block of rays as they were blended, ray after ray, front to back.
+struct SavedBlock {
+  std::vector<uint32_t> surfel;
+  std::vector<float> distance;  // scene units
+  std::vector<float> alpha;
+  std::vector<uint32_t> ray_end;  // of each ray of the block, where its hits end
+
+  void append(const Hits& hits, size_t count) {
+    surfel.insert(surfel.end(), hits.surfel, hits.surfel + count);
+    distance.insert(distance.end(), hits.distance, hits.distance + count);
+    alpha.insert(alpha.end(), hits.alpha, hits.alpha + count);
+  }
+  void end_ray() { ray_end.push_back(static_cast<uint32_t>(surfel.size())); }
+  void clear() {
+    surfel.clear();
+    distance.clear();
+    alpha.clear();
+    ray_end.clear();
+  }
+};
+
+struct Saved {
+  std::vector<SavedBlock> blocks;
+  int64_t rays = 0;
+};
+
+// One block of rays of a forward pass.
+struct BlockTask {
+  const PosedSurfels& surfels;
+  const Bvh& bvh;
+  const Tensor<float>& origins;
+  const Tensor<float>& directions;
+  const Options& options;
+  int64_t begin, end;
+  Output& output;
+  SavedBlock* saved;  // may be null
+};
+
+// A ray as it is traced: its direction of unit length, so that t is a distance.
+struct UnitRay {
+  Vec3<float> origin{0};
+  Vec3<float> direction{0};
+  float length = 0;  // of the caller's direction
+};
+
+// False for a ray that sees the background only. Scales first, so that no square over- or underflows.
+inline bool make_unit_ray(const float* origin, const float* direction, UnitRay& ray) {
+  if (!is_traceable(origin, direction)) return false;
+  const Vec3<float> d = load3<float>(direction);
+  const float largest = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+  const Vec3<float> scaled = d / largest;
+  const float scaled_length = std::sqrt(dot(scaled, scaled));
+  ray = {load3<float>(origin), scaled / scaled_length, largest * scaled_length};
+  return std::isfinite(ray.length);
+}
+
+// The SH basis of a direction, padded with zeros so that vectors may be loaded from any coefficient on.
+inline constexpr int padded_basis = 32;
+inline void padded_sh_basis(int degree, const Vec3<float>& direction, float* basis) {
+  std::fill_n(basis, padded_basis, 0.0F);
+  sh_basis(degree, direction, basis);
+}
+
+}  // namespace traceflow::trace

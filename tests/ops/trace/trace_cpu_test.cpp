@@ -1,0 +1,247 @@
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <numeric>
+
+#include "base/parallel.h"
+#include "ops/trace/trace.h"
+#include "ops/trace/trace_run.h"
+#include "ops/trace/trace_scene.h"
+
+namespace traceflow::trace {
+namespace {
+
+// How many of a tensor's numbers are farther than `tolerance` from those of the reference.
+int64_t count_far(const Tensor<float>& fast, const Tensor<double>& truth, double tolerance) {
+  EXPECT_EQ(fast.size(), truth.size());
+  int64_t far = 0;
+  for (int64_t i = 0; i < fast.size(); ++i) far += !(std::abs(fast[i] - truth[i]) <= tolerance);
+  return far;
+}
+
+double root_mean_square(const Tensor<double>& t) {
+  double sum = 0;
+  for (const double v : t.values()) sum += v * v;
+  return std::sqrt(sum / static_cast<double>(std::max<int64_t>(1, t.size())));
+}
+
+// A hit near alpha_min or two hits at almost one distance may fall either way in single precision: a bounded
+// share.
+void expect_output_near(const Output& fast, const BasicOutput<double>& truth, double flips) {
+  const double rays = static_cast<double>(fast.alpha.size());
+  EXPECT_LE(count_far(fast.colour, truth.colour, 2e-4), 3 * flips * rays);
+  EXPECT_LE(count_far(fast.alpha, truth.alpha, 2e-4), flips * rays);
+  EXPECT_LE(count_far(fast.distance, truth.distance, 2e-3), flips * rays);
+}
+
+void expect_matches_reference(const TestScene& scene, const Options& options, double flips) {
+  const Traced fast = trace(scene, options);
+  const auto surfels = convert<double>(scene.surfels);
+  const auto origins = convert<double>(scene.origins), directions = convert<double>(scene.directions);
+  BasicOutput<double> truth;
+  forward_reference(surfels, origins, directions, options, truth);
+  expect_output_near(fast.output, truth, flips);
+}
+
+TEST(Trace, MatchesTheReferenceAtEveryDegree) {
+  for (int degree = 0; degree <= 3; ++degree) {
+    SceneOptions o;
+    o.surfels = 2000;
+    o.rays = 700;
+    o.sh_degree = degree;
+    o.scale_min = 0.02;
+    o.scale_max = 0.2;
+    expect_matches_reference(random_scene(static_cast<uint64_t>(degree), o), {}, 0.01);
+  }
+}
+
+TEST(Trace, MatchesTheReferenceWhereEveryRayEndsEarly) {
+  SceneOptions o;
+  o.surfels = 3000;
+  o.rays = 500;
+  o.scale_min = 0.05;
+  o.scale_max = 0.3;
+  o.opacity_min = 0.9;
+  o.opacity_max = 1.0;
+  Options options;
+  options.hits_per_pass = 2;
+  options.background = {0.1F, 0.2F, 0.3F};
+  expect_matches_reference(random_scene(11, o), options, 0.01);
+}
+
+TEST(Trace, MatchesTheReferenceFromInsideTheScene) {
+  SceneOptions o;
+  o.surfels = 1000;
+  o.rays = 500;
+  o.ray_distance = 0.3;
+  o.scale_min = 0.05;
+  Options options;
+  options.t_min = 0.1F;
+  expect_matches_reference(random_scene(12, o), options, 0.01);
+}
+
+// Faint, wide surfels and a far cut-off: nothing flips, so that gradients agree everywhere.
+TEST(Trace, GradientsMatchTheReference) {
+  for (int degree = 0; degree <= 3; ++degree) {
+    SceneOptions o;
+    o.surfels = 300;
+    o.rays = 700;
+    o.sh_degree = degree;
+    o.opacity_max = 0.6;
+    const TestScene scene = random_scene(20 + static_cast<uint64_t>(degree), o);
+    Options options;
+    options.alpha_min = 1e-9F;
+    options.background = {0.4F, 0.1F, 0.2F};
+    const Traced fast = trace(scene, options, 5);
+    BasicInputGradient<double> truth;
+    backward_reference(convert<double>(scene.surfels), convert<double>(scene.origins),
+                       convert<double>(scene.directions), options,
+                       random_output_gradient(5, scene.origins.dim(0)), truth);
+    const auto expect_near = [&](const Tensor<float>& a, const Tensor<double>& b, const char* name) {
+      EXPECT_EQ(count_far(a, b, 5e-3 * root_mean_square(b)), 0) << name << " degree " << degree;
+    };
+    expect_near(fast.gradient.surfels.position, truth.surfels.position, "position");
+    expect_near(fast.gradient.surfels.scale, truth.surfels.scale, "scale");
+    expect_near(fast.gradient.surfels.rotation, truth.surfels.rotation, "rotation");
+    expect_near(fast.gradient.surfels.opacity, truth.surfels.opacity, "opacity");
+    expect_near(fast.gradient.surfels.sh, truth.surfels.sh, "sh");
+    expect_near(fast.gradient.origins, truth.origins, "origins");
+    expect_near(fast.gradient.directions, truth.directions, "directions");
+  }
+}
+
+TEST(Trace, PositionGradientIsTheNormTimesHalfTheDistance) {
+  TestScene scene{make_surfels(1, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  set_facing(scene.surfels, 0, 2, 0.5F, 0.8F);
+  scene.origins(0, 0) = 0.3F;
+  scene.directions(0, 2) = 4;
+  const Traced t = trace(scene, {});
+  const Vec3<float> g = load3<float>(t.gradient.surfels.position.row(0));
+  EXPECT_GT(glm::length(g), 0);
+  EXPECT_NEAR(t.gradient.position_gradient[0], glm::length(g) * 2 / 2, 1e-6);
+}
+
+TEST(Trace, HitsPerPassChangesNothing) {
+  SceneOptions o;
+  o.surfels = 3000;
+  o.rays = 600;
+  o.scale_max = 0.3;
+  for (const double opacity : {0.3, 0.99}) {
+    o.opacity_max = opacity;
+    const TestScene scene = random_scene(31, o);
+    Options options;
+    options.hits_per_pass = 1;
+    const Traced one = trace(scene, options);
+    for (const int k : {4, 64, 100000}) {
+      options.hits_per_pass = k;
+      const Traced other = trace(scene, options);
+      EXPECT_TRUE(same_bytes(one.output, other.output)) << k;
+      EXPECT_TRUE(same_bytes(one.gradient, other.gradient)) << k;
+    }
+  }
+}
+
+TEST(Trace, SameBytesAtAnyNumberOfThreads) {
+  SceneOptions o;
+  o.surfels = 40000;
+  o.rays = 3000;
+  o.scale_min = 0.02;
+  o.scale_max = 0.1;
+  const TestScene scene = random_scene(41, o);
+  set_threads(1);
+  const Traced one = trace(scene, {});
+  for (const int threads : {2, 3}) {
+    set_threads(threads);
+    const Traced other = trace(scene, {});
+    EXPECT_TRUE(same_bytes(one.output, other.output)) << threads;
+    EXPECT_TRUE(same_bytes(one.gradient, other.gradient)) << threads;
+  }
+  set_threads(0);
+}
+
+template <class T>
+Tensor<T> permuted(const Tensor<T>& from, const std::vector<int64_t>& order) {
+  Tensor<T> to(from.shape());
+  for (size_t i = 0; i < order.size(); ++i) {
+    std::copy_n(from.row(order[i]), from.row_size(), to.row(static_cast<int64_t>(i)));
+  }
+  return to;
+}
+
+TEST(Trace, TheOrderOfTheSurfelsDoesNotMatter) {
+  SceneOptions o;
+  o.surfels = 2000;
+  o.rays = 500;
+  const TestScene scene = random_scene(51, o);
+  std::vector<int64_t> order(static_cast<size_t>(o.surfels));
+  std::iota(order.begin(), order.end(), 0);
+  Random random(9);
+  for (size_t i = order.size(); i-- > 1;) {
+    std::swap(order[i], order[static_cast<size_t>(random.below(static_cast<int64_t>(i) + 1))]);
+  }
+  const PosedSurfels& s = scene.surfels;
+  const TestScene shuffled{{permuted(s.position, order),
+                            permuted(s.scale, order),
+                            permuted(s.rotation, order),
+                            permuted(s.opacity, order),
+                            permuted(s.sh, order),
+                            {}},
+                           scene.origins,
+                           scene.directions};
+  const Traced a = trace(scene, {}), b = trace(shuffled, {});
+  EXPECT_TRUE(same_bytes(a.output, b.output));
+  EXPECT_TRUE(same_bytes(permuted(a.gradient.surfels.position, order), b.gradient.surfels.position));
+  EXPECT_TRUE(same_bytes(permuted(a.gradient.surfels.sh, order), b.gradient.surfels.sh));
+}
+
+TEST(Trace, HitsAtOneDistanceBlendInOrderOfIndex) {
+  TestScene scene{make_surfels(70, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  for (int64_t i = 0; i < 70; ++i) {
+    set_facing(scene.surfels, i, 1, 1, 0.5F);
+    for (int c = 0; c < 3; ++c)
+      scene.surfels.sh.row(i)[c] = static_cast<float>((i == 0 ? 0.5 : -0.5) / sh_c0);
+  }
+  scene.directions(0, 2) = 1;
+  for (const int k : {1, 64}) {
+    Options options;
+    options.hits_per_pass = k;
+    EXPECT_NEAR(trace(scene, options).output.colour(0, 0), 0.5, 1e-6);
+  }
+}
+
+// More hits on a ray than any buffer starts with.
+TEST(Trace, AnyNumberOfHits) {
+  constexpr int64_t count = 5000;
+  TestScene scene{make_surfels(count, 0), Tensor<float>({2, 3}), Tensor<float>({2, 3})};
+  for (int64_t i = 0; i < count; ++i)
+    set_facing(scene.surfels, i, 1 + 0.001F * static_cast<float>(i), 1, 0.004F);
+  scene.directions(0, 2) = 1;
+  scene.directions(1, 2) = 1;
+  scene.origins(1, 2) = 10;
+  scene.directions(1, 2) = -1;
+  const Traced t = trace(scene, {});
+  EXPECT_GT(t.hits, 4000);
+  BasicOutput<double> truth;
+  forward_reference(convert<double>(scene.surfels), convert<double>(scene.origins),
+                    convert<double>(scene.directions), {}, truth);
+  expect_output_near(t.output, truth, 0);
+}
+
+RC_GTEST_PROP(TraceProperty, FindsWhatBruteForceFinds, ()) {
+  SceneOptions o;
+  o.surfels = *rc::gen::inRange<int64_t>(0, 300);
+  o.rays = 20;
+  o.sh_degree = *rc::gen::inRange(0, 4);
+  o.scale_min = 1e-3;
+  o.scale_max = *rc::gen::element(0.01, 0.1, 1.0, 30.0);
+  o.opacity_min = 0;
+  o.opacity_max = *rc::gen::element(0.01, 0.5, 1.0);
+  o.ray_distance = *rc::gen::element(0.0, 0.5, 3.0, 100.0);
+  const auto seed = *rc::gen::arbitrary<uint64_t>();
+  Options options;
+  options.hits_per_pass = *rc::gen::inRange(1, 20);
+  expect_matches_reference(random_scene(seed, o), options, 0.1);
+}
+
+}  // namespace
+}  // namespace traceflow::trace
