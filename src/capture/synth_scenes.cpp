@@ -50,7 +50,7 @@ void add_room(AnimatedScene& scene) {
   wall(patterned(Pattern::checker, {0.80, 0.79, 0.76}, {0.70, 0.72, 0.76}, {2, 2}, 0.2), {0, 0, room_height},
        axis_x, pi);
   wall(patterned(Pattern::bricks, {0.62, 0.31, 0.22}, {0.78, 0.73, 0.66}, {4, 8}), {0, w, 0}, axis_x, pi / 2);
-  wall(patterned(Pattern::checker, {0.24, 0.40, 0.62}, {0.76, 0.78, 0.72}, {3, 3}), {0, -w, 0}, axis_x,
+  wall(patterned(Pattern::checker, {0.32, 0.46, 0.64}, {0.72, 0.75, 0.72}, {3, 3}), {0, -w, 0}, axis_x,
        -pi / 2);
   wall(patterned(Pattern::stripes, {0.32, 0.52, 0.42}, {0.66, 0.72, 0.56}, {0, 4}), {-w, 0, 0}, axis_y,
        pi / 2);

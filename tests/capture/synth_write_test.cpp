@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "capture/capture.h"
 #include "capture/synth.h"
 #include "files/npy.h"
 #include "files/png.h"
@@ -101,6 +102,54 @@ TEST(SynthWrite, CameraFileHoldsTheCamera) {
     }
   }
   EXPECT_EQ(camera["image_size"], json::array({32, 18}));
+}
+
+TEST(SynthWrite, ReaderFindsWhatWasWritten) {
+  const TempFolder temp;
+  SynthOptions options = tiny_options();
+  options.width = 96;
+  options.height = 54;
+  write_synthetic_capture(options, temp / "capture");
+  const Capture capture = load_capture(temp / "capture", {});
+  EXPECT_TRUE(capture.has_masks);
+  EXPECT_TRUE(capture.has_normal_priors);
+  EXPECT_TRUE(capture.has_truth);
+  EXPECT_TRUE(capture.warnings.empty()) << capture.warnings.front();
+  ASSERT_EQ(capture.train.size(), 6U);
+  ASSERT_EQ(capture.test.size(), 1U);
+
+  const SceneNormalisation normalisation = synth_normalisation();
+  for (const SynthView& view : synth_views(options)) {
+    const auto& found = view.is_test ? capture.test : capture.train;
+    const auto read = std::ranges::find(found, view.id, &View::id);
+    ASSERT_NE(read, found.end());
+    EXPECT_FLOAT_EQ(read->time, static_cast<float>(view.time));
+    const auto expected = (view.camera.position - normalisation.centre) * normalisation.scale;
+    EXPECT_LT(length(Vec3<double>(read->camera.position) - expected), 1e-6);
+    EXPECT_FLOAT_EQ(read->camera.focal_x, static_cast<float>(view.camera.focal_x));
+  }
+
+  const SynthImages images = synth_images(options, synth_views(options)[3]);
+  const ViewTruth truth = load_truth(capture, capture.test.front());
+  for (int64_t i = 0; i < images.depth.size(); ++i) {
+    ASSERT_NEAR(truth.depth[i], images.depth[i] * normalisation.scale, 1e-5);
+  }
+  for (int64_t i = 0; i < images.normal.size(); ++i) ASSERT_NEAR(truth.normal[i], images.normal[i], 0.02);
+}
+
+TEST(SynthWrite, PriorsReadAsWorldNormals) {
+  const TempFolder temp;
+  SynthOptions options = tiny_options();
+  options.prior_noise = 0;
+  write_synthetic_capture(options, temp / "capture");
+  const Capture capture = load_capture(temp / "capture", {});
+  const SynthView view = synth_views(options).front();
+  const SynthImages images = synth_images(options, view);
+  const auto read = load_images(capture, capture.train.front());
+  ASSERT_EQ(read->normal_prior.shape(), images.normal.shape());
+  for (int64_t i = 0; i < images.normal.size(); ++i)
+    ASSERT_NEAR(read->normal_prior[i], images.normal[i], 0.02);
+  EXPECT_TRUE(std::ranges::equal(read->mask.values(), images.mask.values()));
 }
 
 TEST(SynthWrite, SecondRunReplacesTheFirstWithTheSameBytesAndLeavesNothingStale) {
