@@ -1,6 +1,7 @@
 #include "ops/raster/raster.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 
@@ -39,6 +40,17 @@ void check_input(const PosedSurfels& surfels, const Camera<float>& camera) {
           "an image size from 0 to 2^20", std::to_string(camera.width) + "×" + std::to_string(camera.height));
 }
 
+void check_gradient(const OutputGradient& g, int64_t pixels) {
+  for (const auto* tensor : {&g.alpha, &g.tint, &g.depth, &g.median_depth, &g.distortion}) {
+    require(tensor->empty() || tensor->size() == pixels, "a gradient for every pixel",
+            tensor->shape().to_string());
+  }
+  for (const auto* tensor : {&g.colour, &g.normal}) {
+    require(tensor->empty() || tensor->size() == 3 * pixels, "a gradient for every pixel's vector",
+            tensor->shape().to_string());
+  }
+}
+
 }  // namespace
 
 void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Output& output,
@@ -52,6 +64,17 @@ void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Opt
   blend(options, output, kept);
 }
 
+void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
+              const Saved& saved, const OutputGradient& grad_output, InputGradient& gradient) {
+  options.validate();
+  check_input(surfels, camera);
+  require(saved.count == surfels.count() && saved.width == camera.width && saved.height == camera.height,
+          "backward follows forward of the same surfels and camera", std::to_string(surfels.count()));
+  check_gradient(grad_output, int64_t{camera.width} * camera.height);
+  blend_backward(options, saved, grad_output);
+  chain(surfels, camera, saved, gradient);
+}
+
 std::vector<uint8_t> visible(const Saved& saved) {
   std::vector<uint8_t> flags(static_cast<size_t>(saved.count));
   for (int64_t i = 0; i < saved.count; ++i) {
@@ -60,6 +83,12 @@ std::vector<uint8_t> visible(const Saved& saved) {
     flags[static_cast<size_t>(i)] = std::any_of(begin, end, [](uint16_t blocks) { return blocks != 0; });
   }
   return flags;
+}
+
+int64_t evaluations(const Saved& saved) {
+  int64_t blocks = 0;
+  for (const uint16_t touched : saved.touched.values()) blocks += std::popcount(touched);
+  return blocks * pixels_per_block;
 }
 
 }  // namespace traceflow::raster

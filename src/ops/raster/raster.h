@@ -96,6 +96,10 @@ void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Op
 // After forward with `saved`: M flags, 1 where the surfel touched at least one pixel's blend.
 std::vector<uint8_t> visible(const Saved& saved);
 
+// After forward with `saved`: the pairs of a pixel and a surfel in 4×4 blocks of pixels in which the surfel
+// was blended; what the speed is measured in.
+int64_t evaluations(const Saved& saved);
+
 // The plain truth: double precision, every pixel against every surfel, both sort orders, the cut-offs of the
 // contract only.
 void forward_reference(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera,

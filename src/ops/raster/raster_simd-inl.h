@@ -173,12 +173,18 @@ struct TileLists {
   uint32_t counts[blocks_per_tile];
 };
 
-HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, Tensor<uint32_t>& memory) {
+// Without the blocks' lists.
+HWY_INLINE TileLists tile_entries(const Saved& saved, int64_t tile) {
   TileLists lists{};
   lists.x = static_cast<int>(tile % saved.tile_columns) * tile_edge;
   lists.y = static_cast<int>(tile / saved.tile_columns) * tile_edge;
   lists.entries = saved.entries.data() + saved.tile_begin[tile];
   lists.count = saved.tile_begin[tile + 1] - saved.tile_begin[tile];
+  return lists;
+}
+
+HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, Tensor<uint32_t>& memory) {
+  TileLists lists = tile_entries(saved, tile);
   memory.resize({blocks_per_tile, lists.count});
   for (int b = 0; b < blocks_per_tile; ++b) lists.of_block[b] = memory.data() + int64_t{b} * lists.count;
   uint32_t in_image = 0;

@@ -1,0 +1,140 @@
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+#include "base/parallel.h"
+#include "base/random.h"
+#include "math/rotation.h"
+#include "math/spherical_harmonics.h"
+#include "ops/raster/raster.h"
+
+// How fast the rasteriser is on one core. The scene is like a trained capture: surfels that lie on the walls
+// of a room and on a ball in its middle, seen from inside the room; their size falls with their count, so
+// that they cover the surfaces about as often at any count. `evaluations` counts the pairs of a pixel and a
+// surfel for which the Gaussian is computed: the 16 pixels of every block of which at least one blended the
+// surfel.
+namespace traceflow::raster {
+namespace {
+
+struct Frame {
+  PosedSurfels surfels;
+  Camera<float> camera;
+  OutputGradient gradient;
+};
+
+// A point of the room's walls (a cube of side 4) or of the ball (radius 0.8) and its normal.
+std::pair<Vec3<double>, Vec3<double>> surface_point(Random& random) {
+  if (random.uniform() < 0.3) {
+    const double z = random.uniform(-1, 1);
+    const double angle = random.uniform(0, 2 * std::numbers::pi);
+    const Vec3<double> n(std::sqrt(1 - z * z) * std::cos(angle), std::sqrt(1 - z * z) * std::sin(angle), z);
+    return {0.8 * n, n};
+  }
+  const auto axis = static_cast<int>(random.below(3));
+  Vec3<double> p(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2));
+  Vec3<double> n(0.0);
+  n[axis] = random.uniform() < 0.5 ? -1 : 1;
+  p[axis] = -2 * n[axis];
+  return {p, n};
+}
+
+// The turn that takes z to n.
+Vec4<double> towards(const Vec3<double>& n) { return normalize(Vec4<double>(1 + n.z + 1e-9, -n.y, n.x, 0)); }
+
+PosedSurfels room(int64_t count) {
+  Random random(1);
+  PosedSurfels s;
+  s.position = Tensor<float>({count, 3});
+  s.scale = Tensor<float>({count, 2});
+  s.rotation = Tensor<float>({count, 4});
+  s.opacity = Tensor<float>({count});
+  s.sh = Tensor<float>({count, sh_coefficients(3), 3});
+  s.tint = Tensor<float>({count});
+  const double size = 1.1 * std::sqrt(100.0 / static_cast<double>(count));
+  for (int64_t i = 0; i < count; ++i) {
+    auto [p, n] = surface_point(random);
+    p += 0.02 * random.normal() * n;
+    n = normalize(n + 0.1 * Vec3<double>(random.normal(), random.normal(), random.normal()));
+    store3(s.position.row(i), p);
+    const auto q = towards(n);
+    for (int a = 0; a < 4; ++a) s.rotation(i, a) = static_cast<float>(q[a]);
+    for (int a = 0; a < 2; ++a)
+      s.scale(i, a) = static_cast<float>(size * std::exp(0.6 * random.normal() - 0.9));
+    s.opacity[i] = static_cast<float>(1 / (1 + std::exp(-1.5 * random.normal() - 0.5)));
+    for (int c = 0; c < 48; ++c) s.sh.row(i)[c] = static_cast<float>((c < 3 ? 0.8 : 0.1) * random.normal());
+    s.tint[i] = static_cast<float>(random.uniform());
+  }
+  return s;
+}
+
+Frame make_frame(int64_t count, int width) {
+  Frame frame;
+  frame.surfels = room(count);
+  const int height = width * 9 / 16;
+  const auto focal = static_cast<float>(0.8 * width);
+  // From (0, 0, -1.9), towards +z.
+  frame.camera = {width,
+                  height,
+                  focal,
+                  focal,
+                  0.5F * static_cast<float>(width),
+                  0.5F * static_cast<float>(height),
+                  Mat3<float>(1.0F),
+                  Vec3<float>(0, 0, -1.9F)};
+  Random random(2);
+  auto& g = frame.gradient;
+  for (auto* t : {&g.alpha, &g.tint, &g.depth}) *t = Tensor<float>({height, width});
+  for (auto* t : {&g.colour, &g.normal}) *t = Tensor<float>({height, width, 3});
+  for (auto* t : {&g.alpha, &g.tint, &g.depth, &g.colour, &g.normal}) {
+    for (float& v : t->values()) v = static_cast<float>(random.normal());
+  }
+  return frame;
+}
+
+const Frame& frame_of(const benchmark::State& state) {
+  static std::map<std::pair<int64_t, int64_t>, Frame> frames;
+  const auto key = std::make_pair(state.range(0), state.range(1));
+  const auto found = frames.find(key);
+  if (found != frames.end()) return found->second;
+  return frames.emplace(key, make_frame(key.first, static_cast<int>(key.second))).first->second;
+}
+
+void count(benchmark::State& state, const Saved& saved) {
+  const auto pairs = static_cast<double>(evaluations(saved));
+  state.counters["evaluations"] = pairs;
+  state.counters["evaluations/s"] = benchmark::Counter(pairs, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+void forward_one_core(benchmark::State& state) {
+  set_threads(1);
+  const Frame& frame = frame_of(state);
+  const auto saved = make_saved();
+  Output output;
+  for (auto step : state) forward(frame.surfels, frame.camera, {}, output, saved.get());
+  count(state, *saved);
+}
+
+void backward_one_core(benchmark::State& state) {
+  set_threads(1);
+  const Frame& frame = frame_of(state);
+  const auto saved = make_saved();
+  Output output;
+  InputGradient gradient;
+  forward(frame.surfels, frame.camera, {}, output, saved.get());
+  for (auto step : state) backward(frame.surfels, frame.camera, {}, *saved, frame.gradient, gradient);
+  count(state, *saved);
+}
+
+void sizes(benchmark::internal::Benchmark* b) {
+  b->Unit(benchmark::kMillisecond)->ArgNames({"surfels", "width"});
+  b->Args({12700, 240})->Args({12700, 480})->Args({50000, 240})->Args({50000, 480});
+}
+BENCHMARK(forward_one_core)->Apply(sizes);
+BENCHMARK(backward_one_core)->Apply(sizes);
+
+}  // namespace
+}  // namespace traceflow::raster
