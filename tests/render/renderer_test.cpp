@@ -1,0 +1,157 @@
+#include "render/renderer.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "base/parallel.h"
+#include "render/visibility.h"
+
+namespace traceflow {
+namespace {
+
+Surfels scattered(int64_t count, float spread, bool tint, Random& random) {
+  Surfels s;
+  s.position.reset({count, 3});
+  s.log_scale.reset({count, 2});
+  s.log_scale.fill(std::log(0.08F));
+  s.rotation.reset({count, 4});
+  s.opacity_logit.reset({count});
+  s.sh.reset({count, 4, 3});
+  if (tint) s.tint_logit.reset({count});
+  for (float& v : s.position.values()) v = spread * static_cast<float>(random.normal());
+  for (float& v : s.rotation.values()) v = static_cast<float>(random.normal());
+  for (float& v : s.sh.values()) v = 0.3F * static_cast<float>(random.normal());
+  return s;
+}
+
+// A cloud around the camera's target with an environment around everything; half of the cloud lies outside
+// the view.
+struct Fixture {
+  Scene scene;
+  FrameRequest request;
+
+  Fixture() {
+    Random random(3);
+    scene.main = scattered(600, 1.2F, true, random);
+    scene.environment = scattered(400, 3, false, random);
+    NetworkOptions network;
+    network.width = 16;
+    network.depth = 2;
+    network.skip = 0;
+    scene.main_field = make_field(network, residual::main_outputs, random);
+    for (float& v : scene.main_field->head_weight.values()) v = 0.05F * static_cast<float>(random.normal());
+    request.camera.width = 64;
+    request.camera.height = 48;
+    request.camera.focal_x = request.camera.focal_y = 70;
+    request.camera.centre_x = 32;
+    request.camera.centre_y = 24;
+    request.camera.position = {0, 0, -3};
+    request.time = 0.6F;
+    request.sh_degree_main = request.sh_degree_environment = 1;
+  }
+};
+
+void expect_equal(const Tensor<float>& a, const Tensor<float>& b, const char* name) {
+  ASSERT_EQ(a.size(), b.size()) << name;
+  for (int64_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i], b[i]) << name << " " << i;
+}
+
+TEST(Renderer, CullingChangesNoPixel) {
+  Fixture f;
+  Renderer renderer(RenderOptions{});
+  const Frame& whole = renderer.forward(f.scene, f.request);
+  const Tensor<float> colour = whole.colour;
+  const Tensor<float> depth = whole.raster.depth;
+  f.scene.main_reach = whole.reach;
+  f.request.cull = true;
+  const Frame& culled = renderer.forward(f.scene, f.request);
+  ASSERT_LT(culled.main.count(), f.scene.main.count() * 9 / 10) << "the view leaves something out";
+  expect_equal(colour, culled.colour, "colour");
+  expect_equal(depth, culled.raster.depth, "depth");
+}
+
+TEST(Renderer, WithoutReflectionsTheImageIsTheDiffuseOne) {
+  Fixture f;
+  f.request.specular = false;
+  Renderer renderer(RenderOptions{});
+  const Frame& frame = renderer.forward(f.scene, f.request);
+  EXPECT_TRUE(frame.traced.pixel.empty());
+  expect_equal(frame.colour, frame.raster.colour, "colour");
+}
+
+TEST(Renderer, SkippingPixelsThatDoNotReflectChangesTheImageByLessThanHalfAStep) {
+  // method §4.4: the default thresholds move no pixel by more than 1/512.
+  Fixture f;
+  Random random(9);
+  for (float& v : f.scene.main.tint_logit.values()) v = static_cast<float>(random.uniform(-12, 0));
+  RenderOptions all;
+  all.select.min_alpha = all.select.min_tint = 0;
+  Renderer exact(all);
+  Renderer skipping(RenderOptions{});
+  const Tensor<float> expected = exact.forward(f.scene, f.request).colour;
+  const Frame& frame = skipping.forward(f.scene, f.request);
+  EXPECT_LT(frame.traced.pixel.size(), static_cast<size_t>(64 * 48));
+  for (int64_t i = 0; i < expected.size(); ++i)
+    ASSERT_NEAR(frame.colour[i], expected[i], 1.0F / 512 + 1e-6F) << i;
+}
+
+TEST(Renderer, ColourIsTheBlendOfItsLayers) {
+  // method §6 on every pixel that was traced.
+  Fixture f;
+  Renderer renderer(RenderOptions{});
+  const Frame& frame = renderer.forward(f.scene, f.request);
+  const Tensor<float> specular = frame.specular_image();
+  ASSERT_FALSE(frame.traced.pixel.empty());
+  for (const int32_t p : frame.traced.pixel) {
+    for (int64_t c = 0; c < 3; ++c) {
+      const int64_t i = 3 * int64_t{p} + c;
+      const float a = frame.raster.tint[p];
+      ASSERT_NEAR(frame.colour[i], (1 - a) * frame.raster.colour[i] + a * specular[i], 1e-5F);
+    }
+  }
+}
+
+TEST(Renderer, AnEmptyViewIsBackground) {
+  Fixture f;
+  f.request.camera.position = {0, 0, 50};
+  f.request.cull = true;
+  RenderOptions options;
+  options.background = {0.2F, 0.4F, 0.6F};
+  Renderer renderer(options);
+  const Frame& frame = renderer.forward(f.scene, f.request, true);
+  for (int64_t i = 0; i < frame.raster.alpha.size(); ++i) ASSERT_FLOAT_EQ(frame.colour[3 * i + 2], 0.6F);
+  FrameGradient grad;
+  grad.colour.reset(frame.colour.shape());
+  grad.colour.fill(1);
+  SceneGradient gradient;
+  gradient.reset(f.scene);
+  renderer.backward(f.scene, f.request, Trainable{}, grad, gradient);
+  gradient.main.for_each([](const char* name, const Tensor<float>& t) {
+    for (const float v : t.values()) ASSERT_EQ(v, 0) << name;
+  });
+}
+
+TEST(Renderer, SameBytesAtAnyThreadCount) {
+  Fixture f;
+  Tensor<float> colour[2];
+  Tensor<float> gradient_of_position[2];
+  for (int threads = 1; threads <= 2; ++threads) {
+    set_threads(threads);
+    Renderer renderer(RenderOptions{});
+    const Frame& frame = renderer.forward(f.scene, f.request, true);
+    colour[threads - 1] = frame.colour;
+    FrameGradient grad;
+    grad.colour = frame.colour;
+    SceneGradient gradient;
+    gradient.reset(f.scene);
+    renderer.backward(f.scene, f.request, Trainable{}, grad, gradient);
+    gradient_of_position[threads - 1] = gradient.main.position;
+  }
+  set_threads(0);
+  expect_equal(colour[0], colour[1], "colour");
+  expect_equal(gradient_of_position[0], gradient_of_position[1], "gradient");
+}
+
+}  // namespace
+}  // namespace traceflow

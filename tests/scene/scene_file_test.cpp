@@ -1,0 +1,147 @@
+#include "scene/scene_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "scene/rows.h"
+
+namespace traceflow {
+namespace {
+
+Tensor<float> noise(const Shape& shape, Random& random) {
+  Tensor<float> t(shape);
+  for (float& v : t.values()) v = static_cast<float>(random.normal());
+  return t;
+}
+
+Surfels random_surfels(int64_t count, bool tint, Random& random) {
+  Surfels s;
+  s.position = noise({count, 3}, random);
+  s.log_scale = noise({count, 2}, random);
+  s.rotation = noise({count, 4}, random);
+  s.opacity_logit = noise({count}, random);
+  s.sh = noise({count, 4, 3}, random);
+  if (tint) s.tint_logit = noise({count}, random);
+  return s;
+}
+
+Scene full_scene() {
+  Random random(5);
+  NetworkOptions network;
+  network.width = 16;
+  network.depth = 3;
+  network.skip = 1;
+  Scene scene;
+  scene.main = random_surfels(7, true, random);
+  scene.environment = random_surfels(4, false, random);
+  scene.main_field = make_field(network, residual::main_outputs, random);
+  scene.environment_field = make_field(network, residual::environment_outputs, random);
+  scene.environment_map.emplace();
+  scene.environment_map->logit = noise({12, 2, 3}, random);
+  scene.environment_map->field = make_field(network, 3, random);
+  scene.specular = Specular::environment_map;
+  scene.normalisation = {{0.1, -2, 3}, 0.37};
+  scene.extent = 1.75F;
+  scene.main_reach = 0.125F;
+  return scene;
+}
+
+std::vector<float> all_numbers(const Scene& scene) {
+  std::vector<float> all{scene.extent, scene.main_reach, static_cast<float>(scene.normalisation.scale)};
+  const auto take = [&](const auto&, const Tensor<float>& t) {
+    all.insert(all.end(), t.values().begin(), t.values().end());
+  };
+  scene.main.for_each(take);
+  scene.environment.for_each(take);
+  if (scene.main_field) scene.main_field->for_each(take);
+  if (scene.environment_field) scene.environment_field->for_each(take);
+  if (scene.environment_map) {
+    take("map", scene.environment_map->logit);
+    if (scene.environment_map->field) scene.environment_map->field->for_each(take);
+  }
+  return all;
+}
+
+TEST(SceneFile, GivesBackWhatWasPut) {
+  const Scene scene = full_scene();
+  const auto path = std::filesystem::path(testing::TempDir()) / ("scene_file_" + std::to_string(::getpid()));
+  Safetensors file;
+  put_scene(scene, file);
+  file.write(path);
+  const Scene back = get_scene(Safetensors::read(path));
+  EXPECT_EQ(all_numbers(back), all_numbers(scene));
+  EXPECT_EQ(back.specular, scene.specular);
+  EXPECT_EQ(back.normalisation.centre, scene.normalisation.centre);
+  EXPECT_EQ(back.main_field->shape.skip, 1);
+}
+
+TEST(SceneFile, AStaticSceneHasNoFields) {
+  Random random(6);
+  Scene scene;
+  scene.main = random_surfels(3, true, random);
+  scene.specular = Specular::none;
+  Safetensors file;
+  put_scene(scene, file);
+  const Scene back = get_scene(file);
+  EXPECT_FALSE(back.main_field || back.environment_field || back.environment_map);
+  EXPECT_EQ(back.environment.count(), 0);
+}
+
+TEST(SceneFile, AMissingOrMisshapenTensorIsNamed) {
+  const Scene scene = full_scene();
+  Safetensors file;
+  put_scene(scene, file);
+  file.add("scene/main/opacity_logit", Tensor<float>(Shape{99}));
+  try {
+    get_scene(file);
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("scene/main/opacity_logit"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(get_scene(Safetensors{}), InputError);
+}
+
+TEST(SceneFile, DamagedMetadataIsRefused) {
+  Safetensors file;
+  put_scene(full_scene(), file);
+  for (const char* text : {"", "{", "[]", "{\"specular\": 3}", "{\"specular\": \"mirror\"}"}) {
+    file.metadata["scene"] = text;
+    EXPECT_THROW(get_scene(file), InputError) << text;
+  }
+}
+
+TEST(Rows, AnEditCopiesDropsAndAdds) {
+  Random random(7);
+  Surfels s = random_surfels(5, true, random);
+  const Surfels before = s;
+  RowEdit edit;
+  edit.keep(4);
+  edit.keep(1);
+  edit.add(1);
+  edit_rows(s, edit);
+  ASSERT_EQ(s.count(), 3);
+  for (int64_t k = 0; k < 12; ++k) {
+    EXPECT_EQ(s.sh.row(0)[k], before.sh.row(4)[k]);
+    EXPECT_EQ(s.sh.row(2)[k], before.sh.row(1)[k]);
+  }
+  const Tensor<float> moments = edited_rows(before.rotation, edit, true);
+  EXPECT_EQ(moments(1, 3), before.rotation(1, 3));
+  EXPECT_EQ(moments(2, 3), 0);
+}
+
+TEST(Rows, AppendingJoinsTwoSets) {
+  Random random(8);
+  Surfels a = random_surfels(3, false, random);
+  const Surfels first = a;
+  const Surfels b = random_surfels(2, false, random);
+  append_rows(a, b);
+  ASSERT_EQ(a.count(), 5);
+  EXPECT_EQ(a.position(2, 1), first.position(2, 1));
+  EXPECT_EQ(a.position(4, 1), b.position(1, 1));
+  EXPECT_EQ(a.sh.row(3)[11], b.sh.row(0)[11]);
+}
+
+}  // namespace
+}  // namespace traceflow
