@@ -137,7 +137,7 @@ AnimatedScene balls() {
   add(standing_box(patterned(Pattern::stripes, {0.62, 0.24, 0.58}, {0.84, 0.78, 0.40}, {0, 24}, 0.15),
                    {0.05, 0.04, 0.04}, {-0.28, -0.38}, 0.7));
   add_far_clutter(scene);
-  scene.arc = arc_around({0, 0, 0.22}, 1.22, 0.28);
+  scene.arc = arc_around({0, 0, 0.22}, 1.28, 0.28);
   return scene;
 }
 
