@@ -18,14 +18,25 @@ extern char** environ;
 
 namespace traceflow::eval {
 
-void Video::require_ffmpeg() {
+namespace {
+
+bool ffmpeg_in_path() {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "" : path);
   for (std::string folder; std::getline(folders, folder, ':');) {
-    if (::access((std::filesystem::path(folder) / "ffmpeg").c_str(), X_OK) == 0) return;
+    if (::access((std::filesystem::path(folder) / "ffmpeg").c_str(), X_OK) == 0) return true;
   }
-  throw InputError("option", "video", "no ffmpeg on this machine", "ffmpeg in PATH",
-                   "install it with `apt install ffmpeg`, or leave --video out");
+  return false;
+}
+
+}  // namespace
+
+void Video::prepare(const std::filesystem::path& path) {
+  if (!ffmpeg_in_path()) {
+    throw InputError("option", "video", "no ffmpeg on this machine", "ffmpeg in PATH",
+                     "install it with `apt install ffmpeg`, or leave --video out");
+  }
+  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
 }
 
 void Video::start() {

@@ -11,8 +11,9 @@ namespace traceflow::eval {
 // A film written by ffmpeg, which is fed frames through a pipe.
 class Video {
  public:
-  // Throws InputError when there is no ffmpeg: to be called before any work begins.
-  static void require_ffmpeg();
+  // Throws InputError when there is no ffmpeg, and makes the film's folder: to be called before any work
+  // begins.
+  static void prepare(const std::filesystem::path& path);
 
   Video(std::filesystem::path path, double frames_per_second)
       : path_(std::move(path)), frames_per_second_(frames_per_second) {}

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "eval/subject.h"
+#include "train/options.h"
+
+namespace traceflow::cli {
+
+// A run's folder as eval, render and export see it.
+struct TrainedRun {
+  eval::Subject subject;  // takes part as far as the run has come (method §7.1–§7.3)
+  TrainOptions options;
+  std::string capture;                   // its name
+  std::filesystem::path capture_folder;  // where it was when the run was trained
+  int64_t iterations = 0;                // done
+  double train_seconds = 0;
+  std::string note;  // one line when the checkpoint is not the newest; else empty
+};
+
+// Throws InputError.
+TrainedRun read_run(const std::filesystem::path& folder);
+
+// The capture that the run was trained on, or the one in `folder` when that is not empty; downscale 0: the
+// run's.
+Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale);
+
+// The views of a split by its name. Throws InputError when the capture has none.
+const std::vector<View>& views_of(const Capture& capture, const std::string& split);
+
+}  // namespace traceflow::cli

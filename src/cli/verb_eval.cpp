@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <memory>
+
+#include "base/atomic_file.h"
+#include "cli/trained_run.h"
+#include "cli/verbs.h"
+#include "eval/camera_file.h"
+#include "eval/contact_sheet.h"
+#include "eval/layer_files.h"
+#include "eval/report.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+struct EvalArguments {
+  std::string run, capture, split = "test", lpips, layers = "rgb,diffuse,specular,tint,alpha,normal,depth",
+                            sheet;
+  int downscale = 0;
+  int sheet_views = 4;
+  int sheet_width = 240;
+};
+
+// Whether view i of n is among `wanted` views spread evenly.
+bool on_sheet(size_t i, size_t n, size_t wanted) {
+  const size_t shown = std::min(n, wanted);
+  for (size_t k = 0; k < shown; ++k) {
+    if (i == (2 * k + 1) * n / (2 * shown)) return true;
+  }
+  return false;
+}
+
+std::optional<lpips::Weights> read_lpips(const std::string& path) {
+  if (!path.empty()) return lpips::read_weights(path);
+  fmt::print(stderr,
+             "LPIPS is null: it needs weights. scripts/export_lpips.py writes them, --lpips FILE reads them "
+             "(docs/eval.md)\n");
+  return std::nullopt;
+}
+
+void run_eval(const EvalArguments& a) {
+  const std::vector<eval::Layer> layers =
+      a.layers == "none" ? std::vector<eval::Layer>{} : eval::parse_layers(a.layers);
+  const TrainedRun run = read_run(a.run);
+  if (!run.note.empty()) fmt::print(stderr, "{}\n", run.note);
+  const Capture capture = capture_of(run, a.capture, a.downscale);
+  const std::vector<View>& views = views_of(capture, a.split);
+  for (const View& view : views) eval::check_name(capture.folder.string(), "view id", view.id);
+  const std::optional<lpips::Weights> weights = read_lpips(a.lpips);
+
+  const std::filesystem::path folder = std::filesystem::path(a.run) / "eval" / a.split;
+  std::filesystem::create_directories(folder);
+  eval::LayerFiles files(folder, layers, eval::ImageFormat::png, run.subject.scene.normalisation.scale);
+  eval::ContactSheet sheet(a.sheet_width);
+  eval::Report report;
+  report.capture = capture.name;
+  report.split = a.split;
+  report.downscale = a.downscale > 0 ? a.downscale : run.options.capture.downscale;
+  report.iterations = run.iterations;
+  report.train_seconds = run.train_seconds;
+  eval::evaluate(
+      run.subject, capture, views, weights ? &*weights : nullptr,
+      [&](const View& view, const ViewImages& images, const Frame& frame) {
+        files.write(view.id, frame);
+        const auto i = static_cast<size_t>(&view - views.data());
+        if (!a.sheet.empty() && on_sheet(i, views.size(), static_cast<size_t>(a.sheet_views))) {
+          sheet.add(images.colour, frame);
+        }
+      },
+      report);
+  if (!a.sheet.empty()) sheet.write(a.sheet);
+  write_atomically(folder / "metrics.json", eval::report_json(report));
+  fmt::print("{}{}\n", eval::report_table(report), (folder / "metrics.json").string());
+}
+
+}  // namespace
+
+void add_eval(CLI::App& program) {
+  CLI::App* verb = program.add_subcommand("eval", "Measure a run on views of its capture");
+  const auto a = std::make_shared<EvalArguments>();
+  verb->add_option("RUN", a->run, "Folder of the run")->required();
+  verb->add_option("--split", a->split, "Views to measure: test or train")
+      ->check(CLI::IsMember({"test", "train"}));
+  verb->add_option("-d,--data", a->capture, "The capture's folder, where it is not where the run found it");
+  verb->add_option("--downscale", a->downscale, "Measure at another size than the run was trained at")
+      ->check(CLI::Range(1, 64));
+  verb->add_option("--lpips", a->lpips, "Weights for LPIPS, as scripts/export_lpips.py writes them")
+      ->envname("TRACEFLOW_LPIPS");
+  verb->add_option("--layers", a->layers, "Layers to write as pictures, with commas between; all; or none")
+      ->capture_default_str();
+  verb->add_option("--contact-sheet", a->sheet, "Also write one picture of every layer of a few views");
+  verb->add_option("--sheet-views", a->sheet_views, "Views on the contact sheet")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  verb->add_option("--sheet-width", a->sheet_width, "Columns of one picture on it, pixels")
+      ->check(CLI::Range(16, 4096))
+      ->capture_default_str();
+  verb->callback([a] { run_eval(*a); });
+}
+
+}  // namespace traceflow::cli
