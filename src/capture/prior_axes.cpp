@@ -66,8 +66,8 @@ struct Sums {
 class DepthCells {
  public:
   DepthCells(const Camera<float>& camera, const Tensor<float>& points)
-      : width_(camera.width / side + 1),
-        nearest_(static_cast<size_t>(width_) * static_cast<size_t>(camera.height / side + 1),
+      : width_(static_cast<size_t>(camera.width) / side + 1),
+        nearest_(width_ * (static_cast<size_t>(camera.height) / side + 1),
                  std::numeric_limits<float>::infinity()) {
     for (int64_t i = 0; i < points.dim(0); ++i) {
       const Vec3<float> x = camera.point_in_camera(load3<float>(points.row(i)));
@@ -86,12 +86,12 @@ class DepthCells {
   bool hides(const Vec2<float>& at, float depth) { return depth > 1.05F * cell(at); }
 
  private:
-  static constexpr int side = 8;
+  static constexpr size_t side = 8;
   float& cell(const Vec2<float>& at) {
-    return nearest_[static_cast<size_t>(static_cast<int>(at.y) / side * width_ +
-                                        static_cast<int>(at.x) / side)];
+    const auto column = static_cast<size_t>(at.x) / side, row = static_cast<size_t>(at.y) / side;
+    return nearest_[row * width_ + column];
   }
-  int width_;
+  size_t width_;
   std::vector<float> nearest_;
 };
 

@@ -6,17 +6,24 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "base/error.h"
 
 namespace traceflow {
 
+namespace {
+
+// What the last system call that failed says.
+std::string reason() { return std::generic_category().message(errno); }
+
+}  // namespace
+
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
   descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor_ < 0) throw InputError(path.string(), "", std::strerror(errno), "a readable file");
+  if (descriptor_ < 0) throw InputError(path.string(), "", reason(), "a readable file");
   struct stat status {};
   if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
     close();
@@ -32,7 +39,7 @@ InputFile InputFile::scratch(const std::filesystem::path& origin) {
   std::string name = (std::filesystem::temp_directory_path() / "traceflow-XXXXXX").string();
   const int descriptor = ::mkstemp(name.data());
   if (descriptor < 0) {
-    throw InputError(origin.string(), "temporary file " + name, std::strerror(errno), "room to unpack",
+    throw InputError(origin.string(), "temporary file " + name, reason(), "room to unpack",
                      "set TMPDIR to a folder with space");
   }
   ::unlink(name.c_str());
@@ -63,7 +70,7 @@ void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
     const ssize_t n = ::pread(descriptor_, bytes.data() + done, bytes.size() - done,
                               static_cast<off_t>(offset) + static_cast<off_t>(done));
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw InputError(path_.string(), "read", std::strerror(errno), "a readable file");
+    if (n < 0) throw InputError(path_.string(), "read", reason(), "a readable file");
     if (n == 0) {
       throw InputError(path_.string(), "", std::to_string(size_) + " bytes",
                        std::to_string(offset + static_cast<int64_t>(bytes.size())) + " bytes at least",
@@ -79,7 +86,7 @@ void InputFile::append(std::span<const std::byte> bytes) {
         ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(size_));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) {
-      throw InputError(path_.string(), "unpacking", std::strerror(errno), "room in the temporary folder",
+      throw InputError(path_.string(), "unpacking", reason(), "room in the temporary folder",
                        "set TMPDIR to a folder with space");
     }
     done += static_cast<size_t>(n);

@@ -192,8 +192,9 @@ Tensor<uint8_t> to_8bit(const Tensor<float>& image) {
   result.resize(image.shape());
   for (int64_t i = 0; i < image.size(); ++i) {
     const float v = image[i];
+    const float shifted = v * 255.0F + 0.5F;
     // A NaN fails both comparisons and becomes black.
-    result[i] = v >= 1.0F ? uint8_t{255} : v > 0.0F ? static_cast<uint8_t>(v * 255.0F + 0.5F) : uint8_t{0};
+    result[i] = v >= 1.0F ? uint8_t{255} : v > 0.0F ? static_cast<uint8_t>(shifted) : uint8_t{0};
   }
   return result;
 }
