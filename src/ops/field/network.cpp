@@ -16,33 +16,35 @@ int padded(int columns) { return (columns + 15) / 16 * 16; }
 // fp32.
 constexpr int64_t block_values = 65536;
 
-// Writes a dense fp32 matrix in the number type of the hidden values.
-void store(Number number, const Tensor<float>& from, Tensor<std::byte>& to) {
-  if (number == Number::fp32) {
-    to.resize({from.size() * 4});
-    std::copy(from.data(), from.data() + from.size(), reinterpret_cast<float*>(to.data()));
-  } else {
-    to.resize({from.size() * 2});
-    round_to_bf16(from.data(), from.size(), reinterpret_cast<uint16_t*>(to.data()));
-  }
+// Packs a product's B = weightᵀ, or `weight` itself, from `columns` columns of a row-major matrix.
+void pack(const Product& product, const float* weight, int64_t columns, bool transposed,
+          Tensor<std::byte>& packed) {
+  packed.resize({product.packed_bytes()});
+  product.pack(weight, transposed ? 1 : columns, transposed ? columns : 1, packed.data());
 }
 
-// to[c][o] = weight[o][first + c] for c < columns and all outputs o; the rest of `to` is zero.
-void transpose(const Tensor<float>& weight, int64_t first, int64_t columns, const Shape& shape,
-               Tensor<float>& to) {
-  constexpr int64_t tile = 16;
-  to.reset(shape);
-  const int64_t outputs = weight.dim(0);
-  for (int64_t o = 0; o < outputs; o += tile) {
-    for (int64_t c = 0; c < columns; ++c) {
-      for (int64_t k = o; k < std::min(o + tile, outputs); ++k) to(c, k) = weight(k, first + c);
-    }
-  }
+// The first columns of a matrix, with zeros around them where the new shape is larger.
+Tensor<float> padded_copy(const Tensor<float>& from, int64_t columns, const Shape& shape) {
+  Tensor<float> to(shape);
+  for (int64_t i = 0; i < from.dim(0); ++i) std::copy_n(from.row(i), columns, to.row(i));
+  return to;
 }
 
 // The first column of the hidden values' weights in a layer.
 int64_t hidden_column(const Layout& layout, int layer) {
   return layout.sees_encoding(layer) ? layout.encoding + layout.time_encoding : 0;
+}
+
+// bias += W_t γ(t), W_t the columns of the time's encoding.
+void add_time(const Layout& layout, const Tensor<float>& weight, const std::vector<double>& time_encoding,
+              Tensor<float>& bias) {
+  for (int64_t o = 0; o < layout.width; ++o) {
+    double sum = bias[o];
+    for (int j = 0; j < layout.time_encoding; ++j) {
+      sum += static_cast<double>(weight(o, layout.encoding + j)) * time_encoding[j];
+    }
+    bias[o] = static_cast<float>(sum);
+  }
 }
 
 }  // namespace
@@ -72,6 +74,7 @@ std::vector<double> encode_time(const Layout& layout, float time) {
 }
 
 void ForwardWeights::fill(const Layout& layout, const Field& field, float time) {
+  const ForwardProducts products(layout, layout.block_rows);
   const std::vector<double> time_encoding = encode_time(layout, time);
   const auto layers = static_cast<size_t>(layout.depth);
   bias.resize(layers);
@@ -82,66 +85,77 @@ void ForwardWeights::fill(const Layout& layout, const Field& field, float time) 
     const Tensor<float>& weight = field.weight[layer];
     bias[layer] = field.bias[layer];
     if (layout.sees_encoding(layer)) {
-      transpose(weight, 0, layout.encoding, {layout.padded_encoding, layout.width}, encoding[layer]);
-      for (int64_t o = 0; o < layout.width; ++o) {
-        double sum = field.bias[layer][o];
-        for (int j = 0; j < layout.time_encoding; ++j) {
-          sum += static_cast<double>(weight(o, layout.encoding + j)) * time_encoding[j];
-        }
-        bias[layer][o] = static_cast<float>(sum);
-      }
+      add_time(layout, weight, time_encoding, bias[layer]);
+      const auto part = padded_copy(weight, layout.encoding, {layout.width, layout.padded_encoding});
+      const Product& product = layer == 0 ? products.first : products.skip_encoding;
+      pack(product, part.data(), layout.padded_encoding, true, encoding[layer]);
     }
     if (layer > 0) {
-      thread_local Tensor<float> transposed;
-      transpose(weight, hidden_column(layout, layer), layout.width, {layout.width, layout.width}, transposed);
-      // The skip's sum is fp32 but its operands are hidden values like all others.
-      store(layout.hidden, transposed, hidden[layer]);
+      const Product& product = layer == layout.skip ? products.skip_hidden : products.hidden;
+      pack(product, weight.data() + hidden_column(layout, layer), weight.dim(1), true, hidden[layer]);
     }
   };
   parallel_for("field weights", layout.depth, fill_layer, 1);
-  Tensor<float> transposed;
-  transpose(field.head_weight, 0, layout.width, {layout.width, layout.padded_outputs}, transposed);
-  store(layout.hidden, transposed, head);
+  const auto padded_head =
+      padded_copy(field.head_weight, layout.width, {layout.padded_outputs, layout.width});
+  pack(products.head, padded_head.data(), layout.width, true, head);
   head_bias.reset({layout.padded_outputs});
   std::copy_n(field.head_bias.data(), layout.outputs, head_bias.data());
 }
 
 void BackwardWeights::fill(const Layout& layout, const Field& field) {
+  const BackwardProducts products(layout, layout.block_rows);
   hidden.resize(static_cast<size_t>(layout.depth));
   const auto fill_layer = [&](int64_t index) {
     const int layer = static_cast<int>(index) + 1;
     const Tensor<float>& weight = field.weight[layer];
-    thread_local Tensor<float> dense;
-    dense.resize({layout.width, layout.width});
-    for (int64_t o = 0; o < layout.width; ++o) {
-      std::copy_n(weight.row(o) + hidden_column(layout, layer), layout.width, dense.row(o));
-    }
-    store(layout.hidden, dense, hidden[layer]);
+    pack(products.hidden, weight.data() + hidden_column(layout, layer), weight.dim(1), false, hidden[layer]);
   };
   parallel_for("field weights", layout.depth - 1, fill_layer, 1);
-  Tensor<float> padded_head(Shape{layout.padded_outputs, layout.width});
-  std::copy(field.head_weight.data(), field.head_weight.data() + field.head_weight.size(),
-            padded_head.data());
-  store(layout.hidden, padded_head, head);
+  const auto padded_head =
+      padded_copy(field.head_weight, layout.width, {layout.padded_outputs, layout.width});
+  pack(products.head, padded_head.data(), layout.width, false, head);
 }
 
 ForwardProducts::ForwardProducts(const Layout& l, int64_t rows)
-    : first(product({.m = rows, .k = l.padded_encoding, .n = l.width, .bias = true, .relu = true})),
-      skip_encoding(product({.m = rows, .k = l.padded_encoding, .n = l.width, .bias = true})),
-      skip_hidden(product(
-          {.m = rows, .k = l.width, .n = l.width, .operands = l.hidden, .accumulate = true, .relu = true})),
+    : first(product({.m = rows,
+                     .k = l.padded_encoding,
+                     .n = l.width,
+                     .packed_for = l.block_rows,
+                     .bias = true,
+                     .relu = true})),
+      skip_encoding(product(
+          {.m = rows, .k = l.padded_encoding, .n = l.width, .packed_for = l.block_rows, .bias = true})),
+      skip_hidden(product({.m = rows,
+                           .k = l.width,
+                           .n = l.width,
+                           .operands = l.hidden,
+                           .packed_for = l.block_rows,
+                           .accumulate = true,
+                           .relu = true})),
       hidden(product({.m = rows,
                       .k = l.width,
                       .n = l.width,
                       .operands = l.hidden,
                       .result = l.hidden,
+                      .packed_for = l.block_rows,
                       .bias = true,
                       .relu = true})),
-      head(product({.m = rows, .k = l.width, .n = l.padded_outputs, .operands = l.hidden, .bias = true})) {}
+      head(product({.m = rows,
+                    .k = l.width,
+                    .n = l.padded_outputs,
+                    .operands = l.hidden,
+                    .packed_for = l.block_rows,
+                    .bias = true})) {}
 
 BackwardProducts::BackwardProducts(const Layout& l, int64_t rows)
-    : head(product({.m = rows, .k = l.padded_outputs, .n = l.width, .operands = l.hidden})),
-      hidden(product({.m = rows, .k = l.width, .n = l.width, .operands = l.hidden})),
+    : head(product({.m = rows,
+                    .k = l.padded_outputs,
+                    .n = l.width,
+                    .operands = l.hidden,
+                    .packed_for = l.block_rows})),
+      hidden(
+          product({.m = rows, .k = l.width, .n = l.width, .operands = l.hidden, .packed_for = l.block_rows})),
       grad_encoding(
           product({.m = l.width, .k = rows, .n = l.padded_encoding, .transposed = true, .accumulate = true})),
       grad_hidden(product({.m = l.width,
@@ -168,7 +182,7 @@ void forward_hidden(const Layout& layout, const ForwardWeights& weights, const B
       continue;
     }
     float* sums = rounds ? block.fp32 : reinterpret_cast<float*>(values);
-    const float* encoding_weight = weights.encoding[layer].data();
+    const std::byte* encoding_weight = weights.encoding[layer].data();
     if (layer == 0) {
       products.first.run(block.encoding, encoding_weight, bias, sums);
     } else {

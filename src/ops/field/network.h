@@ -37,24 +37,7 @@ struct Layout {
 // γ(t).
 std::vector<double> encode_time(const Layout& layout, float time);
 
-// The parameters as the products read them, filled anew by each pass over the points. All dense.
-struct ForwardWeights {
-  void fill(const Layout& layout, const Field& field, float time);
-
-  std::vector<Tensor<float>> bias;        // layer: width; the time's part included
-  std::vector<Tensor<float>> encoding;    // layer that sees it: padded_encoding × width
-  std::vector<Tensor<std::byte>> hidden;  // layer > 0: width × width, transposed
-  Tensor<std::byte> head;                 // width × padded_outputs
-  Tensor<float> head_bias;                // padded_outputs
-};
-struct BackwardWeights {
-  void fill(const Layout& layout, const Field& field);
-
-  std::vector<Tensor<std::byte>> hidden;  // layer > 0: width × width
-  Tensor<std::byte> head;                 // padded_outputs × width
-};
-
-// The products that take `rows` points through the layers.
+// The products that take `rows` points through the layers. Their weights are packed for full blocks.
 struct ForwardProducts {
   ForwardProducts(const Layout& layout, int64_t rows);
 
@@ -72,6 +55,23 @@ struct BackwardProducts {
   const Product& grad_encoding;  // the three add to a weight's gradient, fp32
   const Product& grad_hidden;
   const Product& grad_head;
+};
+
+// The parameters as the products read them, packed anew by each pass over the points.
+struct ForwardWeights {
+  void fill(const Layout& layout, const Field& field, float time);
+
+  std::vector<Tensor<float>> bias;          // layer: width; the time's part included
+  std::vector<Tensor<std::byte>> encoding;  // layer that sees it: padded_encoding × width
+  std::vector<Tensor<std::byte>> hidden;    // layer > 0: width × width, transposed
+  Tensor<std::byte> head;                   // width × padded_outputs
+  Tensor<float> head_bias;                  // padded_outputs
+};
+struct BackwardWeights {
+  void fill(const Layout& layout, const Field& field);
+
+  std::vector<Tensor<std::byte>> hidden;  // layer > 0: width × width
+  Tensor<std::byte> head;                 // padded_outputs × width
 };
 
 // A block of points on its way through the layers, and where its hidden values are.

@@ -56,9 +56,11 @@ dnnl::primitive_attr attributes(const ProductShape& shape) {
   return attributes;
 }
 
+dnnl::memory::desc operand_b(const ProductShape& shape);
+
 dnnl::matmul::primitive_desc describe(const ProductShape& shape) {
   const auto a = matrix(shape.m, shape.k, shape.operands, shape.transposed);
-  const auto b = matrix(shape.k, shape.n, shape.operands);
+  const auto b = operand_b(shape);
   const auto bias = shape.bias ? matrix(1, shape.n, Number::fp32) : dnnl::memory::desc();
   const auto c = matrix(shape.m, shape.n, shape.result);
 #if DNNL_VERSION_MAJOR >= 3
@@ -68,8 +70,24 @@ dnnl::matmul::primitive_desc describe(const ProductShape& shape) {
 #endif
 }
 
+// A product that B is packed for may choose the order; the others take it as it is.
+dnnl::memory::desc operand_b(const ProductShape& shape) {
+  if (shape.packed_for == 0) return matrix(shape.k, shape.n, shape.operands);
+  if (shape.packed_for == shape.m) {
+    return {{shape.k, shape.n}, data_type(shape.operands), dnnl::memory::format_tag::any};
+  }
+  ProductShape chooser = shape;
+  chooser.m = shape.packed_for;
+  return describe(chooser).weights_desc();
+}
+
 dnnl::memory view(const dnnl::memory::desc& desc, const void* data) {
   return {desc, engine(), const_cast<void*>(data)};
+}
+
+dnnl::stream& stream() {
+  thread_local dnnl::stream own(engine());
+  return own;
 }
 
 // Each thread's own working memory, as large as the largest product has needed.
@@ -99,18 +117,55 @@ Product::Product(const ProductShape& shape) {
 
 Product::~Product() = default;
 
+int64_t Product::packed_bytes() const { return static_cast<int64_t>(compiled_->b.get_size()); }
+
+void Product::pack(const float* b, int64_t row_stride, int64_t column_stride, void* packed) const {
+  const OneThread one_thread;
+  const dnnl::memory::desc from(compiled_->b.dims(), dnnl::memory::data_type::f32,
+                                dnnl::memory::dims{row_stride, column_stride});
+  dnnl::primitive_attr attributes;
+  attributes.set_scratchpad_mode(dnnl::scratchpad_mode::user);
+  const dnnl::reorder::primitive_desc description(engine(), from, engine(), compiled_->b, attributes);
+  const dnnl::memory::desc scratch = description.scratchpad_desc();
+  dnnl::reorder(description)
+      .execute(stream(), {{DNNL_ARG_FROM, view(from, b)},
+                          {DNNL_ARG_TO, view(compiled_->b, packed)},
+                          {DNNL_ARG_SCRATCHPAD, view(scratch, scratchpad(scratch.get_size()))}});
+  stream().wait();
+}
+
+// The operands of a product as oneDNN's objects. Each thread has its own, made once: they cost more than a
+// small product.
+struct Product::Arguments {
+  explicit Arguments(const Compiled& p)
+      : a(view(p.a, nullptr)),
+        b(view(p.b, nullptr)),
+        bias(p.bias.is_zero() ? dnnl::memory() : view(p.bias, nullptr)),
+        c(view(p.c, nullptr)),
+        scratch(view(p.scratch, nullptr)),
+        all{{DNNL_ARG_SRC, a},
+            {DNNL_ARG_WEIGHTS, b},
+            {DNNL_ARG_BIAS, bias},
+            {DNNL_ARG_DST, c},
+            {DNNL_ARG_SCRATCHPAD, scratch}} {
+    if (p.bias.is_zero()) all.erase(DNNL_ARG_BIAS);
+  }
+  dnnl::memory a, b, bias, c, scratch;
+  std::unordered_map<int, dnnl::memory> all;
+};
+
 void Product::run(const void* a, const void* b, const float* bias, void* c) const {
   const OneThread one_thread;
-  thread_local dnnl::stream stream(engine());
   const Compiled& p = *compiled_;
-  std::unordered_map<int, dnnl::memory> arguments{
-      {DNNL_ARG_SRC, view(p.a, a)},
-      {DNNL_ARG_WEIGHTS, view(p.b, b)},
-      {DNNL_ARG_DST, view(p.c, c)},
-      {DNNL_ARG_SCRATCHPAD, view(p.scratch, scratchpad(p.scratch.get_size()))}};
-  if (bias != nullptr) arguments.emplace(DNNL_ARG_BIAS, view(p.bias, bias));
-  p.primitive.execute(stream, arguments);
-  stream.wait();
+  thread_local std::unordered_map<const Compiled*, Arguments> made;
+  Arguments& arguments = made.try_emplace(&p, p).first->second;
+  arguments.a.set_data_handle(const_cast<void*>(a));
+  arguments.b.set_data_handle(const_cast<void*>(b));
+  if (bias != nullptr) arguments.bias.set_data_handle(const_cast<float*>(bias));
+  arguments.c.set_data_handle(c);
+  arguments.scratch.set_data_handle(scratchpad(p.scratch.get_size()));
+  p.primitive.execute(stream(), arguments.all);
+  stream().wait();
 }
 
 const Product& product(const ProductShape& shape) {
@@ -118,7 +173,7 @@ const Product& product(const ProductShape& shape) {
   static std::map<ProductShape, std::unique_ptr<const Product>> compiled;
   const std::lock_guard lock(mutex);
   std::unique_ptr<const Product>& entry = compiled[shape];
-  if (!entry) entry = std::make_unique<const Product>(shape);
+  if (!entry) entry.reset(new Product(shape));
   return *entry;
 }
 

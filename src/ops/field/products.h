@@ -4,7 +4,8 @@
 #include <cstdint>
 #include <memory>
 
-// Matrix products on one thread, by oneDNN. All matrices are dense and row-major.
+// Matrix products on one thread, by oneDNN. All matrices are dense and row-major, but for a B that is used
+// often: it can be packed into the order in which the product reads it.
 namespace traceflow::field {
 
 enum class Number { fp32, bf16 };
@@ -16,6 +17,7 @@ struct ProductShape {
   Number operands = Number::fp32;  // of A and B
   Number result = Number::fp32;    // of C
   bool transposed = false;         // A is stored k×m
+  int64_t packed_for = 0;          // B is packed as the same product with this m wants it; 0: not packed
   bool bias = false;               // C += bias, one fp32 number per column
   bool accumulate = false;         // C += what C held before
   bool relu = false;               // C = max(C, 0)
@@ -26,15 +28,23 @@ struct ProductShape {
 // result does not depend on how many the program uses.
 class Product {
  public:
-  explicit Product(const ProductShape& shape);
   ~Product();
   Product(const Product&) = delete;
   Product& operator=(const Product&) = delete;
 
+  // Bytes of a packed B.
+  int64_t packed_bytes() const;
+  // Packs B(i, j) = b[i·row_stride + j·column_stride], rounding it to the operands' type.
+  void pack(const float* b, int64_t row_stride, int64_t column_stride, void* packed) const;
+
   void run(const void* a, const void* b, const float* bias, void* c) const;
 
  private:
+  friend const Product& product(const ProductShape& shape);
+  explicit Product(const ProductShape& shape);
+
   struct Compiled;
+  struct Arguments;
   std::unique_ptr<const Compiled> compiled_;
 };
 
