@@ -16,7 +16,7 @@ inline std::array<double, 2 * ssim_radius + 1> ssim_window() {
   std::array<double, 2 * ssim_radius + 1> window{};
   double sum = 0;
   for (int k = -ssim_radius; k <= ssim_radius; ++k) {
-    sum += window[static_cast<size_t>(k + ssim_radius)] = std::exp(-k * k / (2 * 1.5 * 1.5));
+    sum += window[k + ssim_radius] = std::exp(-k * k / (2 * 1.5 * 1.5));
   }
   for (double& tap : window) tap /= sum;
   return window;

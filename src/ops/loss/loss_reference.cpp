@@ -21,8 +21,7 @@ void over_window(const Tensor<double>& image, const Pixel& centre, F&& f) {
     for (int dx = -ssim_radius; dx <= ssim_radius; ++dx) {
       const int64_t row = centre.row + dy, column = centre.column + dx;
       if (row < 0 || row >= image.dim(0) || column < 0 || column >= image.dim(1)) continue;
-      f(window[static_cast<size_t>(dy + ssim_radius)] * window[static_cast<size_t>(dx + ssim_radius)],
-        Pixel{row, column, centre.channel});
+      f(window[dy + ssim_radius] * window[dx + ssim_radius], Pixel{row, column, centre.channel});
     }
   }
 }
