@@ -139,6 +139,9 @@ HWY_INLINE void write_block(const SavedBlock& saved, const BlockSums& sums, int 
   }
 }
 
+// How many surfels a block evaluates side by side: as the registers allow.
+constexpr int side_by_side = HWY_TARGET <= HWY_AVX3 ? 4 : 2;
+
 class TileBlender {
  public:
   HWY_INLINE TileBlender(const KernelOptions& o, const TileLists& lists, int64_t tile, Saved& saved)
@@ -180,12 +183,27 @@ class TileBlender {
     Blend<Pixels> blend(d, live_lanes(d, at));
     const uint32_t* places = lists_.of_block[block];
     const uint32_t* const end = places + lists_.counts[block];
-    for (; places != end && blend.is_live(d); ++places) {
-      const TileEntry entry = lists_.entries[*places];
-      const Splat& splat = saved_.splats[entry.surfel];
-      if (blend.add(d, o_, splat, evaluate(d, splat, at.x, at.y), *places)) touch(entry, block);
+    for (; end - places >= side_by_side && blend.is_live(d); places += side_by_side) {
+      add_places<side_by_side>(d, places, block, at, blend);
     }
+    for (; places != end && blend.is_live(d); ++places) add_places<1>(d, places, block, at, blend);
     blend.store(d, o_, lane, left, sums);
+  }
+
+  template <size_t count>
+  HWY_INLINE void add_places(Pixels d, const uint32_t* places, int block, const PixelCentres<Pixels>& at,
+                             Blend<Pixels>& blend) {
+    const Splat* splats[count];
+    PixelCentres<Pixels> centres[count];
+    Footprint<Pixels> footprints[count];
+    for (size_t i = 0; i < count; ++i) {
+      splats[i] = &saved_.splats[lists_.entries[places[i]].surfel];
+      centres[i] = at;
+    }
+    evaluate<count>(d, splats, centres, footprints);
+    for (size_t i = 0; i < count; ++i) {
+      if (blend.add(d, o_, *splats[i], footprints[i], places[i])) touch(lists_.entries[places[i]], block);
+    }
   }
 
   HWY_INLINE void in_hit_order(const std::vector<SortedHits::Hit>& hits, int block, int x, int y, size_t lane,
@@ -196,7 +214,7 @@ class TileBlender {
     for (uint32_t i = 0; i < hits.size() && blend.is_live(d); ++i) {
       const TileEntry entry = lists_.entries[hits[i].place];
       const Splat& splat = saved_.splats[entry.surfel];
-      if (blend.add(d, o_, splat, evaluate(d, splat, at.x, at.y), i)) touch(entry, block);
+      if (blend.add(d, o_, splat, evaluate(d, splat, at), i)) touch(entry, block);
     }
     blend.store(d, o_, lane, left, sums);
   }

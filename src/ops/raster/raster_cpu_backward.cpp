@@ -241,8 +241,8 @@ class TileUnblender {
       const int block = std::countr_zero(touched);
       for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
         const auto at = pixel_centres(d, block_x(block), block_y(block), lane);
-        sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at.x, at.y), place,
-                                           blocks_[block], lane, state_.blocks[block]);
+        sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
+                                           state_.blocks[block]);
       }
     }
     sums.reduce(d, &saved_.scratch.gradients[entry.entry].u_x);
@@ -255,8 +255,8 @@ class TileUnblender {
       const TileEntry entry = lists_.entries[hits[place].place];
       const Splat& splat = saved_.splats[entry.surfel];
       Sums<OnePixel> sums(d);
-      sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at.x, at.y), place, blocks_[block],
-                                         lane, state_.blocks[block]);
+      sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
+                                         state_.blocks[block]);
       float values[Sums<OnePixel>::padded];
       sums.reduce(d, values);
       float* const to = &saved_.scratch.gradients[entry.entry].u_x;

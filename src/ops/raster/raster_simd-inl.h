@@ -75,31 +75,6 @@ struct Footprint {
   }
 };
 
-template <class D>
-HWY_INLINE Footprint<D> evaluate(D d, const Splat& s, V<D> pixel_x, V<D> pixel_y) {
-  const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
-  Footprint<D> f;
-  f.x = hn::Sub(pixel_x, set(s.anchor_x));
-  f.y = hn::Sub(pixel_y, set(s.anchor_y));
-  f.nu = hn::MulAdd(set(s.u_x), f.x, hn::MulAdd(set(s.u_y), f.y, set(s.u_1)));
-  f.nv = hn::MulAdd(set(s.v_x), f.x, hn::MulAdd(set(s.v_y), f.y, set(s.v_1)));
-  f.w = hn::MulAdd(set(s.w_x), f.x, hn::MulAdd(set(s.w_y), f.y, set(s.w_1)));
-  f.inverse_w = reciprocal(d, f.w);
-  f.dx = hn::Sub(f.x, set(s.centre_x));
-  f.dy = hn::Sub(f.y, set(s.centre_y));
-  const auto distance2 = hn::MulAdd(f.dx, f.dx, hn::Mul(f.dy, f.dy));
-  const auto rho_screen = hn::MulAdd(set(2.0F), distance2, set(s.rho_screen_1));
-  const auto rho_plane =
-      hn::Mul(hn::MulAdd(f.nu, f.nu, hn::Mul(f.nv, f.nv)), hn::Mul(f.inverse_w, f.inverse_w));
-  const auto in_front = hn::And(hn::Gt(f.w, hn::Zero(d)), hn::Le(f.w, set(s.w_max)));
-  const auto rho_max = set(s.rho_max);
-  f.on_plane = hn::And(in_front, hn::Le(rho_plane, hn::Min(rho_screen, rho_max)));
-  const auto rho = hn::IfThenElse(f.on_plane, rho_plane, rho_screen);
-  f.inside = hn::Le(rho, rho_max);
-  f.opacity = exp2(d, hn::MulAdd(rho, set(-0.72134752F), set(s.log2_opacity)));
-  return f;
-}
-
 // Pixel centres of the lanes from `lane` on of a block whose upper left corner is (x, y).
 template <class D>
 struct PixelCentres {
@@ -114,6 +89,56 @@ HWY_INLINE PixelCentres<D> pixel_centres(D d, int x, int y, size_t lane) {
   const auto half = hn::Set(d, 0.5F);
   return {hn::Add(hn::ConvertTo(d, hn::Add(column, hn::Set(di, x))), half),
           hn::Add(hn::ConvertTo(d, hn::Add(row, hn::Set(di, y))), half)};
+}
+
+// Evaluates `count` pairs of a splat and a vector of pixels side by side. A pair is a long chain of dependent
+// operations; step by step for all pairs the chains overlap.
+template <size_t count, class D>
+HWY_INLINE void evaluate(D d, const Splat* const* splats, const PixelCentres<D>* at,
+                         Footprint<D>* footprints) {
+  const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
+  V<D> rho_screen[count];
+  V<D> rho[count];
+  for (size_t i = 0; i < count; ++i) {
+    const Splat& s = *splats[i];
+    Footprint<D>& f = footprints[i];
+    f.x = hn::Sub(at[i].x, set(s.anchor_x));
+    f.y = hn::Sub(at[i].y, set(s.anchor_y));
+    f.w = hn::MulAdd(set(s.w_x), f.x, hn::MulAdd(set(s.w_y), f.y, set(s.w_1)));
+    f.inverse_w = reciprocal(d, f.w);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const Splat& s = *splats[i];
+    Footprint<D>& f = footprints[i];
+    f.nu = hn::MulAdd(set(s.u_x), f.x, hn::MulAdd(set(s.u_y), f.y, set(s.u_1)));
+    f.nv = hn::MulAdd(set(s.v_x), f.x, hn::MulAdd(set(s.v_y), f.y, set(s.v_1)));
+    f.dx = hn::Sub(f.x, set(s.centre_x));
+    f.dy = hn::Sub(f.y, set(s.centre_y));
+    const auto distance2 = hn::MulAdd(f.dx, f.dx, hn::Mul(f.dy, f.dy));
+    rho_screen[i] = hn::MulAdd(set(2.0F), distance2, set(s.rho_screen_1));
+  }
+  for (size_t i = 0; i < count; ++i) {
+    const Splat& s = *splats[i];
+    Footprint<D>& f = footprints[i];
+    const auto rho_max = set(s.rho_max);
+    const auto rho_plane =
+        hn::Mul(hn::MulAdd(f.nu, f.nu, hn::Mul(f.nv, f.nv)), hn::Mul(f.inverse_w, f.inverse_w));
+    const auto in_front = hn::And(hn::Gt(f.w, hn::Zero(d)), hn::Le(f.w, set(s.w_max)));
+    f.on_plane = hn::And(in_front, hn::Le(rho_plane, hn::Min(rho_screen[i], rho_max)));
+    rho[i] = hn::IfThenElse(f.on_plane, rho_plane, rho_screen[i]);
+    f.inside = hn::Le(rho[i], rho_max);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    footprints[i].opacity = exp2(d, hn::MulAdd(rho[i], set(-0.72134752F), set(splats[i]->log2_opacity)));
+  }
+}
+
+template <class D>
+HWY_INLINE Footprint<D> evaluate(D d, const Splat& splat, const PixelCentres<D>& at) {
+  const Splat* const splats[] = {&splat};
+  Footprint<D> f;
+  evaluate<1>(d, splats, &at, &f);
+  return f;
 }
 
 // The blocks of a tile in which a splat may reach a pixel, as bits. Exact for the ellipse and the low-pass
@@ -221,7 +246,7 @@ struct SortedHits {
       for (uint32_t i = 0; i < lists.counts[block]; ++i) {
         const uint32_t place = lists.of_block[block][i];
         const Splat& splat = saved.splats[lists.entries[place].surfel];
-        const auto f = evaluate(d, splat, at.x, at.y);
+        const auto f = evaluate(d, splat, at);
         HWY_ALIGN float z[pixels_per_block];
         HWY_ALIGN float inside[pixels_per_block];
         hn::Store(f.z(d, splat), d, z);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/parallel.h"
 #include "raster_scenes.h"
 
 // The fast path against the reference. Single precision decides differently at a discontinuity (α at its
@@ -87,6 +88,7 @@ struct Drawn {
   Drawn(const Case& c, uint64_t seed)
       : scene(convert_scene<float>(random_scene(seed, c.width, c.height, c.scene))),
         truth(convert_scene<double>(scene)) {
+    set_threads(1);
     forward(scene.surfels, scene.camera, c.options, found, saved.get());
     forward_reference(truth.surfels, truth.camera, c.options, expected);
     for (int64_t pixel = 0; pixel < int64_t{c.width} * c.height; ++pixel) {
