@@ -4,8 +4,8 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <string>
+#include <system_error>
 
 #include "base/error.h"
 
@@ -14,7 +14,8 @@ namespace traceflow {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const char* step) {
-  throw InputError(path.string(), step, std::strerror(errno), "a writable file", "check space and permissions");
+  throw InputError(path.string(), step, std::system_category().message(errno), "a writable file",
+                   "check space and permissions");
 }
 
 // Closes the descriptor and removes the temporary file unless the write was completed.
