@@ -65,6 +65,9 @@ int run_program(int argc, const char* const* argv) {
   add_verbs(program);
   try {
     program.parse(argc, argv);
+  } catch (const Exit&) {
+    if (arguments.profile) print_profile();
+    throw;
   } catch (const CLI::ParseError& error) {
     return finish_parse(program, error);
   }

@@ -62,11 +62,14 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
   // Either way of multiplying adds one surfel; where there is no room for all, those with the largest signal
   // go first.
   const int64_t room = std::max<int64_t>(0, cap - left);
-  at_cap = static_cast<int64_t>(growing.size()) > room;
-  if (at_cap) {
+  const auto share = static_cast<int64_t>(static_cast<double>(options_.growth) * static_cast<double>(count));
+  const int64_t allowed = std::min(room, std::max<int64_t>(1, share));
+  const auto wanted = static_cast<int64_t>(growing.size());
+  at_cap = wanted > room && room < share;
+  if (wanted > allowed) {
     std::stable_sort(growing.begin(), growing.end(),
                      [&](int64_t a, int64_t b) { return mean_signal(a) > mean_signal(b); });
-    growing.resize(static_cast<size_t>(room));
+    growing.resize(static_cast<size_t>(allowed));
   }
   for (const int64_t i : growing) {
     const bool small = largest_scale(surfels, i) <= options_.clone_below * extent;

@@ -125,18 +125,22 @@ void set_colours_from_views(Surfels& s, const Capture& capture) {
   }
 }
 
-// Surfels of which most sightings lie outside the masks: the still surroundings, which are what a mirror
-// shows.
-RowEdit unmasked_surfels(const Surfels& s, const Capture& capture) {
+// For each surfel, sightings outside the masks less those inside: positive for still surroundings, negative
+// on the moving object, zero where it was never seen.
+std::vector<int> balance_outside_masks(const Surfels& s, const Capture& capture) {
   std::vector<int> balance(static_cast<size_t>(s.count()), 0);
   for_each_sighting(s, capture, [&](int64_t i, const ViewImages& images, int64_t x, int64_t y) {
     balance[static_cast<size_t>(i)] += !images.mask.empty() && images.mask(y, x) ? -1 : 1;
   });
-  RowEdit kept;
+  return balance;
+}
+
+void set_tint_from_masks(Surfels& s, const Capture& capture, const InitialOptions& options) {
+  const std::vector<int> balance = balance_outside_masks(s, capture);
   for (int64_t i = 0; i < s.count(); ++i) {
-    if (balance[static_cast<size_t>(i)] > 0) kept.keep(i);
+    s.tint_logit[i] =
+        logit(balance[static_cast<size_t>(i)] < 0 ? options.tint_in_mask : options.tint_outside_mask);
   }
-  return kept;
 }
 
 // At most `limit` of the points, drawn without replacement, in their order.
@@ -226,7 +230,13 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   as_environment.sh_degree = options.environment_sh_degree;
   Surfels s = surfels_at_points(thinned(points, options.environment_points, random), as_environment, random);
   s.tint_logit = {};
-  edit_rows(s, unmasked_surfels(s, capture));
+  // What the camera sees beside the object is also what the object mirrors.
+  const std::vector<int> balance = balance_outside_masks(s, capture);
+  RowEdit surroundings;
+  for (int64_t i = 0; i < s.count(); ++i) {
+    if (balance[static_cast<size_t>(i)] > 0) surroundings.keep(i);
+  }
+  edit_rows(s, surroundings);
   set_colours_from_views(s, capture);
   return s;
 }
@@ -244,6 +254,9 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
   scene.extent = capture.extent;
   scene.main = surfels_at_points(thinned(points, limit, random), options.initial, random);
   if (options.initial.colours_from_views) set_colours_from_views(scene.main, capture);
+  if (options.initial.tint_in_mask > 0 && capture.has_masks) {
+    set_tint_from_masks(scene.main, capture, options.initial);
+  }
   if (options.deform.main)
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
 

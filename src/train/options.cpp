@@ -16,6 +16,7 @@ TrainOptions cpu_preset() {
   o.iterations = 5000;
   o.save_every = 1000;
   o.initial.tint = 0.1F;
+  o.initial.tint_in_mask = 0.5F;
   o.initial.max_points = 12000;
   o.initial.sh_degree = 2;
   o.initial.environment_sh_degree = 1;
@@ -28,13 +29,20 @@ TrainOptions cpu_preset() {
   o.deform.network.position_frequencies = 8;
   o.deform.environment_network = o.deform.network;
   o.deform.environment_network.position_frequencies = 6;
-  o.rates.position = 4e-4F;
+  o.rates.position = 1e-3F;
+  o.rates.position_end = 1e-5F;
+  o.rates.field = 2e-3F;
   o.rates.field_end = 2e-5F;
   o.density.every = 1800;
   o.density.from = 1800;
+  o.density.growth = 0.1F;
   o.density.opacity_reset_every = 0;
   o.density.max_surfels = 20000;
+  o.environment_density.from = 18000;
   o.environment_density.every = 3000;
+  o.environment_density.prune_above = 1;
+  o.environment_density.prune_opacity = 0.02F;
+  o.environment_density.growth = 0.1F;
   o.environment_density.opacity_reset_every = 0;
   o.environment_density.max_surfels = 12000;
   return o;
@@ -99,6 +107,7 @@ void DensityOptions::validate(const std::string& group) const {
   check_option(max_surfels > 0, group + ".max_surfels", max_surfels, "a positive number");
   check_option(opacity_reset > 0 && opacity_reset < 1, group + ".opacity_reset", opacity_reset,
                "between 0 and 1");
+  check_option(growth > 0 && growth <= 1, group + ".growth", growth, "above 0, up to 1");
   check_option(gradient_threshold > 0, group + ".gradient_threshold", gradient_threshold,
                "a positive number");
 }
@@ -116,9 +125,11 @@ void InitialOptions::validate() const {
                environment_sh_degree, "0 to 3");
   for (const auto& [value, name] : {std::pair{opacity, "initial.opacity"},
                                     {tint, "initial.tint"},
+                                    {tint_outside_mask, "initial.tint_outside_mask"},
                                     {environment_opacity, "initial.environment_opacity"}}) {
     check_option(value > 0 && value < 1, name, value, "between 0 and 1");
   }
+  check_option(tint_in_mask >= 0 && tint_in_mask < 1, "initial.tint_in_mask", tint_in_mask, "0 to under 1");
   check_option(environment_cells >= 1 && environment_cells <= 128, "initial.environment_cells",
                environment_cells, "1 to 128");
   check_option(environment_per_cell >= 1, "initial.environment_per_cell", environment_per_cell, "1 or more");

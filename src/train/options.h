@@ -108,6 +108,7 @@ struct DensityOptions {
   int until = 30000;
   float gradient_threshold = 2e-4F;
   float clone_below = 0.01F;
+  float growth = 1;
   float prune_opacity = 0.05F;
   float prune_above = 0.1F;
   int opacity_reset_every = 3000;
@@ -123,6 +124,8 @@ struct DensityOptions {
             "Mean centre gradient above which a surfel multiplies.");
     v.field("clone_below", clone_below, "extents",
             "Largest scale up to which it is cloned; above, it is split.");
+    v.field("growth", growth, "",
+            "At most this share of the set multiplies at a time, the strongest signals first.");
     v.field("prune_opacity", prune_opacity, "", "Surfels fainter than this go.");
     v.field("prune_above", prune_above, "extents", "Surfels wider than this go.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
@@ -159,6 +162,8 @@ struct InitialOptions {
   int environment_sh_degree = 3;
   float opacity = 0.1F;
   float tint = 0.001F;
+  float tint_in_mask = 0;
+  float tint_outside_mask = 0.001F;
   bool colours_from_views = true;
   bool normals_from_points = true;
   int environment_cells = 32;
@@ -175,6 +180,10 @@ struct InitialOptions {
     v.field("environment_sh_degree", environment_sh_degree, "", "Degree of the environment's harmonics.");
     v.field("opacity", opacity, "", "First opacity of main surfels.");
     v.field("tint", tint, "", "First specular tint; short schedules want 0.1.");
+    v.field(
+        "tint_in_mask", tint_in_mask, "",
+        "First tint of surfels that the capture's masks show on the moving object; 0: masks do not matter.");
+    v.field("tint_outside_mask", tint_outside_mask, "", "Then the first tint of the others.");
     v.field("colours_from_views", colours_from_views, "",
             "First colours from photographs near time 0, else grey.");
     v.field("normals_from_points", normals_from_points, "",
