@@ -152,12 +152,34 @@ BENCHMARK_CAPTURE(forward, faint, faint, 0.0)
     ->Arg(8)
     ->Arg(16)
     ->Arg(64);
+BENCHMARK_CAPTURE(forward, faint_uneven, faint, 0.2)->Unit(benchmark::kMillisecond)->Arg(16);
 BENCHMARK_CAPTURE(forward, opaque, opaque, 0.0)
     ->Unit(benchmark::kMillisecond)
     ->Arg(4)
     ->Arg(8)
     ->Arg(16)
     ->Arg(64);
+
+void backward(benchmark::State& state, const Setting& setting, double unevenness) {
+  set_threads(1);
+  const PosedSurfels surfels = make_shell(setting);
+  const Rays rays = reflect_off_ball(256, unevenness);
+  const trace::Options options;
+  const trace::BvhPtr bvh = trace::make_bvh();
+  const trace::SavedPtr saved = trace::make_saved();
+  trace::build(surfels, options, *bvh);
+  trace::Output output;
+  trace::forward(surfels, *bvh, rays.origins, rays.directions, options, output, saved.get());
+  trace::OutputGradient grad{output.colour, output.alpha, output.distance};
+  trace::InputGradient gradient;
+  for (auto _ : state) {
+    trace::backward(surfels, rays.origins, rays.directions, options, *saved, grad, gradient);
+  }
+  state.SetItemsProcessed(state.iterations() * rays.origins.dim(0));
+}
+BENCHMARK_CAPTURE(backward, faint, faint, 0.0)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(backward, faint_uneven, faint, 0.2)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(backward, opaque, opaque, 0.0)->Unit(benchmark::kMillisecond);
 
 void build(benchmark::State& state) {
   set_threads(static_cast<int>(state.range(0)));

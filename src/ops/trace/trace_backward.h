@@ -57,13 +57,14 @@ struct BackwardInput {
   const Options& options;
   const OutputGradient& grad_output;
   const std::vector<BackwardFrame>& frames;
+  const RayOrder& order;
 };
 
 // One block of rays: writes records, the rays' gradients, and the rays' SH bases.
 struct BackwardRays {
   const BackwardInput& input;
   const SavedBlock& saved;
-  int64_t first_ray;        // of the block
+  int64_t first_ray;        // of the block; in the tracer's order, as all positions here
   int64_t first_chunk_ray;  // of the chunk
   std::vector<uint32_t>& offsets;
   Record* records;

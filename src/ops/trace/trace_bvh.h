@@ -12,6 +12,9 @@ namespace traceflow::trace {
 
 inline constexpr int bvh_width = 16;
 
+// No hit lies farther. Less than infinity, where the boxes of unused children are.
+inline constexpr float farthest_distance = 1e30F;
+
 // A child is a node or a leaf, told apart by the top bit.
 inline constexpr uint32_t leaf_bit = 0x80000000U;
 
@@ -27,6 +30,7 @@ struct alignas(64) BvhLeaf {
   float v[3][bvh_width];  // t_v / scale
   float normal[3][bvh_width];
   float log_opacity[bvh_width];  // -inf in an unused slot
+  float radius[bvh_width];       // of a sphere around the disk; scene units
   uint32_t surfel[bvh_width];
 };
 
@@ -41,6 +45,7 @@ class Bvh {
   std::vector<BvhNode> nodes;
   std::vector<BvhLeaf> leaves;
   int64_t surfels = 0;  // of the set that it was built from
+  float leaf_size = 0;  // of a typical leaf: half its box's diagonal; scene units
 };
 
 }  // namespace traceflow::trace

@@ -122,21 +122,22 @@ HWY_INLINE Vec3<float> direction_backward(const UnitRay& ray, const Vec3<float>&
 }
 
 template <int degree>
-void backward_ray(const BackwardRays& task, int64_t r, const RayHits& hits, RayScratch& scratch) {
+void backward_ray(const BackwardRays& task, int64_t position, const RayHits& hits, RayScratch& scratch) {
   const BackwardInput& input = task.input;
+  const int64_t r = input.order.ray[static_cast<size_t>(position)];
   UnitRay ray;
   make_unit_ray(input.origins.row(r), input.directions.row(r), ray);
   scratch.fit(hits.count);
   for (size_t i = 0; i < hits.count; ++i) {
     scratch.record[i] = task.records + task.offsets[hits.surfel[i] / surfels_per_bucket]++;
-    scratch.record[i]->ray = static_cast<uint32_t>(r - task.first_chunk_ray);
+    scratch.record[i]->ray = static_cast<uint32_t>(position - task.first_chunk_ray);
     scratch.record[i]->surfel = hits.surfel[i];
   }
   const RaySums sums = replay(hits, scratch.transmittance.data());
   const RayGradient grad(input.grad_output, r, ray.length);
   float basis[padded_basis];
   padded_sh_basis(degree, ray.direction, basis);
-  std::copy_n(basis, 16, task.bases + 16 * (r - task.first_chunk_ray));
+  std::copy_n(basis, 16, task.bases + 16 * (position - task.first_chunk_ray));
   Vec3<float> grad_unit =
       colours_backward<degree>(input.surfels, hits, sums, grad, ray.direction, basis, scratch);
   Vec3<float> grad_origin(0);
@@ -268,14 +269,14 @@ void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const T
               const Options& options, const Saved& saved, const OutputGradient& grad_output,
               InputGradient& gradient) {
   const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  require(saved.rays == rays, "the hits were saved for these rays");
+  require(static_cast<int64_t>(saved.order.ray.size()) == rays, "the hits were saved for these rays");
   gradient.surfels.reset_like(surfels);
   gradient.origins.reset({rays, 3});
   gradient.directions.reset({rays, 3});
   gradient.position_gradient.reset({surfels.count()});
   const std::vector<BackwardFrame> frames = make_backward_frames(surfels);
   std::vector<Record> sums(frames.size(), Record{});
-  const BackwardInput input{surfels, origins, directions, options, grad_output, frames};
+  const BackwardInput input{surfels, origins, directions, options, grad_output, frames, saved.order};
   Chunk chunk;
   ChunkRoom room;
   for (size_t block = 0; block < saved.blocks.size(); block = chunk.last_block) {

@@ -16,9 +16,13 @@ void grow_tensor(Tensor<T>& tensor, size_t capacity, size_t used) {
   tensor = std::move(larger);
 }
 
-void order_ties(Hits& hits, size_t begin, size_t end) {
+uint32_t name(const Hits& hits, size_t i, const uint32_t* names) {
+  return names ? names[hits.surfel[i]] : hits.surfel[i];
+}
+
+void order_ties(Hits& hits, size_t begin, size_t end, const uint32_t* names) {
   for (size_t i = begin + 1; i < end; ++i) {
-    for (size_t j = i; j > begin && hits.surfel[j] < hits.surfel[j - 1]; --j) {
+    for (size_t j = i; j > begin && name(hits, j, names) < name(hits, j - 1, names); --j) {
       std::swap(hits.surfel[j], hits.surfel[j - 1]);
       std::swap(hits.alpha[j], hits.alpha[j - 1]);
     }
@@ -49,7 +53,7 @@ void swap(Hits& a, Hits& b) noexcept {
   std::swap(a.capacity_, b.capacity_);
 }
 
-void HitSorter::place(const uint32_t* rank, Hits& hits) {
+void HitSorter::place(const uint32_t* rank, Hits& hits, const uint32_t* names) {
   sorted_.count = 0;
   sorted_.reserve_more(hits.count);
   for (size_t i = 0; i < hits.count; ++i) {
@@ -63,13 +67,13 @@ void HitSorter::place(const uint32_t* rank, Hits& hits) {
   for (size_t begin = 0; begin + 1 < hits.count;) {
     size_t end = begin + 1;
     while (end < hits.count && hits.distance[end] == hits.distance[begin]) ++end;
-    if (end - begin > 1) order_ties(hits, begin, end);
+    if (end - begin > 1) order_ties(hits, begin, end, names);
     begin = end;
   }
 }
 
 // Distances are not negative, so their bits order as they do.
-void HitSorter::sort_many(Hits& hits) {
+void HitSorter::sort_many(Hits& hits, const uint32_t* names) {
   const size_t n = hits.count;
   keys_.resize({static_cast<int64_t>(2 * n)});
   uint64_t* keys = keys_.data();
@@ -79,7 +83,7 @@ void HitSorter::sort_many(Hits& hits) {
   };
   auto* keyed = reinterpret_cast<Keyed*>(keys);
   for (size_t i = 0; i < n; ++i) {
-    keyed[i] = {uint64_t{std::bit_cast<uint32_t>(hits.distance[i])} << 32 | hits.surfel[i], i};
+    keyed[i] = {uint64_t{std::bit_cast<uint32_t>(hits.distance[i])} << 32 | name(hits, i, names), i};
   }
   std::sort(keyed, keyed + n, [](const Keyed& a, const Keyed& b) { return a.key < b.key; });
   sorted_.count = 0;

@@ -10,9 +10,15 @@ namespace traceflow::trace {
 struct Hits {
   float* distance = nullptr;
   float* alpha = nullptr;
-  uint32_t* surfel = nullptr;
+  uint32_t* surfel = nullptr;  // or whatever stands for one
   size_t count = 0;
 
+  void push(float t, float a, uint32_t s) {
+    reserve_more(1);
+    distance[count] = t;
+    alpha[count] = a;
+    surfel[count++] = s;
+  }
   void reserve_more(size_t more) {
     if (count + more + slack > capacity_) grow(count + more + slack);
   }
@@ -33,8 +39,9 @@ class HitSorter {
   // Up to so many hits each is placed by counting the ones before it.
   static constexpr size_t most_ranked = 192;
 
-  void place(const uint32_t* rank, Hits& hits);
-  void sort_many(Hits& hits);
+  // `names`: the surfel of what each hit names, null where hits name surfels.
+  void place(const uint32_t* rank, Hits& hits, const uint32_t* names);
+  void sort_many(Hits& hits, const uint32_t* names);
 
  private:
   Hits sorted_;

@@ -8,6 +8,7 @@
 #include "math/types.h"
 #include "ops/trace/trace.h"
 #include "ops/trace/trace_hits.h"
+#include "ops/trace/trace_order.h"
 #include "ops/trace/trace_usable.h"
 
 // What the tracer's forward and backward passes share.
@@ -15,15 +16,18 @@ namespace traceflow::trace {
 
 inline constexpr int64_t rays_per_block = 256;
 
-// The hits of a block of rays as they were blended, ray after ray, front to back.
+// The hits of a block of rays as they were blended, ray after ray in the tracer's order, front to back.
 struct SavedBlock {
   std::vector<uint32_t> surfel;
   std::vector<float> distance;  // scene units
   std::vector<float> alpha;
   std::vector<uint32_t> ray_end;  // of each ray of the block, where its hits end
 
-  void append(const Hits& hits, size_t count) {
+  // `names` as in HitSorter.
+  void append(const Hits& hits, size_t count, const uint32_t* names) {
+    const size_t before = surfel.size();
     surfel.insert(surfel.end(), hits.surfel, hits.surfel + count);
+    for (size_t i = before; names && i < surfel.size(); ++i) surfel[i] = names[surfel[i]];
     distance.insert(distance.end(), hits.distance, hits.distance + count);
     alpha.insert(alpha.end(), hits.alpha, hits.alpha + count);
   }
@@ -37,8 +41,8 @@ struct SavedBlock {
 };
 
 struct Saved {
+  RayOrder order;
   std::vector<SavedBlock> blocks;
-  int64_t rays = 0;
 };
 
 // One block of rays of a forward pass.
@@ -48,7 +52,8 @@ struct BlockTask {
   const Tensor<float>& origins;
   const Tensor<float>& directions;
   const Options& options;
-  int64_t begin, end;
+  const RayOrder& order;
+  int64_t begin, end;  // in that order
   Output& output;
   SavedBlock* saved;  // may be null
 };

@@ -1,0 +1,112 @@
+#include "ops/trace/trace_order.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "ops/trace/trace_kernels.h"
+
+namespace traceflow::trace {
+
+namespace {
+
+constexpr uint32_t untraceable_key = 1U << 30;  // behind all 30-bit keys
+
+// Moves the lower 10 bits apart: to bits 0, 3, 6, …
+uint32_t spread_bits(uint32_t x) {
+  x = (x | x << 16) & 0x030000FFU;
+  x = (x | x << 8) & 0x0300F00FU;
+  x = (x | x << 4) & 0x030C30C3U;
+  return (x | x << 2) & 0x09249249U;
+}
+
+uint32_t morton_key(const Vec3<float>& unit_cube) {
+  const Vec3<float> cell = glm::clamp(unit_cube, Vec3<float>(0), Vec3<float>(1)) * 1023.0F;
+  return spread_bits(static_cast<uint32_t>(cell.x)) | spread_bits(static_cast<uint32_t>(cell.y)) << 1 |
+         spread_bits(static_cast<uint32_t>(cell.z)) << 2;
+}
+
+Vec3<float> median(std::vector<Vec3<float>> points) {
+  if (points.empty()) return Vec3<float>(0);
+  Vec3<float> result;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto middle = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 2);
+    std::nth_element(points.begin(), middle, points.end(),
+                     [axis](const Vec3<float>& a, const Vec3<float>& b) { return a[axis] < b[axis]; });
+    result[axis] = (*middle)[axis];
+  }
+  return result;
+}
+
+// Medians of samples: neither stray rays nor stray surfels move them.
+Vec3<float> typical_origin(const Tensor<float>& origins, const Tensor<float>& directions) {
+  constexpr int64_t samples = 1000;
+  const int64_t rays = origins.dim(0);
+  std::vector<Vec3<float>> points;
+  for (int64_t r = 0; r < rays; r += std::max<int64_t>(1, rays / samples)) {
+    if (is_traceable(origins.row(r), directions.row(r))) points.push_back(load3<float>(origins.row(r)));
+  }
+  return median(std::move(points));
+}
+
+float typical_distance(const Bvh& bvh, const Vec3<float>& from) {
+  constexpr size_t samples = 1000;
+  std::vector<float> distances;
+  for (size_t i = 0; i < bvh.leaves.size(); i += std::max<size_t>(1, bvh.leaves.size() / samples)) {
+    const auto& p = bvh.leaves[i].position;
+    distances.push_back(glm::length(Vec3<float>(p[0][0], p[1][0], p[2][0]) - from));
+  }
+  if (distances.empty()) return 1;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return std::isfinite(*middle) && *middle > 0 ? *middle : 1;
+}
+
+struct Keyed {
+  uint32_t key, ray;
+};
+
+// Stable, least significant digit first.
+void radix_sort(std::vector<Keyed>& items) {
+  constexpr int digit_bits = 11;
+  constexpr uint32_t digits = 1U << digit_bits;
+  std::vector<Keyed> other(items.size());
+  for (int shift = 0; shift < 31; shift += digit_bits) {
+    std::array<uint32_t, digits> next{};
+    for (const Keyed& item : items) ++next[item.key >> shift & (digits - 1)];
+    uint32_t sum = 0;
+    for (uint32_t& n : next) {
+      const uint32_t count = n;
+      n = sum;
+      sum += count;
+    }
+    for (const Keyed& item : items) other[next[item.key >> shift & (digits - 1)]++] = item;
+    items.swap(other);
+  }
+}
+
+}  // namespace
+
+void order_rays(const Bvh& bvh, const Tensor<float>& origins, const Tensor<float>& directions,
+                RayOrder& order) {
+  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
+  order.ray.resize(static_cast<size_t>(rays));
+  if (rays == 0) return;
+  const Vec3<float> centre = typical_origin(origins, directions);
+  order.reach = typical_distance(bvh, centre);
+  const float scale = 0.25F / order.reach;
+  std::vector<Keyed> items(static_cast<size_t>(rays));
+  parallel_for("trace order", rays, [&](int64_t r) {
+    UnitRay ray;
+    uint32_t key = untraceable_key;
+    if (make_unit_ray(origins.row(r), directions.row(r), ray)) {
+      key = morton_key(scale * (ray.origin + order.reach * ray.direction - centre) + Vec3<float>(0.5F));
+    }
+    items[static_cast<size_t>(r)] = {key, static_cast<uint32_t>(r)};
+  });
+  radix_sort(items);
+  std::transform(items.begin(), items.end(), order.ray.begin(), [](const Keyed& item) { return item.ray; });
+}
+
+}  // namespace traceflow::trace
