@@ -29,7 +29,7 @@ Tensor<float> every_nth(const Tensor<float>& points) {
 
 // Unit normals of either sign; zero where the neighbours do not lie in a plane.
 Tensor<float> point_normals(const Tensor<float>& points) {
-  constexpr double flat = 0.25;  // thickness² against width²
+  constexpr double flat = 0.1;  // thickness² against width²
   const Neighbours near = nearest_neighbours(points, neighbour_count);
   Tensor<float> normals(points.shape());
   parallel_for("prior axes: planes", points.dim(0), [&](int64_t i) {
@@ -62,45 +62,53 @@ struct Sums {
   }
 };
 
-// The nearest depth in each square of 8×8 pixels: what lies well behind it is taken for hidden.
+// The nearest depth in each square of the image, of a size that a few points fall into each: what lies well
+// behind it is taken for hidden.
 class DepthCells {
  public:
-  DepthCells(const Camera<float>& camera, const Tensor<float>& points)
-      : width_(static_cast<size_t>(camera.width) / side + 1),
-        nearest_(width_ * (static_cast<size_t>(camera.height) / side + 1),
-                 std::numeric_limits<float>::infinity()) {
+  DepthCells(const Camera<float>& camera, const Tensor<float>& points) : camera_(camera) {
+    constexpr double points_in_cell = 24;
+    std::vector<Vec3<float>> seen;  // pixel, depth
     for (int64_t i = 0; i < points.dim(0); ++i) {
       const Vec3<float> x = camera.point_in_camera(load3<float>(points.row(i)));
       Vec2<float> at;
-      if (!sees(camera, x, at)) continue;
-      float& depth = cell(at);
-      depth = std::min(depth, x.z);
+      if (sees(x, at)) seen.emplace_back(at, x.z);
+    }
+    const double area = static_cast<double>(camera.width) * camera.height;
+    side_ = std::max(8.0F, static_cast<float>(std::sqrt(area * points_in_cell /
+                                                        std::max(1.0, static_cast<double>(seen.size())))));
+    columns_ = static_cast<size_t>(static_cast<float>(camera.width) / side_) + 1;
+    const size_t rows = static_cast<size_t>(static_cast<float>(camera.height) / side_) + 1;
+    nearest_.assign(columns_ * rows, std::numeric_limits<float>::infinity());
+    for (const Vec3<float>& s : seen) {
+      float& depth = nearest_[cell({s.x, s.y})];
+      depth = std::min(depth, s.z);
     }
   }
-  static bool sees(const Camera<float>& camera, const Vec3<float>& x, Vec2<float>& at) {
+  bool sees(const Vec3<float>& x, Vec2<float>& at) const {
     if (!(x.z > 0)) return false;
-    at = camera.project(x);
-    return at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
-           at.y < static_cast<float>(camera.height);
+    at = camera_.project(x);
+    return at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera_.width) &&
+           at.y < static_cast<float>(camera_.height);
   }
-  bool hides(const Vec2<float>& at, float depth) { return depth > 1.05F * cell(at); }
+  bool hides(const Vec2<float>& at, float depth) const { return depth > 1.05F * nearest_[cell(at)]; }
 
  private:
-  static constexpr size_t side = 8;
-  float& cell(const Vec2<float>& at) {
-    const auto column = static_cast<size_t>(at.x) / side, row = static_cast<size_t>(at.y) / side;
-    return nearest_[row * width_ + column];
+  size_t cell(const Vec2<float>& at) const {
+    return static_cast<size_t>(at.y / side_) * columns_ + static_cast<size_t>(at.x / side_);
   }
-  size_t width_;
+  const Camera<float>& camera_;
+  float side_ = 8;
+  size_t columns_ = 1;
   std::vector<float> nearest_;
 };
 
 void add_view(const PriorView& view, const Tensor<float>& points, const Tensor<float>& normals, Sums& sums) {
-  DepthCells cells(view.camera, points);
+  const DepthCells cells(view.camera, points);
   for (int64_t i = 0; i < points.dim(0); ++i) {
     const Vec3<float> x = view.camera.point_in_camera(load3<float>(points.row(i)));
     Vec2<float> at;
-    if (!DepthCells::sees(view.camera, x, at) || cells.hides(at, x.z)) continue;
+    if (!cells.sees(x, at) || cells.hides(at, x.z)) continue;
     const Vec3<double> prior =
         load3<double>(&view.normal(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x), 0));
     Vec3<double> truth(view.camera.camera_from_world * load3<float>(normals.row(i)));
