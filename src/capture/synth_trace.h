@@ -35,6 +35,6 @@ struct Radiance {
   Vector diffuse{0};
   Vector specular{0};
 };
-Radiance trace_path(const Stage& stage, const Ray& ray, Sampler& sampler);
+Radiance trace_path(const Stage& stage, const Ray& first, Sampler& sampler);
 
 }  // namespace traceflow::synth
