@@ -49,6 +49,12 @@ TEST(ErrorBoundary, BrokenPromisesAreCalledBugsAndCode3) {
   EXPECT_EQ(outcome([]() -> int { throw 7; }).code, 3);
 }
 
+TEST(ErrorBoundary, AVerbThatHasSaidEverythingOnlyGivesItsCode) {
+  const Outcome o = outcome([]() -> int { throw Exit{exit_interrupted}; });
+  EXPECT_EQ(o.code, 130);
+  EXPECT_EQ(o.line, "");
+}
+
 TEST(ErrorBoundary, MemoryIsCode4AndOneLine) {
   const Outcome o = outcome([]() -> int { throw std::bad_alloc(); });
   EXPECT_EQ(o.code, 4);
