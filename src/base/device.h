@@ -7,7 +7,8 @@
 #define TRACEFLOW_HD
 #endif
 
-// For a small function that a loop must swallow whole in order to be vectorised, whatever the loop's target is.
+// For a small function that a loop must swallow whole in order to be vectorised, whatever the loop's target
+// is.
 #define TRACEFLOW_ALWAYS_INLINE inline __attribute__((always_inline))
 
 namespace traceflow {
