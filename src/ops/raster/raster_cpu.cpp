@@ -1,3 +1,5 @@
+#include <type_traits>
+
 #include "base/parallel.h"
 #include "ops/raster/raster_kernels.h"
 
@@ -19,6 +21,7 @@ struct BlockSums {
   alignas(64) float normal[3][pixels_per_block];
   alignas(64) float tint[pixels_per_block];
   alignas(64) float median_depth[pixels_per_block];
+  alignas(64) float distortion[pixels_per_block];
 };
 
 // The state of the pixels of one vector.
@@ -41,13 +44,14 @@ class Blend {
         m2_(hn::Zero(d)),
         first_inverse_z_(hn::Zero(d)),
         median_depth_(hn::Zero(d)),
+        next_(hn::Zero(Int<D>())),
         last_(hn::Set(Int<D>(), -1)),
         median_(hn::Set(Int<D>(), -1)) {}
 
   HWY_INLINE bool is_live(D d) const { return !hn::AllFalse(d, live_); }
 
-  // Blends a hit; `place` is its place in the list. Returns whether any pixel took it.
-  HWY_INLINE bool add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f, uint32_t place) {
+  // Blends the next hit of the list. Returns whether any pixel took it.
+  HWY_INLINE bool add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f) {
     const Int<D> di;
     const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
     const auto one = set(1.0F);
@@ -62,16 +66,16 @@ class Blend {
     const auto inverse_z = f.inverse_z(d, s);
     const auto is_first = hn::And(hit, hn::Eq(transmittance_, one));
     first_inverse_z_ = hn::IfThenElse(is_first, inverse_z, first_inverse_z_);
-    const auto m = hn::Mul(set(o.m_scale), hn::Sub(first_inverse_z_, inverse_z));
+    const auto m = hn::Sub(first_inverse_z_, inverse_z);
     const auto wm = hn::Mul(weight, m);
     m_ = hn::Add(m_, wm);
     m2_ = hn::MulAdd(wm, m, m2_);
     // The last hit before the transmittance is one half or less; none if it never is.
     const auto may_be_median = hn::And(hit, hn::Gt(transmittance_, set(0.5F)));
-    const auto here = hn::Set(di, static_cast<int32_t>(place));
     median_depth_ = hn::IfThenElse(may_be_median, z, median_depth_);
-    median_ = hn::IfThenElse(hn::RebindMask(di, may_be_median), here, median_);
-    last_ = hn::IfThenElse(hn::RebindMask(di, hit), here, last_);
+    median_ = hn::IfThenElse(hn::RebindMask(di, may_be_median), next_, median_);
+    last_ = hn::IfThenElse(hn::RebindMask(di, hit), next_, last_);
+    next_ = hn::Add(next_, hn::Set(di, 1));
 
     alpha_ = hn::Add(alpha_, weight);
     red_ = hn::MulAdd(weight, set(s.colour[0]), red_);
@@ -103,8 +107,14 @@ class Blend {
     hn::StoreU(transmittance_, d, saved.transmittance + lane);
     hn::StoreU(alpha_, d, saved.alpha + lane);
     hn::StoreU(hn::IfThenElseZero(is_hit, hn::Div(depth_, alpha_)), d, saved.depth + lane);
-    hn::StoreU(m_, d, saved.m + lane);
-    hn::StoreU(m2_, d, saved.m2 + lane);
+    // Σ over pairs of w_i w_j (m_i - m_j)² = A M2 - M1²
+    const auto m_scale = hn::Set(d, o.m_scale);
+    const auto m = hn::Mul(m_scale, m_);
+    const auto m2 = hn::Mul(hn::Mul(m_scale, m_scale), m2_);
+    const auto distortion = hn::NegMulAdd(m, m, hn::Mul(alpha_, m2));
+    hn::StoreU(hn::Max(distortion, hn::Zero(d)), d, sums.distortion + lane);
+    hn::StoreU(m, d, saved.m + lane);
+    hn::StoreU(m2, d, saved.m2 + lane);
     hn::StoreU(first_inverse_z_, d, saved.inverse_z + lane);
     hn::StoreU(last_, di, saved.last + lane);
     hn::StoreU(hn::IfThenElse(hn::RebindMask(di, has_median), median_, hn::Set(di, -1)), di,
@@ -115,26 +125,37 @@ class Blend {
   M<D> live_;
   V<D> transmittance_, alpha_, red_, green_, blue_, tint_, normal_x_, normal_y_, normal_z_, depth_, m_, m2_;
   V<D> first_inverse_z_, median_depth_;
-  V<Int<D>> last_, median_;
+  V<Int<D>> next_, last_, median_;  // places in the list
 };
+
+// One row of a block; a constant number of columns makes copies of vectors.
+template <class Columns>
+HWY_INLINE void write_row(const SavedBlock& saved, const BlockSums& sums, int begin, int64_t pixel,
+                          Columns columns, Output& output) {
+  for (int i = 0; i < columns; ++i) {
+    for (int c = 0; c < 3; ++c) output.colour[3 * (pixel + i) + c] = sums.colour[c][begin + i];
+    for (int c = 0; c < 3; ++c) output.normal[3 * (pixel + i) + c] = sums.normal[c][begin + i];
+  }
+  const auto copy = [&](const float* from, Tensor<float>& to) {
+    for (int i = 0; i < columns; ++i) to[pixel + i] = from[begin + i];
+  };
+  copy(saved.alpha, output.alpha);
+  copy(sums.tint, output.tint);
+  copy(saved.depth, output.depth);
+  copy(sums.median_depth, output.median_depth);
+  copy(sums.distortion, output.distortion);
+}
 
 HWY_INLINE void write_block(const SavedBlock& saved, const BlockSums& sums, int block_x, int block_y,
                             int width, int height, Output& output) {
   const int rows = std::min(block_edge, height - block_y);
   const int columns = std::min(block_edge, width - block_x);
   for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
-      const int i = row * block_edge + column;
-      const int64_t pixel = int64_t{block_y + row} * width + block_x + column;
-      for (int c = 0; c < 3; ++c) {
-        output.colour[3 * pixel + c] = sums.colour[c][i];
-        output.normal[3 * pixel + c] = sums.normal[c][i];
-      }
-      output.alpha[pixel] = saved.alpha[i];
-      output.tint[pixel] = sums.tint[i];
-      output.depth[pixel] = saved.depth[i];
-      output.median_depth[pixel] = sums.median_depth[i];
-      output.distortion[pixel] = std::max(saved.alpha[i] * saved.m2[i] - saved.m[i] * saved.m[i], 0.0F);
+    const int64_t pixel = int64_t{block_y + row} * width + block_x;
+    if (columns == block_edge) {
+      write_row(saved, sums, row * block_edge, pixel, std::integral_constant<int, block_edge>(), output);
+    } else {
+      write_row(saved, sums, row * block_edge, pixel, columns, output);
     }
   }
 }
@@ -151,9 +172,9 @@ class TileBlender {
     SortedHits sorted;
     for (uint32_t place = 0; place < lists_.count; ++place) saved_.touched[lists_.entries[place].entry] = 0;
     for (int block = 0; block < blocks_per_tile; ++block) {
-      const int x = lists_.x + block % blocks_per_row * block_edge;
-      const int y = lists_.y + block / blocks_per_row * block_edge;
-      if (x >= saved_.width || y >= saved_.height) continue;
+      if ((lists_.blocks >> block & 1U) == 0) continue;
+      const int x = lists_.block_x(block);
+      const int y = lists_.block_y(block);
       BlockSums sums;
       SavedBlock& left = saved_.blocks[tile_ * blocks_per_tile + block];
       if (order == SortOrder::centre) {
@@ -188,6 +209,10 @@ class TileBlender {
     }
     for (; places != end && blend.is_live(d); ++places) add_places<1>(d, places, block, at, blend);
     blend.store(d, o_, lane, left, sums);
+    for (size_t i = lane; i < lane + hn::Lanes(d); ++i) {
+      if (left.last[i] >= 0) left.last[i] = static_cast<int32_t>(lists_.of_block[block][left.last[i]]);
+      if (left.median[i] >= 0) left.median[i] = static_cast<int32_t>(lists_.of_block[block][left.median[i]]);
+    }
   }
 
   template <size_t count>
@@ -202,7 +227,7 @@ class TileBlender {
     }
     evaluate<count>(d, splats, centres, footprints);
     for (size_t i = 0; i < count; ++i) {
-      if (blend.add(d, o_, *splats[i], footprints[i], places[i])) touch(lists_.entries[places[i]], block);
+      if (blend.add(d, o_, *splats[i], footprints[i])) touch(lists_.entries[places[i]], block);
     }
   }
 
@@ -214,7 +239,7 @@ class TileBlender {
     for (uint32_t i = 0; i < hits.size() && blend.is_live(d); ++i) {
       const TileEntry entry = lists_.entries[hits[i].place];
       const Splat& splat = saved_.splats[entry.surfel];
-      if (blend.add(d, o_, splat, evaluate(d, splat, at), i)) touch(entry, block);
+      if (blend.add(d, o_, splat, evaluate(d, splat, at))) touch(entry, block);
     }
     blend.store(d, o_, lane, left, sums);
   }
@@ -230,7 +255,7 @@ class TileBlender {
   Saved& saved_;
 };
 
-void blend_tile(SortOrder order, const KernelOptions& o, int64_t tile, Tensor<uint32_t>& memory, Saved& saved,
+void blend_tile(SortOrder order, const KernelOptions& o, int64_t tile, TileMemory& memory, Saved& saved,
                 Output& output) {
   const TileLists lists = tile_lists(saved, tile, memory);
   TileBlender(o, lists, tile, saved).run(order, output);
@@ -258,7 +283,7 @@ void blend(const Options& options, Output& output, Saved& saved) {
   const KernelOptions kernel_options(options);
   const auto blend_one = HWY_DYNAMIC_DISPATCH(blend_tile);
   parallel_blocks("raster: blend", saved.tiles(), 1, [&](int64_t tile, int64_t) {
-    static thread_local Tensor<uint32_t> memory;
+    static thread_local TileMemory memory;
     blend_one(options.sort, kernel_options, tile, memory, saved, output);
   });
 }

@@ -223,16 +223,13 @@ class TileUnblender {
     }
     SortedHits sorted;
     for (int block = 0; block < blocks_per_tile; ++block) {
-      if (block_x(block) >= saved_.width || block_y(block) >= saved_.height) continue;
-      sorted.collect(saved_, lists_, block, block_x(block), block_y(block));
+      if ((lists_.blocks >> block & 1U) == 0) continue;
+      sorted.collect(saved_, lists_, block, lists_.block_x(block), lists_.block_y(block));
       for (size_t i = 0; i < pixels_per_block; ++i) add_pixel(sorted.of_pixel[i], block, i);
     }
   }
 
  private:
-  int block_x(int block) const { return lists_.x + block % blocks_per_row * block_edge; }
-  int block_y(int block) const { return lists_.y + block / blocks_per_row * block_edge; }
-
   HWY_INLINE void add_surfel(const TileEntry& entry, uint32_t touched, uint32_t place) {
     const Pixels d;
     const Splat& splat = saved_.splats[entry.surfel];
@@ -240,7 +237,7 @@ class TileUnblender {
     for (; touched != 0; touched &= touched - 1) {
       const int block = std::countr_zero(touched);
       for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
-        const auto at = pixel_centres(d, block_x(block), block_y(block), lane);
+        const auto at = pixel_centres(d, lists_.block_x(block), lists_.block_y(block), lane);
         sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
                                            state_.blocks[block]);
       }
@@ -250,7 +247,7 @@ class TileUnblender {
 
   HWY_INLINE void add_pixel(const std::vector<SortedHits::Hit>& hits, int block, size_t lane) {
     const OnePixel d;
-    const auto at = pixel_centres(d, block_x(block), block_y(block), lane);
+    const auto at = pixel_centres(d, lists_.block_x(block), lists_.block_y(block), lane);
     for (auto place = static_cast<uint32_t>(blocks_[block].last[lane] + 1); place-- > 0;) {
       const TileEntry entry = lists_.entries[hits[place].place];
       const Splat& splat = saved_.splats[entry.surfel];
@@ -282,16 +279,15 @@ HWY_INLINE void unblend(SortOrder order, const KernelOptions& o, const TileLists
   }
 }
 
-void unblend_tile(SortOrder order, const KernelOptions& o, int64_t index, Tensor<uint32_t>& memory,
+void unblend_tile(SortOrder order, const KernelOptions& o, int64_t index, TileMemory& memory,
                   const Saved& saved, const OutputGradient& grad_output) {
   const TileLists lists =
       order == SortOrder::centre ? tile_entries(saved, index) : tile_lists(saved, index, memory);
   const SavedBlock* const blocks = &saved.blocks[index * blocks_per_tile];
   TileState state;
   for (int block = 0; block < blocks_per_tile; ++block) {
-    load_block(grad_output, o.background, lists.x + block % blocks_per_row * block_edge,
-               lists.y + block / blocks_per_row * block_edge, saved.width, saved.height, blocks[block],
-               state.blocks[block]);
+    load_block(grad_output, o.background, lists.block_x(block), lists.block_y(block), saved.width,
+               saved.height, blocks[block], state.blocks[block]);
   }
   if (grad_output.distortion.empty()) {
     unblend<false>(order, o, lists, blocks, saved, state);
@@ -313,7 +309,7 @@ void blend_backward(const Options& options, const Saved& saved, const OutputGrad
   const KernelOptions kernel_options(options);
   const auto unblend_one = HWY_DYNAMIC_DISPATCH(unblend_tile);
   parallel_blocks("raster: blend backward", saved.tiles(), 1, [&](int64_t tile, int64_t) {
-    static thread_local Tensor<uint32_t> memory;
+    static thread_local TileMemory memory;
     unblend_one(options.sort, kernel_options, tile, memory, saved, grad_output);
   });
 }

@@ -1,11 +1,12 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cfloat>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "base/parallel.h"
-#include "math/blend.h"
 #include "math/rotation.h"
 #include "math/spherical_harmonics.h"
 #include "math/surfel_projection.h"
@@ -39,7 +40,7 @@ struct Rectangle {
 struct Disk {
   Vec3<double> centre, half_u, half_v;
 
-  double nearest_z() const { return centre.z - std::hypot(half_u.z, half_v.z); }
+  double nearest_z() const { return centre.z - std::sqrt(half_u.z * half_u.z + half_v.z * half_v.z); }
 };
 
 // The projection of a disk that lies well in front of the camera is an ellipse; its bounding box is exact.
@@ -107,7 +108,9 @@ class Preparer {
         camera_(convert<double>(camera)),
         options_(options),
         saved_(saved),
-        sh_degree_(surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0) {}
+        sh_degree_(surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0),
+        log_alpha_min_(std::log(double{options.alpha_min})),
+        sides_(image_sides()) {}
 
   void run(int64_t i) {
     Bounds bounds;
@@ -125,48 +128,78 @@ class Preparer {
            (!s.has_tint() || std::isfinite(s.tint[i]));
   }
 
-  void place(int64_t i, Bounds& bounds) {
-    const SurfelFrame<double> frame = surfel_frame(surfels_, i);
-    const Vec3<double> from_camera = frame.position - camera_.position;
-    const Vec3<double> centre = camera_.camera_from_world * from_camera;
-    const bool in_front = centre.z >= options_.near_plane;
-    if (!in_front && options_.sort == SortOrder::centre) return;
-    const double opacity = surfels_.opacity[i];
-    const double rho_max =
-        std::max(cutoff_radius2(BlendRules<double>{options_.alpha_min, 0, 0}, opacity), 0.0);
-    const Vec2<double> pixel = in_front ? camera_.project(centre) : Vec2<double>(0.0);
-    const bool has_low_pass = options_.low_pass && in_front;
+  // Where a surfel stands and how far it reaches.
+  struct Placement {
+    Vec3<double> from_camera;  // world axes
+    Vec3<double> centre;       // camera axes
+    bool in_front;             // of the near plane, by its centre
+    bool has_low_pass;
+    double log_opacity;
+    double rho_max, radius;  // radius² = rho_max
+    Vec2<double> pixel;      // the projected centre, where in front
+  };
 
-    const double radius = std::sqrt(rho_max);
-    const Disk disk{centre, radius * frame.scale.x * (camera_.camera_from_world * frame.rotation[0]),
-                    radius * frame.scale.y * (camera_.camera_from_world * frame.rotation[1])};
-    bounds.is_ellipse = in_front && disk.nearest_z() > 0.1 * centre.z;
-    Vec2<double> ellipse_centre(0.0);
-    Rectangle box = bounds.is_ellipse ? ellipse_box(disk, camera_, pixel, ellipse_centre)
-                                      : clipped_box(disk, camera_, options_.near_plane);
-    if (has_low_pass) {
-      const double reach = radius / std::sqrt(2.0);
-      box.include(pixel.x - reach, pixel.y - reach);
-      box.include(pixel.x + reach, pixel.y + reach);
+  void place(int64_t i, Bounds& bounds) {
+    Placement p{};
+    p.from_camera = load3<double>(surfels_.position.row(i)) - camera_.position;
+    p.centre = camera_.camera_from_world * p.from_camera;
+    p.in_front = p.centre.z >= options_.near_plane;
+    if (!p.in_front && options_.sort == SortOrder::centre) return;
+    p.has_low_pass = options_.low_pass && p.in_front;
+    p.log_opacity = std::log(double{surfels_.opacity[i]});
+    p.rho_max = std::max(2 * (p.log_opacity - log_alpha_min_), 0.0);
+    p.radius = std::sqrt(p.rho_max);
+    if (is_outside(p, std::max(surfels_.scale(i, 0), surfels_.scale(i, 1)))) return;
+    if (p.in_front) p.pixel = camera_.project(p.centre);
+
+    const SurfelFrame<double> frame = surfel_frame(surfels_, i);
+    const Mat3<double> axes = camera_.camera_from_world * frame.rotation;
+    const Disk disk{p.centre, p.radius * frame.scale.x * axes[0], p.radius * frame.scale.y * axes[1]};
+    const bool is_ellipse = p.in_front && disk.nearest_z() > 0.1 * p.centre.z;
+    Vec2<double> ellipse_centre(std::numeric_limits<double>::quiet_NaN());
+    Rectangle box = is_ellipse ? ellipse_box(disk, camera_, p.pixel, ellipse_centre)
+                               : clipped_box(disk, camera_, options_.near_plane);
+    if (p.has_low_pass) {
+      const double reach = p.radius / std::sqrt(2.0);
+      box.include(p.pixel.x - reach, p.pixel.y - reach);
+      box.include(p.pixel.x + reach, p.pixel.y + reach);
     }
     tile_range(box.x0, box.x1, camera_.width, bounds.tile_x0, bounds.tile_x1);
     tile_range(box.y0, box.y1, camera_.height, bounds.tile_y0, bounds.tile_y1);
     if (bounds.tiles() == 0) return;
+    if (!store(i, p, frame, ellipse_centre)) bounds = {};
+  }
 
+  // Whether the ball around a surfel and its low-pass disk lie beyond one side of the image. Quick, and
+  // misses some.
+  bool is_outside(const Placement& p, double scale) const {
+    const double ball = p.radius * scale;
+    const double disk = p.in_front ? (p.radius + 1) * p.centre.z : 0;
+    for (const Side& side : sides_) {
+      if (dot(side.plane, p.centre) + std::max(ball * side.norm, disk) < 0) return true;
+    }
+    return false;
+  }
+
+  // False for a surfel that single precision cannot hold.
+  bool store(int64_t i, const Placement& p, const SurfelFrame<double>& frame,
+             const Vec2<double>& ellipse_centre) {
     Splat& splat = saved_.splats[i];
     const Vec2<double> anchor =
-        in_front ? anchor_near(pixel) : anchor_near({camera_.width / 2.0, camera_.height / 2.0});
+        anchor_near(p.in_front ? p.pixel : Vec2<double>(camera_.width / 2.0, camera_.height / 2.0));
     store_forms(surfel_forms(frame, camera_), anchor, splat);
-    splat.centre_x = static_cast<float>(has_low_pass ? pixel.x - anchor.x : 0);
-    splat.centre_y = static_cast<float>(has_low_pass ? pixel.y - anchor.y : 0);
-    splat.rho_screen_1 = has_low_pass ? 0 : 1e30F;
-    splat.rho_max = static_cast<float>(rho_max);
-    splat.log2_opacity = static_cast<float>(std::log2(opacity));
-    splat.z_centre = static_cast<float>(centre.z);
-    splat.inverse_z_centre = static_cast<float>(1 / centre.z);
-    store_values(i, from_camera, frame.rotation[2], splat);
-    if (!all_finite(&splat.anchor_x, sizeof(Splat) / sizeof(float))) bounds = {};
-    if (bounds.is_ellipse) store_ellipse(splat, ellipse_centre - anchor, bounds);
+    splat.centre_x = static_cast<float>(p.has_low_pass ? p.pixel.x - anchor.x : 0);
+    splat.centre_y = static_cast<float>(p.has_low_pass ? p.pixel.y - anchor.y : 0);
+    splat.rho_screen_1 = p.has_low_pass ? 0 : 1e30F;
+    splat.rho_max = static_cast<float>(p.rho_max);
+    splat.log2_opacity = static_cast<float>(p.log_opacity / std::numbers::ln2);
+    splat.z_centre = static_cast<float>(p.centre.z);
+    splat.inverse_z_centre = static_cast<float>(1 / p.centre.z);
+    store_values(i, p.from_camera, frame.rotation[2], splat);
+    splat.ellipse_x = splat.ellipse_y = splat.slope_x = splat.slope_y = 0;
+    if (!all_finite(&splat.anchor_x, sizeof(Splat) / sizeof(float))) return false;
+    store_ellipse(ellipse_centre - anchor, splat);
+    return true;
   }
 
   // A whole pixel near the point, not far outside the image.
@@ -201,22 +234,33 @@ class Preparer {
     store3(splat.colour, finite ? colour : Vec3<float>(std::numeric_limits<float>::quiet_NaN()));
     store3(splat.normal, normal * (dot(normal, from_camera) > 0 ? -1.0 : 1.0));
     splat.tint = surfels_.has_tint() ? surfels_.tint[i] : 0;
-    std::fill(std::begin(splat.unused), std::end(splat.unused), 0.0F);
   }
 
-  static void store_ellipse(const Splat& s, const Vec2<double>& centre, Bounds& bounds) {
+  static void store_ellipse(const Vec2<double>& centre, Splat& s) {
     const double rho = s.rho_max;
-    const auto product = [&](double ux, double uy, double vx, double vy, double wx, double wy) {
-      return ux * uy + vx * vy - rho * wx * wy;
+    const double xx = double{s.u_x} * s.u_x + double{s.v_x} * s.v_x - rho * s.w_x * s.w_x;
+    const double xy = double{s.u_x} * s.u_y + double{s.v_x} * s.v_y - rho * s.w_x * s.w_y;
+    const double yy = double{s.u_y} * s.u_y + double{s.v_y} * s.v_y - rho * s.w_y * s.w_y;
+    s.ellipse_x = static_cast<float>(centre.x);
+    s.ellipse_y = static_cast<float>(centre.y);
+    s.slope_x = static_cast<float>(-xy / xx);
+    s.slope_y = static_cast<float>(-xy / yy);
+    const bool is_sound = xx > 0 && yy > 0 && all_finite(&s.ellipse_x, 4);
+    if (!is_sound) s.ellipse_x = std::numeric_limits<float>::quiet_NaN();
+  }
+
+  // A side of the image as a plane through the camera: what may be seen has plane · point ≥ 0.
+  struct Side {
+    Vec3<double> plane;
+    double norm;
+  };
+  std::array<Side, 4> image_sides() const {
+    const auto side = [](double x, double y, double z) {
+      return Side{{x, y, z}, std::sqrt(x * x + y * y + z * z)};
     };
-    const double xx = product(s.u_x, s.u_x, s.v_x, s.v_x, s.w_x, s.w_x);
-    const double xy = product(s.u_x, s.u_y, s.v_x, s.v_y, s.w_x, s.w_y);
-    const double yy = product(s.u_y, s.u_y, s.v_y, s.v_y, s.w_y, s.w_y);
-    bounds.ellipse_x = static_cast<float>(centre.x);
-    bounds.ellipse_y = static_cast<float>(centre.y);
-    bounds.slope_x = static_cast<float>(-xy / xx);
-    bounds.slope_y = static_cast<float>(-xy / yy);
-    bounds.is_ellipse = xx > 0 && yy > 0 && std::isfinite(bounds.slope_x) && std::isfinite(bounds.slope_y);
+    const Camera<double>& c = camera_;
+    return {side(c.focal_x, 0, c.centre_x), side(-c.focal_x, 0, c.width - c.centre_x),
+            side(0, c.focal_y, c.centre_y), side(0, -c.focal_y, c.height - c.centre_y)};
   }
 
   const PosedSurfels& surfels_;
@@ -224,6 +268,8 @@ class Preparer {
   const Options& options_;
   Saved& saved_;
   const int sh_degree_;
+  const double log_alpha_min_;
+  const std::array<Side, 4> sides_;
 };
 
 }  // namespace

@@ -36,19 +36,16 @@ struct alignas(64) Splat {
   float colour[3];
   float tint;
   float normal[3];  // world axes, turned to the camera
-  float unused[4];
+  // The ellipse of the plane's hits; ellipse_x is not a number where they are not bounded by one. The lowest
+  // points of its quadratic form along vertical lines: y - ellipse_y = slope_y (x - ellipse_x).
+  float ellipse_x, ellipse_y;
+  float slope_x, slope_y;
 };
 static_assert(sizeof(Splat) == 128);
 
-// Where on the screen a surfel can be seen: a range of tiles (none when empty), and within it the ellipse of
-// the plane's hits, relative to the splat's anchor.
+// The tiles in which a surfel can be seen: half open ranges, empty where it is not drawn.
 struct Bounds {
-  int32_t tile_x0 = 0, tile_x1 = 0, tile_y0 = 0, tile_y1 = 0;  // half open
-  bool is_ellipse = false;                                     // false: anywhere in the range
-  float ellipse_x = 0, ellipse_y = 0;
-  // The lowest point of the ellipse's quadratic form along a vertical line: y - ellipse_y = slope_y (x -
-  // ellipse_x).
-  float slope_x = 0, slope_y = 0;
+  int32_t tile_x0 = 0, tile_x1 = 0, tile_y0 = 0, tile_y1 = 0;
 
   int64_t tiles() const { return int64_t{tile_x1 - tile_x0} * (tile_y1 - tile_y0); }
 };
@@ -111,6 +108,11 @@ struct Saved {
   mutable Scratch scratch;
 
   int64_t tiles() const { return int64_t{tile_columns} * tile_rows; }
+};
+
+// Memory of one thread for the lists of its tile.
+struct TileMemory {
+  Tensor<uint32_t> reached, places;
 };
 
 // The limits of the kernels' loops, as they stand in Options.

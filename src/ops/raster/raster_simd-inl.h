@@ -7,6 +7,7 @@
 #define TRACEFLOW_RASTER_SIMD_INL_H
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -143,39 +144,39 @@ HWY_INLINE Footprint<D> evaluate(D d, const Splat& splat, const PixelCentres<D>&
 
 // The blocks of a tile in which a splat may reach a pixel, as bits. Exact for the ellipse and the low-pass
 // disk against the square of each block's pixel centres, up to a margin for rounding.
-HWY_INLINE uint32_t reached_blocks(const Splat& s, const Bounds& bounds, int tile_x, int tile_y) {
-  if (!bounds.is_ellipse) return 0xffff;
+HWY_INLINE uint32_t reached_blocks(const Splat& s, int tile_x, int tile_y) {
+  if (s.ellipse_x != s.ellipse_x) return 0xffff;
   const Pixels d;
   const Int<Pixels> di;
   const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
   const auto clamp = [](auto x, auto low, auto high) HWY_ATTR { return hn::Min(hn::Max(x, low), high); };
+  constexpr float margin = 0.01F;
   const auto rho = set(s.rho_max * 1.002F + 0.02F);
-  const auto margin = set(0.01F);
-  const auto span = set(block_edge - 1 + 0.02F);
   const auto inside = [&](auto x, auto y) HWY_ATTR {
     const auto nu = hn::MulAdd(set(s.u_x), x, hn::MulAdd(set(s.u_y), y, set(s.u_1)));
     const auto nv = hn::MulAdd(set(s.v_x), x, hn::MulAdd(set(s.v_y), y, set(s.v_1)));
     const auto w = hn::MulAdd(set(s.w_x), x, hn::MulAdd(set(s.w_y), y, set(s.w_1)));
     return hn::Le(hn::MulAdd(nu, nu, hn::Mul(nv, nv)), hn::Mul(rho, hn::Mul(w, w)));
   };
+  const auto first_x = set(static_cast<float>(tile_x) + 0.5F - margin - s.anchor_x);
+  const auto first_y = set(static_cast<float>(tile_y) + 0.5F - margin - s.anchor_y);
+  const auto span = set(block_edge - 1 + 2 * margin);
   uint32_t reached = 0;
   for (size_t b = 0; b < blocks_per_tile; b += hn::Lanes(d)) {
     const auto block = hn::Add(hn::Iota(di, static_cast<int32_t>(b)), hn::Zero(di));
     const auto column = hn::ConvertTo(d, hn::And(block, hn::Set(di, blocks_per_row - 1)));
     const auto row = hn::ConvertTo(d, hn::ShiftRight<2>(block));
-    const auto low_x = hn::MulAdd(column, set(block_edge),
-                                  hn::Sub(set(static_cast<float>(tile_x) + 0.5F - s.anchor_x), margin));
-    const auto low_y = hn::MulAdd(row, set(block_edge),
-                                  hn::Sub(set(static_cast<float>(tile_y) + 0.5F - s.anchor_y), margin));
+    const auto low_x = hn::MulAdd(column, set(block_edge), first_x);
+    const auto low_y = hn::MulAdd(row, set(block_edge), first_y);
     const auto high_x = hn::Add(low_x, span);
     const auto high_y = hn::Add(low_y, span);
     // The convex form is lowest in a rectangle on the sides that face its centre.
-    const auto centre_x = set(bounds.ellipse_x);
-    const auto centre_y = set(bounds.ellipse_y);
+    const auto centre_x = set(s.ellipse_x);
+    const auto centre_y = set(s.ellipse_y);
     const auto side_x = clamp(centre_x, low_x, high_x);
     const auto side_y = clamp(centre_y, low_y, high_y);
-    const auto on_side_x = hn::MulAdd(set(bounds.slope_y), hn::Sub(side_x, centre_x), centre_y);
-    const auto on_side_y = hn::MulAdd(set(bounds.slope_x), hn::Sub(side_y, centre_y), centre_x);
+    const auto on_side_x = hn::MulAdd(set(s.slope_y), hn::Sub(side_x, centre_x), centre_y);
+    const auto on_side_y = hn::MulAdd(set(s.slope_x), hn::Sub(side_y, centre_y), centre_x);
     const auto ellipse = hn::Or(inside(side_x, clamp(on_side_x, low_y, high_y)),
                                 inside(clamp(on_side_y, low_x, high_x), side_y));
     const auto dx = hn::Sub(clamp(set(s.centre_x), low_x, high_x), set(s.centre_x));
@@ -189,13 +190,17 @@ HWY_INLINE uint32_t reached_blocks(const Splat& s, const Bounds& bounds, int til
   return reached;
 }
 
-// A tile of the image and the places in its list that each of its blocks has to look at.
+// A tile of the image, its list, and the places in the list that each of its blocks has to look at.
 struct TileLists {
   int x, y;                  // upper left pixel
   const TileEntry* entries;  // front to back
   uint32_t count;
+  uint32_t blocks;  // those within the image, as bits
   const uint32_t* of_block[blocks_per_tile];
   uint32_t counts[blocks_per_tile];
+
+  int block_x(int block) const { return x + block % blocks_per_row * block_edge; }
+  int block_y(int block) const { return y + block / blocks_per_row * block_edge; }
 };
 
 // Without the blocks' lists.
@@ -205,27 +210,50 @@ HWY_INLINE TileLists tile_entries(const Saved& saved, int64_t tile) {
   lists.y = static_cast<int>(tile / saved.tile_columns) * tile_edge;
   lists.entries = saved.entries.data() + saved.tile_begin[tile];
   lists.count = saved.tile_begin[tile + 1] - saved.tile_begin[tile];
+  for (int b = 0; b < blocks_per_tile; ++b) {
+    if (lists.block_x(b) < saved.width && lists.block_y(b) < saved.height) lists.blocks |= 1U << b;
+  }
   return lists;
 }
 
-HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, Tensor<uint32_t>& memory) {
-  TileLists lists = tile_entries(saved, tile);
-  memory.resize({blocks_per_tile, lists.count});
-  for (int b = 0; b < blocks_per_tile; ++b) lists.of_block[b] = memory.data() + int64_t{b} * lists.count;
-  uint32_t in_image = 0;
-  for (int b = 0; b < blocks_per_tile; ++b) {
-    const int block_x = lists.x + b % blocks_per_row * block_edge;
-    const int block_y = lists.y + b / blocks_per_row * block_edge;
-    if (block_x < saved.width && block_y < saved.height) in_image |= 1U << b;
+// How far ahead a list's splats are fetched into the cache.
+constexpr uint32_t prefetch_distance = 6;
+HWY_INLINE void prefetch_splat(const Saved& saved, const TileLists& lists, uint32_t place) {
+  if (place >= lists.count) return;
+  const Splat* const splat = &saved.splats[lists.entries[place].surfel];
+  hwy::Prefetch(splat);
+  hwy::Prefetch(reinterpret_cast<const char*>(splat) + sizeof(Splat) / 2);
+}
+
+// Appends `count` places from `first` on whose bit is set, without a branch per place. There must be room for
+// a vector more.
+HWY_INLINE uint32_t* append_reached(const uint32_t* reached, uint32_t count, uint32_t bit, uint32_t* to) {
+  const hn::ScalableTag<uint32_t> d;
+  const auto wanted = hn::Set(d, bit);
+  for (uint32_t place = 0; place < count; place += static_cast<uint32_t>(hn::Lanes(d))) {
+    const auto has = hn::TestBit(hn::LoadU(d, reached + place), wanted);
+    hn::StoreU(hn::Compress(hn::Iota(d, place), has), d, to);
+    to += hn::CountTrue(d, has);
   }
+  return to;
+}
+
+HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, TileMemory& memory) {
+  constexpr int64_t room = HWY_MAX_BYTES / sizeof(uint32_t);
+  TileLists lists = tile_entries(saved, tile);
+  memory.reached.resize({lists.count + room});
+  memory.places.resize({blocks_per_tile * (lists.count + room)});
+  uint32_t* const reached = memory.reached.data();
   for (uint32_t place = 0; place < lists.count; ++place) {
-    const uint32_t surfel = lists.entries[place].surfel;
-    uint32_t reached =
-        in_image & reached_blocks(saved.splats[surfel], saved.bounds[surfel], lists.x, lists.y);
-    for (; reached != 0; reached &= reached - 1) {
-      const int b = std::countr_zero(reached);
-      memory(b, lists.counts[b]++) = place;
-    }
+    prefetch_splat(saved, lists, place + prefetch_distance);
+    reached[place] = reached_blocks(saved.splats[lists.entries[place].surfel], lists.x, lists.y);
+  }
+  std::fill_n(reached + lists.count, room, 0U);
+  for (int b = 0; b < blocks_per_tile; ++b) {
+    if ((lists.blocks >> b & 1U) == 0) continue;
+    uint32_t* const begin = memory.places.data() + b * (lists.count + room);
+    lists.of_block[b] = begin;
+    lists.counts[b] = static_cast<uint32_t>(append_reached(reached, lists.count, 1U << b, begin) - begin);
   }
   return lists;
 }
