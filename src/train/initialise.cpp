@@ -224,11 +224,11 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
   return s;
 }
 
-Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points,
+Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points, int64_t limit,
                                const InitialOptions& options, Random& random) {
   InitialOptions as_environment = options;
   as_environment.sh_degree = options.environment_sh_degree;
-  Surfels s = surfels_at_points(thinned(points, options.environment_points, random), as_environment, random);
+  Surfels s = surfels_at_points(thinned(points, limit, random), as_environment, random);
   s.tint_logit = {};
   // What the camera sees beside the object is also what the object mirrors.
   const std::vector<int> balance = balance_outside_masks(s, capture);
@@ -262,8 +262,11 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
 
   if (options.specular == Specular::environment_gaussians) {
     scene.environment = surfels_around(points, capture.train, options.initial, random);
-    if (options.initial.environment_points > 0 && capture.has_masks) {
-      append_rows(scene.environment, surroundings_at_points(capture, points, options.initial, random));
+    const int64_t room = options.environment_density.max_surfels - scene.environment.count();
+    const int64_t copies = std::min<int64_t>(options.initial.environment_points, room);
+    if (copies > 0 && capture.has_masks) {
+      append_rows(scene.environment,
+                  surroundings_at_points(capture, points, copies, options.initial, random));
     }
     if (options.deform.environment) {
       scene.environment_field =

@@ -21,8 +21,8 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
 
 // Environment surfels at those of the capture's points that lie outside its masks, coloured as the
 // photographs show them: the surroundings that the camera sees are also what the mirror shows. At most
-// options.environment_points of them.
-Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points,
+// `limit` of them.
+Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points, int64_t limit,
                                const InitialOptions& options, Random& random);
 
 }  // namespace traceflow
