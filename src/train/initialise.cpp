@@ -213,10 +213,11 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
   Surfels s = empty_surfels(count, options.environment_sh_degree, false);
   for (int64_t i = 0; i < count; ++i) {
     const int64_t cell = i / options.environment_per_cell;
-    const Vec3<float> corner(static_cast<float>(cell % cells), static_cast<float>(cell / cells % cells),
-                             static_cast<float>(cell / cells / cells));
-    const Vec3<float> offset(random.uniform(), random.uniform(), random.uniform());
-    store3(s.position.row(i), centre + size * ((corner + offset) / static_cast<float>(cells) - 0.5F));
+    const glm::vec<3, int64_t> corner(cell % cells, cell / cells % cells, cell / cells / cells);
+    // Braces, because they alone fix the order of the draws.
+    const Vec3<float> offset{random.uniform(), random.uniform(), random.uniform()};
+    store3(s.position.row(i),
+           centre + size * ((Vec3<float>(corner) + offset) / static_cast<float>(cells) - 0.5F));
   }
   set_scales_from_neighbours(s);
   set_random_rotations(s, random);

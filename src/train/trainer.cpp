@@ -162,7 +162,7 @@ events::Step Trainer::step_event(const LossTerms& terms, double seconds) {
 }
 
 events::Finished Trainer::finish(events::Ending ending, const std::string& reason, double seconds) {
-  const events::Finished event{ending, iteration_, seconds, health_.smoothed_psnr(), counts(), reason};
+  events::Finished event{ending, iteration_, seconds, health_.smoothed_psnr(), counts(), reason};
   stream_.emit(event);
   return event;
 }
