@@ -32,6 +32,7 @@ struct alignas(64) BvhLeaf {
   float log_opacity[bvh_width];  // -inf in an unused slot
   float radius[bvh_width];       // of a sphere around the disk; scene units
   uint32_t surfel[bvh_width];
+  float lower[3], upper[3];  // the box of all
 };
 
 // Depth at which the builder turns to halving, and the most entries that a walk then has waiting.

@@ -80,6 +80,10 @@ BvhLeaf make_leaf(const PosedSurfels& surfels, const BlendRules<float>& rules,
   for (uint32_t i = group.begin; i < group.end; ++i) {
     set_slot(surfels, rules, items[i].index, static_cast<int>(i - group.begin), leaf);
   }
+  for (int axis = 0; axis < 3; ++axis) {
+    leaf.lower[axis] = group.box.lower[axis];
+    leaf.upper[axis] = group.box.upper[axis];
+  }
   return leaf;
 }
 

@@ -109,7 +109,8 @@ HWY_INLINE void packet_colours(const PosedSurfels& surfels, const Packet& packet
       for (size_t k = 0; k < coefficients; ++k) {
         colour = hn::MulAdd(hn::Load(d, basis[k]), hn::Set(d, row[3 * k + c]), colour);
       }
-      sum[c] = hn::MulAdd(weight, hn::Max(colour, hn::Zero(d)), sum[c]);
+      const Vec clamped = hn::Min(hn::Max(colour, hn::Zero(d)), hn::Set(d, 1e30F));  // 0 · inf is not 0
+      sum[c] = hn::MulAdd(weight, clamped, sum[c]);
     }
   }
   for (size_t c = 0; c < 3; ++c) hn::Store(sum[c], d, colours[c]);

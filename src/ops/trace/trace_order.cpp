@@ -86,6 +86,57 @@ void radix_sort(std::vector<Keyed>& items) {
   }
 }
 
+// The curve leaps: within a section rays are grouped anew, so that those of a packet lie close together.
+constexpr int64_t section_rays = 1024;
+constexpr int64_t group_rays = 16;  // a multiple of every packet's size
+
+// Where a ray starts and where it is at the surfels.
+struct Way {
+  float at[6];
+  uint32_t ray;
+};
+
+// Cuts at the median of the widest coordinate until a group is left.
+void group_ways(Way* begin, Way* end) {
+  const int64_t groups = (end - begin + group_rays - 1) / group_rays;
+  if (groups <= 1) return;
+  float low[6], high[6];
+  std::copy_n(begin->at, 6, low);
+  std::copy_n(begin->at, 6, high);
+  for (const Way* way = begin; way != end; ++way) {
+    for (int k = 0; k < 6; ++k) {
+      low[k] = std::min(low[k], way->at[k]);
+      high[k] = std::max(high[k], way->at[k]);
+    }
+  }
+  int widest = 0;
+  for (int k = 1; k < 6; ++k) {
+    if (high[k] - low[k] > high[widest] - low[widest]) widest = k;
+  }
+  Way* middle = begin + groups / 2 * group_rays;
+  std::nth_element(begin, middle, end, [widest](const Way& a, const Way& b) {
+    return a.at[widest] < b.at[widest] || (a.at[widest] == b.at[widest] && a.ray < b.ray);
+  });
+  group_ways(begin, middle);
+  group_ways(middle, end);
+}
+
+void group_section(const Tensor<float>& origins, const Tensor<float>& directions, float reach,
+                   uint32_t* begin, uint32_t* end) {
+  constexpr float origin_weight = 0.3F;  // the beam is thick at one end only
+  std::array<Way, section_rays> ways;
+  Way* last = ways.data();
+  for (const uint32_t* ray = begin; ray != end; ++ray) {
+    UnitRay unit;
+    make_unit_ray(origins.row(*ray), directions.row(*ray), unit);
+    store3(last->at, unit.origin + reach * unit.direction);
+    store3(last->at + 3, origin_weight * unit.origin);
+    (last++)->ray = *ray;
+  }
+  group_ways(ways.data(), last);
+  std::transform(ways.data(), last, begin, [](const Way& way) { return way.ray; });
+}
+
 }  // namespace
 
 void order_rays(const Bvh& bvh, const Tensor<float>& origins, const Tensor<float>& directions,
@@ -107,6 +158,12 @@ void order_rays(const Bvh& bvh, const Tensor<float>& origins, const Tensor<float
   });
   radix_sort(items);
   std::transform(items.begin(), items.end(), order.ray.begin(), [](const Keyed& item) { return item.ray; });
+  const auto traceable = std::partition_point(items.begin(), items.end(),
+                                              [](const Keyed& item) { return item.key != untraceable_key; });
+  parallel_blocks("trace group", traceable - items.begin(), section_rays, [&](int64_t begin, int64_t end) {
+    group_section(origins, directions, order.reach, &order.ray[static_cast<size_t>(begin)],
+                  order.ray.data() + end);
+  });
 }
 
 }  // namespace traceflow::trace

@@ -9,6 +9,8 @@
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
+#include <bit>
+
 #include "ops/trace/trace_disk-inl.h"
 #include "ops/trace/trace_sort-inl.h"
 #include "ops/trace/trace_tree-inl.h"
@@ -69,6 +71,7 @@ class PacketWalk {
       for (int axis = 0; axis < 3; ++axis) {
         origin_[axis][lane] = ray.origin[axis];
         direction_[axis][lane] = ray.direction[axis];
+        reciprocal_[axis][lane] = safe_reciprocal(ray.direction[axis]);
       }
       far_[lane] = lane < count ? farthest_distance : -1.0F;
       transmittance_[lane] = 1;
@@ -87,21 +90,103 @@ class PacketWalk {
   }
 
  private:
+  // A vector of rays against each disk or a vector of disks against each ray, whichever is fewer.
   HWY_INLINE void meet_leaf(const BvhLeaf& leaf) {
-    const Tag d;
-    const RayVec rays{hn::Load(d, origin_[0]),    hn::Load(d, origin_[1]),    hn::Load(d, origin_[2]),
-                      hn::Load(d, direction_[0]), hn::Load(d, direction_[1]), hn::Load(d, direction_[2])};
-    for (uint32_t bits = meet_spheres(leaf, beam_); bits; bits &= bits - 1) {
-      const auto k = static_cast<size_t>(__builtin_ctz(bits));
-      const DiskHit hit = meet_disk(
-          rays, rules_, hn::Load(d, far_), [k, d](const float* row) HWY_ATTR { return hn::Set(d, row[k]); },
-          leaf);
-      if (hn::AllFalse(d, hit.mask)) continue;
-      append(hit, leaf.surfel[k]);
+    const uint32_t rays = meet_rays(leaf);
+    if (rays == 0) return;
+    const uint32_t disks = meet_spheres(leaf, beam_);
+    if (static_cast<size_t>(std::popcount(disks)) * packet_rays <=
+        static_cast<size_t>(std::popcount(rays)) * bvh_width) {
+      meet_each_disk(leaf, disks);
+    } else {
+      meet_each_ray(leaf, rays);
     }
     if (hits_.candidates.size() - looked_ >= rules_.hits_per_look) look();
   }
 
+  // Bit l: ray l meets the leaf's box before it ends.
+  HWY_INLINE uint32_t meet_rays(const BvhLeaf& leaf) const {
+    const Tag d;
+    Vec enter = hn::Zero(d), leave = hn::Load(d, far_);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec origin = hn::Load(d, origin_[axis]), scale = hn::Load(d, reciprocal_[axis]);
+      const Vec low = hn::Mul(hn::Sub(hn::Set(d, leaf.lower[axis]), origin), scale);
+      const Vec high = hn::Mul(hn::Sub(hn::Set(d, leaf.upper[axis]), origin), scale);
+      enter = hn::Max(enter, hn::Min(low, high));
+      leave = hn::Min(leave, hn::Max(low, high));
+    }
+    return mask_bits(hn::Le(enter, hn::Mul(leave, hn::Set(d, 1.000001F))));
+  }
+
+  HWY_INLINE void meet_each_disk(const BvhLeaf& leaf, uint32_t disks) {
+    const Tag d;
+    const RayVec rays{hn::Load(d, origin_[0]),    hn::Load(d, origin_[1]),    hn::Load(d, origin_[2]),
+                      hn::Load(d, direction_[0]), hn::Load(d, direction_[1]), hn::Load(d, direction_[2])};
+    for (; disks; disks &= disks - 1) {
+      const auto k = static_cast<size_t>(__builtin_ctz(disks));
+      const DiskHit hit = meet_disk(
+          rays, rules_, hn::Load(d, far_), [k, d](const float* row) HWY_ATTR { return hn::Set(d, row[k]); },
+          leaf);
+      if (!hn::AllFalse(d, hit.mask)) append(hit, leaf.surfel[k]);
+    }
+  }
+
+  // Hits name slots of the leaf until all are found: candidates come in an order that no ray's end can
+  // change.
+  HWY_INLINE void meet_each_ray(const BvhLeaf& leaf, uint32_t rays) {
+    const Tag d;
+    size_t first[packet_rays];
+    uint32_t found = 0;
+    for (uint32_t left = rays; left; left &= left - 1) {
+      const auto lane = static_cast<size_t>(__builtin_ctz(left));
+      first[lane] = hits_.rays[lane].count;
+      const RayVec ray{hn::Set(d, origin_[0][lane]),    hn::Set(d, origin_[1][lane]),
+                       hn::Set(d, origin_[2][lane]),    hn::Set(d, direction_[0][lane]),
+                       hn::Set(d, direction_[1][lane]), hn::Set(d, direction_[2][lane])};
+      for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
+        const DiskHit hit = meet_disk(
+            ray, rules_, hn::Set(d, far_[lane]),
+            [i, d](const float* row) HWY_ATTR { return hn::Load(d, row + i); }, leaf);
+        const uint32_t disks = mask_bits(hit.mask);
+        if (disks) append_to(lane, hit, static_cast<uint32_t>(i));
+        found |= disks << i;
+      }
+    }
+    uint32_t candidate_of[bvh_width];
+    for (; found; found &= found - 1) {
+      const auto k = static_cast<size_t>(__builtin_ctz(found));
+      candidate_of[k] = add_candidate(leaf.surfel[k]);
+    }
+    for (; rays; rays &= rays - 1) {
+      const auto lane = static_cast<size_t>(__builtin_ctz(rays));
+      Hits& hits = hits_.rays[lane];
+      for (size_t i = first[lane]; i < hits.count; ++i) hits.surfel[i] = candidate_of[hits.surfel[i]];
+    }
+  }
+
+  // One ray's hits with a vector of disks, from slot `first` of the leaf.
+  HWY_INLINE void append_to(size_t lane, const DiskHit& hit, uint32_t first) {
+    const Tag d;
+    const hn::RebindToUnsigned<Tag> du;
+    const Vec alpha = disk_alpha(hit, rules_);
+    Hits& hits = hits_.rays[lane];
+    hits.reserve_more(bvh_width);
+    const size_t n = hits.count;
+    hn::StoreU(hn::Compress(hit.distance, hit.mask), d, hits.distance + n);
+    hn::StoreU(hn::Compress(alpha, hit.mask), d, hits.alpha + n);
+    hn::StoreU(hn::Compress(hn::Iota(du, first), hn::RebindMask(du, hit.mask)), du, hits.surfel + n);
+    hits.count = n + hn::CountTrue(d, hit.mask);
+    for (size_t i = n; i < hits.count; ++i) transmittance_[lane] *= 1 - hits.alpha[i];
+  }
+
+  HWY_INLINE uint32_t add_candidate(uint32_t surfel) {
+    const auto candidate = static_cast<uint32_t>(hits_.candidates.size());
+    hits_.candidates.push_back(surfel);
+    fetch_ahead(surfel);
+    return candidate;
+  }
+
+  // A disk's hits with all rays.
   HWY_INLINE void append(const DiskHit& hit, uint32_t surfel) {
     const Tag d;
     const Vec alpha = disk_alpha(hit, rules_);
@@ -112,9 +197,7 @@ class PacketWalk {
     HWY_ALIGN float alphas[packet_rays];
     hn::Store(hit.distance, d, distances);
     hn::Store(alpha, d, alphas);
-    const auto candidate = static_cast<uint32_t>(hits_.candidates.size());
-    hits_.candidates.push_back(surfel);
-    fetch_ahead(surfel);
+    const uint32_t candidate = add_candidate(surfel);
     for (uint32_t lanes = mask_bits(hit.mask); lanes; lanes &= lanes - 1) {
       const auto lane = static_cast<size_t>(__builtin_ctz(lanes));
       hits_.rays[lane].push(distances[lane], alphas[lane], candidate);
@@ -159,6 +242,7 @@ class PacketWalk {
   size_t looked_ = 0;
   HWY_ALIGN float origin_[3][packet_rays];
   HWY_ALIGN float direction_[3][packet_rays];
+  HWY_ALIGN float reciprocal_[3][packet_rays];
   HWY_ALIGN float far_[packet_rays];
   HWY_ALIGN float transmittance_[packet_rays];
   size_t cut_at_[packet_rays];

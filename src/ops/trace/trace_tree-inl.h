@@ -30,6 +30,9 @@ HWY_INLINE uint32_t mask_bits(hn::Mask<Tag> mask) {
   return word;
 }
 
+// 1/d, finite for any d.
+HWY_INLINE float safe_reciprocal(float d) { return std::copysign(1.0F, d) / std::max(std::abs(d), 1e-10F); }
+
 // Rays that at distance t lie within origin_radius + t · direction_radius of origin + t · direction, axis by
 // axis.
 struct Beam {
