@@ -13,7 +13,7 @@ namespace {
 using nlohmann::json;
 
 std::filesystem::path scratch(const std::string& name) {
-  const auto path = std::filesystem::path(testing::TempDir()) / ("traceflow_" + name + ".jsonl");
+  auto path = std::filesystem::path(testing::TempDir()) / ("traceflow_" + name + ".jsonl");
   std::filesystem::remove(path);
   return path;
 }

@@ -20,7 +20,9 @@ struct Plane {
     const Vec3<float> u = normalize(cross(normal, Vec3<float>(1, 0, 0)));
     const Vec3<float> v = cross(normal, u);
     for (int64_t i = 0; i < points.dim(0); ++i) {
-      store3(points.row(i), spacing * (static_cast<float>(i % side) * u + static_cast<float>(i / side) * v));
+      const int64_t row = i / side;
+      const int64_t column = i % side;
+      store3(points.row(i), spacing * (static_cast<float>(column) * u + static_cast<float>(row) * v));
     }
   }
 };

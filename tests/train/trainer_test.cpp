@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 // A capture small enough that a run of forty iterations takes a second; made once for all tests.
 const fs::path& capture_folder() {
   static const fs::path folder = [] {
-    const fs::path path = fs::path(testing::TempDir()) / ("trainer_capture_" + std::to_string(::getpid()));
+    fs::path path = fs::path(testing::TempDir()) / ("trainer_capture_" + std::to_string(::getpid()));
     SynthOptions options;
     options.frames = 5;
     options.width = 40;
