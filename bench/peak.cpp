@@ -18,7 +18,7 @@ namespace traceflow::bench::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Twelve independent chains of multiply-adds; returns how many operations that were.
-double MultiplyAdd(size_t rounds, float* result) {
+double multiply_add(size_t rounds, float* result) {
   const hn::ScalableTag<float> d;
   const auto factor = hn::Set(d, 0.999F);
   const auto addend = hn::Set(d, *result);
@@ -52,7 +52,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace traceflow::bench {
 
-HWY_EXPORT(MultiplyAdd);
+HWY_EXPORT(multiply_add);
 
 namespace {
 
@@ -97,7 +97,7 @@ double cpu_seconds() {
 
 double peak_fp32() {
   return best_rate(
-      [](size_t rounds, float* result) { return HWY_DYNAMIC_DISPATCH(MultiplyAdd)(rounds, result); });
+      [](size_t rounds, float* result) { return HWY_DYNAMIC_DISPATCH(multiply_add)(rounds, result); });
 }
 
 double peak_bf16() {

@@ -65,8 +65,8 @@ HWY_INLINE void encode_row(const float* high, const float* low, const EncodingTa
   }
 }
 
-void EncodePoints(const float* points, int64_t count, int64_t rows, const EncodingTable& table,
-                  int64_t columns, float* encoding) {
+void encode_rows(const float* points, int64_t count, int64_t rows, const EncodingTable& table,
+                 int64_t columns, float* encoding) {
   constexpr double turns_per_radian = 0.15915494309189533577;
   for (int64_t i = 0; i < rows; ++i) {
     const bool enters = i < count && evaluated(points + 3 * i);
@@ -91,7 +91,7 @@ HWY_INLINE hn::Vec<hn::Rebind<uint16_t, Floats>> nearest_bf16(Vector v) {
   return hn::DemoteTo(hn::Rebind<uint16_t, Floats>(), hn::BitCast(hn::RebindToSigned<Floats>(), rounded));
 }
 
-void RoundToBf16(const float* from, int64_t count, uint16_t* to) {
+void round_values(const float* from, int64_t count, uint16_t* to) {
   const Floats d;
   const hn::Rebind<uint16_t, Floats> half;
   for (int64_t i = 0; i < count; i += static_cast<int64_t>(hn::Lanes(d))) {
@@ -109,17 +109,17 @@ HWY_INLINE hn::Mask<Floats> is_positive(Floats d, const int16_t* activation) {
   return hn::RebindMask(d, hn::Gt(bits, hn::Zero(integers)));
 }
 
-// Masks a strip of kVectors vectors' width down all rows, the columns' sums in registers.
-template <int kVectors, class Activation>
+// Masks a strip of Vectors vectors' width down all rows, the columns' sums in registers.
+template <int Vectors, class Activation>
 HWY_INLINE void mask_strip(const Activation* activation, int64_t rows, int64_t columns, float* gradient,
                            uint16_t* rounded, float* column_sum) {
   const Floats d;
   const hn::Rebind<uint16_t, Floats> half;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
-  Vector sums[kVectors];
-  for (int v = 0; v < kVectors; ++v) sums[v] = hn::Zero(d);
+  Vector sums[Vectors];
+  for (int v = 0; v < Vectors; ++v) sums[v] = hn::Zero(d);
   for (int64_t i = 0; i < rows * columns; i += columns) {
-    for (int v = 0; v < kVectors; ++v) {
+    for (int v = 0; v < Vectors; ++v) {
       const int64_t at = i + v * lanes;
       const Vector masked = hn::IfThenElseZero(is_positive(d, activation + at), hn::LoadU(d, gradient + at));
       hn::StoreU(masked, d, gradient + at);
@@ -127,7 +127,7 @@ HWY_INLINE void mask_strip(const Activation* activation, int64_t rows, int64_t c
       sums[v] = hn::Add(sums[v], masked);
     }
   }
-  for (int v = 0; v < kVectors; ++v) {
+  for (int v = 0; v < Vectors; ++v) {
     float* sum = column_sum + v * lanes;
     hn::StoreU(hn::Add(hn::LoadU(d, sum), sums[v]), d, sum);
   }
@@ -147,16 +147,16 @@ void mask_columns(const Activation* activation, int64_t rows, int64_t columns, f
   }
 }
 
-void MaskFp32(const float* activation, int64_t rows, int64_t columns, float* gradient, float* column_sum) {
+void mask_fp32(const float* activation, int64_t rows, int64_t columns, float* gradient, float* column_sum) {
   mask_columns(activation, rows, columns, gradient, nullptr, column_sum);
 }
 
-void MaskBf16(const int16_t* activation, int64_t rows, int64_t columns, float* gradient, uint16_t* rounded,
-              float* column_sum) {
+void mask_bf16(const int16_t* activation, int64_t rows, int64_t columns, float* gradient, uint16_t* rounded,
+               float* column_sum) {
   mask_columns(activation, rows, columns, gradient, rounded, column_sum);
 }
 
-void AddSlots(const float* from, int64_t slots, int64_t stride, int64_t count, float* to) {
+void sum_slots(const float* from, int64_t slots, int64_t stride, int64_t count, float* to) {
   const Floats d;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
   int64_t i = 0;
@@ -178,11 +178,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace traceflow::field {
 
-HWY_EXPORT(EncodePoints);
-HWY_EXPORT(RoundToBf16);
-HWY_EXPORT(MaskFp32);
-HWY_EXPORT(MaskBf16);
-HWY_EXPORT(AddSlots);
+HWY_EXPORT(encode_rows);
+HWY_EXPORT(round_values);
+HWY_EXPORT(mask_fp32);
+HWY_EXPORT(mask_bf16);
+HWY_EXPORT(sum_slots);
 
 namespace {
 
@@ -209,26 +209,26 @@ bool evaluated(const float* point) {
 
 void encode_points(const float* points, int64_t count, int64_t rows, int octaves, int64_t columns,
                    float* encoding) {
-  HWY_DYNAMIC_DISPATCH(EncodePoints)(points, count, rows, make_table(octaves), columns, encoding);
+  HWY_DYNAMIC_DISPATCH(encode_rows)(points, count, rows, make_table(octaves), columns, encoding);
 }
 
 void round_to_bf16(const float* from, int64_t count, uint16_t* to) {
-  HWY_DYNAMIC_DISPATCH(RoundToBf16)(from, count, to);
+  HWY_DYNAMIC_DISPATCH(round_values)(from, count, to);
 }
 
 void mask_by_activation(const void* activation, Number number, int64_t rows, int64_t columns, float* gradient,
                         uint16_t* rounded, float* column_sum) {
   if (number == Number::fp32) {
-    HWY_DYNAMIC_DISPATCH(MaskFp32)
+    HWY_DYNAMIC_DISPATCH(mask_fp32)
     (static_cast<const float*>(activation), rows, columns, gradient, column_sum);
   } else {
-    HWY_DYNAMIC_DISPATCH(MaskBf16)
+    HWY_DYNAMIC_DISPATCH(mask_bf16)
     (static_cast<const int16_t*>(activation), rows, columns, gradient, rounded, column_sum);
   }
 }
 
 void add_slots(const float* from, int64_t slots, int64_t stride, int64_t count, float* to) {
-  HWY_DYNAMIC_DISPATCH(AddSlots)(from, slots, stride, count, to);
+  HWY_DYNAMIC_DISPATCH(sum_slots)(from, slots, stride, count, to);
 }
 
 }  // namespace traceflow::field

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <memory>
+#include <tuple>
 
 // Matrix products on one thread, by oneDNN. All matrices are dense and row-major, but for a B that is used
 // often: it can be packed into the order in which the product reads it.
@@ -21,7 +21,14 @@ struct ProductShape {
   bool bias = false;               // C += bias, one fp32 number per column
   bool accumulate = false;         // C += what C held before
   bool relu = false;               // C = max(C, 0)
-  auto operator<=>(const ProductShape&) const = default;
+
+  // All of it, so that shapes can be compared.
+  auto key() const {
+    return std::tie(m, k, n, operands, result, transposed, packed_for, bias, accumulate, relu);
+  }
+  friend bool operator<(const ProductShape& left, const ProductShape& right) {
+    return left.key() < right.key();
+  }
 };
 
 // One compiled product. run() may be called from any number of threads at once and never starts others; its

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <ostream>
 #include <thread>
 
 #include "field_scene.h"
@@ -65,10 +66,10 @@ struct Case {
   int64_t points;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
-  *out << "depth " << c.shape.depth << " width " << c.shape.width << " skip " << c.shape.skip << " octaves "
-       << c.shape.position_frequencies << "+" << c.shape.time_frequencies << " outputs " << c.outputs
-       << " points " << c.points;
+std::ostream& operator<<(std::ostream& out, const Case& c) {
+  return out << "depth " << c.shape.depth << " width " << c.shape.width << " skip " << c.shape.skip
+             << " octaves " << c.shape.position_frequencies << "+" << c.shape.time_frequencies << " outputs "
+             << c.outputs << " points " << c.points;
 }
 
 class FieldCases : public ::testing::TestWithParam<Case> {};
