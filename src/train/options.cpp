@@ -13,7 +13,7 @@ void check_not_negative(double value, const char* name) {
 
 TrainOptions cpu_preset() {
   TrainOptions o;
-  o.iterations = 5000;
+  o.iterations = 8000;
   o.save_every = 1000;
   o.initial.tint = 0.1F;
   o.initial.tint_in_mask = 0.5F;
@@ -23,10 +23,9 @@ TrainOptions cpu_preset() {
   o.initial.environment_cells = 10;
   o.initial.environment_points = 6000;
   o.initial.map_size = 32;
-  o.deform.network.width = 64;
+  o.deform.network.width = 96;
   o.deform.network.depth = 6;
   o.deform.network.skip = 3;
-  o.deform.network.position_frequencies = 8;
   o.deform.environment_network = o.deform.network;
   o.deform.environment_network.position_frequencies = 6;
   o.rates.position = 1e-3F;
@@ -50,7 +49,7 @@ TrainOptions cpu_preset() {
 
 TrainOptions demo_preset() {
   TrainOptions o = cpu_preset();
-  o.iterations = 2000;
+  o.iterations = 3600;
   o.density.every = 3000;
   o.density.from = 3000;
   o.density.max_surfels = 12000;
