@@ -17,8 +17,10 @@ namespace {
 
 using ::testing::HasSubstr;
 
+// One file for each test, since tests run side by side.
 std::filesystem::path toml_file(const std::string& text) {
-  const auto path = std::filesystem::path(testing::TempDir()) / "traceflow_options.toml";
+  const std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
+  const auto path = std::filesystem::path(testing::TempDir()) / ("traceflow_" + test + ".toml");
   std::ofstream(path) << text;
   return path;
 }
