@@ -79,8 +79,9 @@ struct Sums {
         log_opacity = red = green = blue = tint = normal_x = normal_y = normal_z = hn::Zero(d);
   }
 
-  // Adds one hit per lane; moves the state in front of it.
-  template <bool with_distortion>
+  // Adds one hit per lane; moves the state in front of it. `with_depths` is false where no gradient of
+  // distortion or median depth is asked for.
+  template <bool with_depths>
   HWY_INLINE void add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f, uint32_t place,
                       const SavedBlock& saved, size_t lane, BlockState& state) {
     const Int<D> di;
@@ -108,7 +109,7 @@ struct Sums {
     own = hn::MulAdd(set(s.normal[1]), load(state.normal[1]), own);
     own = hn::MulAdd(set(s.normal[2]), load(state.normal[2]), own);
     auto grad_z = hn::Mul(weight, load(state.z));
-    if constexpr (with_distortion) {
+    if constexpr (with_depths) {
       // dL/dw_i = g (m² A + M2 - 2 m M1), dL/dm_i = 2 g w (m A - M1)
       const auto inverse_z = f.inverse_z(d, s);
       const auto scale = set(o.m_scale);
@@ -119,9 +120,9 @@ struct Sums {
       own = hn::MulAdd(g, by_weight, own);
       const auto slope = hn::Mul(scale, hn::Mul(inverse_z, inverse_z));
       grad_z = hn::NegMulAdd(hn::Mul(hn::Mul(set(2.0F), g), hn::Mul(weight, ma)), slope, grad_z);
+      const auto is_median = hn::RebindMask(d, hn::Eq(hn::LoadU(di, saved.median + lane), here));
+      grad_z = hn::Add(grad_z, hn::IfThenElseZero(hn::And(hit, is_median), load(state.median)));
     }
-    const auto is_median = hn::RebindMask(d, hn::Eq(hn::LoadU(di, saved.median + lane), here));
-    grad_z = hn::Add(grad_z, hn::IfThenElseZero(hn::And(hit, is_median), load(state.median)));
 
     const auto behind = load(state.behind);
     const auto grad_alpha = hn::NegMulAdd(behind, past, hn::Mul(transmittance, own));
@@ -202,7 +203,7 @@ struct Sums {
   }
 };
 
-template <bool with_distortion>
+template <bool with_depths>
 class TileUnblender {
  public:
   HWY_INLINE TileUnblender(const KernelOptions& o, const TileLists& lists, const SavedBlock* blocks,
@@ -210,7 +211,16 @@ class TileUnblender {
       : o_(o), lists_(lists), blocks_(blocks), saved_(saved), state_(state) {}
 
   HWY_INLINE void in_list_order() {
+    const Pixels d;
+    for (int block = 0; block < blocks_per_tile; ++block) {
+      for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
+        const auto at = pixel_centres(d, lists_.block_x(block), lists_.block_y(block), lane);
+        hn::Store(at.x, d, x_[block] + lane);
+        hn::Store(at.y, d, y_[block] + lane);
+      }
+    }
     for (uint32_t place = lists_.count; place-- > 0;) {
+      prefetch(place - prefetch_distance);
       const TileEntry entry = lists_.entries[place];
       const uint32_t touched = saved_.touched[entry.entry];
       if (touched != 0) add_surfel(entry, touched, place);
@@ -230,6 +240,14 @@ class TileUnblender {
   }
 
  private:
+  HWY_INLINE void prefetch(uint32_t place) const {
+    if (place >= lists_.count) return;
+    prefetch_splat(saved_, lists_, place);
+    const uint32_t entry = lists_.entries[place].entry;
+    hwy::Prefetch(&saved_.scratch.gradients[entry]);
+    hwy::Prefetch(&saved_.scratch.gradients[entry].z_plane);
+  }
+
   HWY_INLINE void add_surfel(const TileEntry& entry, uint32_t touched, uint32_t place) {
     const Pixels d;
     const Splat& splat = saved_.splats[entry.surfel];
@@ -237,9 +255,9 @@ class TileUnblender {
     for (; touched != 0; touched &= touched - 1) {
       const int block = std::countr_zero(touched);
       for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
-        const auto at = pixel_centres(d, lists_.block_x(block), lists_.block_y(block), lane);
-        sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
-                                           state_.blocks[block]);
+        const PixelCentres<Pixels> at{hn::Load(d, x_[block] + lane), hn::Load(d, y_[block] + lane)};
+        sums.template add<with_depths>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
+                                       state_.blocks[block]);
       }
     }
     sums.reduce(d, &saved_.scratch.gradients[entry.entry].u_x);
@@ -252,8 +270,8 @@ class TileUnblender {
       const TileEntry entry = lists_.entries[hits[place].place];
       const Splat& splat = saved_.splats[entry.surfel];
       Sums<OnePixel> sums(d);
-      sums.template add<with_distortion>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
-                                         state_.blocks[block]);
+      sums.template add<with_depths>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
+                                     state_.blocks[block]);
       float values[Sums<OnePixel>::padded];
       sums.reduce(d, values);
       float* const to = &saved_.scratch.gradients[entry.entry].u_x;
@@ -266,12 +284,14 @@ class TileUnblender {
   const SavedBlock* blocks_;
   const Saved& saved_;
   TileState& state_;
+  alignas(64) float x_[blocks_per_tile][pixels_per_block];  // pixel centres
+  alignas(64) float y_[blocks_per_tile][pixels_per_block];
 };
 
-template <bool with_distortion>
+template <bool with_depths>
 HWY_INLINE void unblend(SortOrder order, const KernelOptions& o, const TileLists& lists,
                         const SavedBlock* blocks, const Saved& saved, TileState& state) {
-  TileUnblender<with_distortion> tile(o, lists, blocks, saved, state);
+  TileUnblender<with_depths> tile(o, lists, blocks, saved, state);
   if (order == SortOrder::centre) {
     tile.in_list_order();
   } else {
@@ -289,7 +309,7 @@ void unblend_tile(SortOrder order, const KernelOptions& o, int64_t index, TileMe
     load_block(grad_output, o.background, lists.block_x(block), lists.block_y(block), saved.width,
                saved.height, blocks[block], state.blocks[block]);
   }
-  if (grad_output.distortion.empty()) {
+  if (grad_output.distortion.empty() && grad_output.median_depth.empty()) {
     unblend<false>(order, o, lists, blocks, saved, state);
   } else {
     unblend<true>(order, o, lists, blocks, saved, state);

@@ -23,12 +23,24 @@ class Chain {
         sh_degree_(surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0) {}
 
   void run(int64_t i, CameraGradient<double>& camera) {
+    prefetch(i + surfel_prefetch_distance);
     clear(i);
     SplatGradient sums{};
     if (add_tiles(i, sums)) chain(i, sums, camera);
   }
 
  private:
+  void prefetch(int64_t i) const {
+    if (i >= saved_.count || saved_.entry_begin[i] == saved_.entry_begin[i + 1]) return;
+    prefetch_row(surfels_.position, i);
+    prefetch_row(surfels_.scale, i);
+    prefetch_row(surfels_.rotation, i);
+    prefetch_row(surfels_.sh, i);
+    prefetch_row(saved_.splats, i);
+    prefetch_row(saved_.scratch.gradients, saved_.entry_begin[i]);
+    prefetch_row(saved_.touched, saved_.entry_begin[i]);
+  }
+
   void clear(int64_t i) {
     auto& g = gradient_.surfels;
     const auto zero = [i](Tensor<float>& t) { std::fill_n(t.row(i), t.row_size(), 0.0F); };

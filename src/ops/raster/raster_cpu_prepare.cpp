@@ -150,6 +150,7 @@ class Preparer {
     p.rho_max = std::max(2 * (p.log_opacity - log_alpha_min_), 0.0);
     p.radius = std::sqrt(p.rho_max);
     if (is_outside(p, std::max(surfels_.scale(i, 0), surfels_.scale(i, 1)))) return;
+    prefetch_row(surfels_.sh, i);
     if (p.in_front) p.pixel = camera_.project(p.centre);
 
     const SurfelFrame<double> frame = surfel_frame(surfels_, i);

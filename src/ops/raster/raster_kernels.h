@@ -1,5 +1,7 @@
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <cstdint>
 
 #include "math/surfel_hit.h"
@@ -128,6 +130,17 @@ struct KernelOptions {
         m_scale(o.far_plane * o.near_plane / (o.far_plane - o.near_plane)),
         background(o.background) {}
 };
+
+// How many surfels ahead a loop over surfels fetches what it will read.
+inline constexpr int64_t surfel_prefetch_distance = 8;
+// Fetches row i of a tensor into the cache, if there is one.
+template <class T>
+void prefetch_row(const Tensor<T>& tensor, int64_t i) {
+  constexpr int64_t line = 64;
+  if (tensor.empty() || i >= tensor.dim(0)) return;
+  const auto* const begin = reinterpret_cast<const char*>(tensor.row(i));
+  for (int64_t at = 0; at < tensor.row_size() * int64_t{sizeof(T)}; at += line) hwy::Prefetch(begin + at);
+}
 
 // A surfel's frame in double precision.
 SurfelFrame<double> surfel_frame(const PosedSurfels& surfels, int64_t i);
