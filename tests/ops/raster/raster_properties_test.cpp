@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <algorithm>
 #include <array>
@@ -324,6 +325,40 @@ TEST_P(Orders, draw_nothing_from_nothing) {
   scene.camera.width = 0;
   run(scene, options(), result);
   EXPECT_TRUE(result.output.alpha.empty());
+}
+
+// The kernels are compiled for several instruction sets; all give the same picture and gradient up to
+// rounding.
+TEST_P(Orders, agree_on_every_instruction_set) {
+  SceneOptions wide = mixed();  // no near ties in depth, which rounding would decide
+  wide.count = 60;
+  const auto scene = scene_of(13, wide);
+  Result expected;
+  run(scene, options(), expected);
+  const auto supported = hwy::SupportedTargets();
+  for (auto rest = supported; rest != 0; rest &= rest - 1) {
+    const auto target = rest & -rest;
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    Result found;
+    run(scene, options(), found);
+    SCOPED_TRACE(hwy::TargetName(target));
+    const auto x = outputs_of(expected.output);
+    const auto y = outputs_of(found.output);
+    for (size_t o = 0; o < x.size(); ++o) {
+      int64_t differing = 0;
+      for (int64_t i = 0; i < x[o]->size(); ++i)
+        differing += std::abs((*x[o])[i] - (*y[o])[i]) > 2e-4F ? 1 : 0;
+      EXPECT_LE(differing, 5) << output_names[o];
+    }
+    const auto& a = expected.gradient.surfels.position;
+    const auto& b = found.gradient.surfels.position;
+    float largest = 0;
+    for (const float v : a.values()) largest = std::max(largest, std::abs(v));
+    for (int64_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-3F * largest) << i;
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 TEST(RasterOptions, say_what_is_wrong) {
