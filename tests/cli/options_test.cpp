@@ -10,6 +10,7 @@
 #include "cli/option_page.h"
 #include "cli/option_toml.h"
 #include "files/options_json.h"
+#include "support/temp_folder.h"
 #include "train/options.h"
 
 namespace traceflow::cli {
@@ -17,10 +18,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// One file for each test, since tests run side by side.
 std::filesystem::path toml_file(const std::string& text) {
-  const std::string test = testing::UnitTest::GetInstance()->current_test_info()->name();
-  const auto path = std::filesystem::path(testing::TempDir()) / ("traceflow_" + test + ".toml");
+  static const TempFolder folder;
+  const auto path = folder / "options.toml";
   std::ofstream(path) << text;
   return path;
 }

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstring>
@@ -11,35 +10,16 @@
 #include <limits>
 
 #include "files/half.h"
+#include "support/temp_folder.h"
 
 namespace traceflow {
 namespace {
 
 using ::testing::HasSubstr;
 
-// A folder of this process, gone at its end: tests run side by side. In memory where the system has such a
-// place, since every write is synced, which on a busy disk takes a while.
-struct ScratchFolder {
-  std::filesystem::path path;
-
-  ScratchFolder() {
-    const std::filesystem::path memory("/dev/shm");
-    const auto base =
-        std::filesystem::is_directory(memory) ? memory : std::filesystem::path(testing::TempDir());
-    path = base / ("traceflow_safetensors_" + std::to_string(getpid()));
-    std::filesystem::create_directories(path);
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-};
-
 std::filesystem::path scratch(const std::string& name) {
-  static const ScratchFolder folder;
-  return folder.path / (name + ".safetensors");
+  static const TempFolder folder;
+  return folder / (name + ".safetensors");
 }
 
 std::string contents(const std::filesystem::path& path) {

@@ -6,17 +6,12 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "support/temp_folder.h"
 
 namespace traceflow {
 namespace {
 
 using nlohmann::json;
-
-std::filesystem::path scratch(const std::string& name) {
-  auto path = std::filesystem::path(testing::TempDir()) / ("traceflow_" + name + ".jsonl");
-  std::filesystem::remove(path);
-  return path;
-}
 
 std::vector<json> lines(const std::filesystem::path& path) {
   std::ifstream file(path);
@@ -41,7 +36,8 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   full.seconds = 3;
   full.rate = 2.5;
   full.surfels = {100, 20};
-  const auto path = scratch("kinds");
+  const TempFolder folder;
+  const auto path = folder / "log.jsonl";
   {
     EventLog log(path);
     log(events::Started{"plate", "runs/plate", 0, 10, 2, 42, {100, 20}});
@@ -76,7 +72,8 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
 }
 
 TEST(EventLog, AppendsAndThinsStepsButKeepsTheLast) {
-  const auto path = scratch("thinned");
+  const TempFolder folder;
+  const auto path = folder / "log.jsonl";
   for (int session = 0; session < 2; ++session) {
     EventLog log(path, 3);
     for (int64_t i = 1; i <= 7; ++i) log(step(i, 7));
