@@ -22,7 +22,8 @@ InputError::InputError(const std::string& where, const std::string& field, const
 
 void require(bool condition, const char* invariant, const std::string& observed) {
   if (condition) return;
-  throw InternalError(std::string("invariant broken: ") + invariant + (observed.empty() ? "" : " (" + observed + ")"));
+  throw InternalError(std::string("invariant broken: ") + invariant +
+                      (observed.empty() ? "" : " (" + observed + ")"));
 }
 
 }  // namespace traceflow

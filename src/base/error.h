@@ -5,7 +5,8 @@
 
 namespace traceflow {
 
-// Input that cannot be used: a file, an option, a capture. The program prints what() as its one line and exits 2.
+// Input that cannot be used: a file, an option, a capture. The program prints what() as its one line and
+// exits 2.
 class InputError : public std::runtime_error {
  public:
   // where: the file or option; field: the place inside it, may be empty; found, expected: values in words;

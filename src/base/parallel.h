@@ -39,8 +39,9 @@ class ExceptionBridge {
 
 }  // namespace detail
 
-// f(begin, end) over [0, n) in blocks of `grain`, dealt to threads as they come free. Which elements share a block never
-// depends on the number of threads, so a sum kept per block and added in block order has the same bytes at any count.
+// f(begin, end) over [0, n) in blocks of `grain`, dealt to threads as they come free. Which elements share a
+// block never depends on the number of threads, so a sum kept per block and added in block order has the same
+// bytes at any count.
 template <class F>
 void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
   if (n <= 0) return;

@@ -14,8 +14,8 @@ struct Entry {
   double seconds = 0;
 };
 
-// Measures from construction to destruction, on the thread that opened it. Costs a clock read when profiling is on and one
-// relaxed load when it is off. `name` must outlive the program (a literal).
+// Measures from construction to destruction, on the thread that opened it. Costs a clock read when profiling
+// is on and one relaxed load when it is off. `name` must outlive the program (a literal).
 class Scope {
  public:
   explicit Scope(const char* name);

@@ -39,8 +39,7 @@ bool JsonField::has(const std::string& key) const {
 }
 
 JsonField JsonField::operator[](const std::string& key) const {
-  JsonField field(path_, name_.empty() ? key : name_ + "." + key,
-                        has(key) ? &value_->at(key) : nullptr);
+  JsonField field(path_, name_.empty() ? key : name_ + "." + key, has(key) ? &value_->at(key) : nullptr);
   if (field.value_ == nullptr) field.fail("nothing", "a value");
   return field;
 }

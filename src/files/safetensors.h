@@ -10,8 +10,8 @@
 
 namespace traceflow {
 
-// The safetensors format: a JSON header with names, types, shapes and offsets, then the bytes. Types: F32, F64, I32, I64, U8,
-// and for reading also F16 and BF16 (widened to float). Metadata is a map of strings.
+// The safetensors format: a JSON header with names, types, shapes and offsets, then the bytes. Types: F32,
+// F64, I32, I64, U8, and for reading also F16 and BF16 (widened to float). Metadata is a map of strings.
 class Safetensors {
  public:
   // Throws InputError for a file that is not one or whose header points outside it.
@@ -27,8 +27,8 @@ class Safetensors {
 
   bool has(const std::string& name) const;
   std::vector<std::string> names() const;
-  // T is float, double, int32_t, int64_t or uint8_t. Throws InputError naming the file and the tensor when it is missing or has
-  // another type.
+  // T is float, double, int32_t, int64_t or uint8_t. Throws InputError naming the file and the tensor when it
+  // is missing or has another type.
   template <class T>
   Tensor<T> tensor(const std::string& name) const;
 

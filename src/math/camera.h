@@ -4,14 +4,15 @@
 
 namespace traceflow {
 
-// A pinhole camera (method §2). Camera axes are OpenCV's: x right, y down, z forward; pixel (i, j) has its centre at
-// (i + 0.5, j + 0.5). Lengths are in the normalised scene's units. Captured distortion and skew are removed on loading.
+// A pinhole camera (method §2). Camera axes are OpenCV's: x right, y down, z forward; pixel (i, j) has its
+// centre at (i + 0.5, j + 0.5). Lengths are in the normalised scene's units. Captured distortion and skew are
+// removed on loading.
 template <class T>
 struct Camera {
   int width = 0;
   int height = 0;
-  T focal_x = 1, focal_y = 1;      // pixels
-  T centre_x = 0, centre_y = 0;    // principal point, pixels
+  T focal_x = 1, focal_y = 1;       // pixels
+  T centre_x = 0, centre_y = 0;     // principal point, pixels
   Mat3<T> camera_from_world{T(1)};  // rotation
   Vec3<T> position{T(0)};           // centre of projection, in world
 
@@ -31,12 +32,18 @@ struct Camera {
 
 template <class To, class From>
 Camera<To> convert(const Camera<From>& c) {
-  return {c.width,     c.height,    To(c.focal_x),           To(c.focal_y), To(c.centre_x),
-          To(c.centre_y), Mat3<To>(c.camera_from_world), Vec3<To>(c.position)};
+  return {c.width,
+          c.height,
+          To(c.focal_x),
+          To(c.focal_y),
+          To(c.centre_x),
+          To(c.centre_y),
+          Mat3<To>(c.camera_from_world),
+          Vec3<To>(c.position)};
 }
 
-// dL/dcamera pose. The rotation's nine entries are taken as free numbers; whoever updates a pose projects them to the
-// rotation group. Ops add to it.
+// dL/dcamera pose. The rotation's nine entries are taken as free numbers; whoever updates a pose projects
+// them to the rotation group. Ops add to it.
 template <class T>
 struct CameraGradient {
   Mat3<T> camera_from_world{T(0)};

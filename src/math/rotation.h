@@ -4,7 +4,8 @@
 
 #include "math/types.h"
 
-// A surfel's frame from its quaternion (method §1.1). Quaternions are stored (w, x, y, z) and need not have unit length.
+// A surfel's frame from its quaternion (method §1.1). Quaternions are stored (w, x, y, z) and need not have
+// unit length.
 namespace traceflow {
 
 // Columns t_u, t_v, n of the rotation of q/|q|. A zero quaternion gives the identity.

@@ -76,10 +76,11 @@ TRACEFLOW_HD Vec3<T> sh_colour(int degree, const U* sh, const Vec3<T>& direction
   return glm::max(c, Vec3<T>(T(0)));
 }
 
-// Adds dL/dsh to grad_sh and returns dL/ddirection (direction as free). A channel clamped at zero passes nothing.
+// Adds dL/dsh to grad_sh and returns dL/ddirection (direction as free). A channel clamped at zero passes
+// nothing.
 template <class T, class U>
-TRACEFLOW_HD Vec3<T> sh_colour_backward(int degree, const U* sh, const Vec3<T>& direction, Vec3<T> grad_colour,
-                                        U* grad_sh) {
+TRACEFLOW_HD Vec3<T> sh_colour_backward(int degree, const U* sh, const Vec3<T>& direction,
+                                        Vec3<T> grad_colour, U* grad_sh) {
   T basis[16];
   sh_basis(degree, direction, basis);
   Vec3<T> c(T(0.5));

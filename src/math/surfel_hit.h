@@ -15,8 +15,8 @@ struct SurfelFrame {
   Vec2<T> scale;
 };
 
-// Where the ray origin + t·direction meets the surfel's plane; (u, v) in standard deviations. `valid` is false for a ray
-// parallel to the plane.
+// Where the ray origin + t·direction meets the surfel's plane; (u, v) in standard deviations. `valid` is
+// false for a ray parallel to the plane.
 template <class T>
 struct SurfelHit {
   T t, u, v;
@@ -24,7 +24,8 @@ struct SurfelHit {
 };
 
 template <class T>
-TRACEFLOW_HD SurfelHit<T> intersect(const SurfelFrame<T>& s, const Vec3<T>& origin, const Vec3<T>& direction) {
+TRACEFLOW_HD SurfelHit<T> intersect(const SurfelFrame<T>& s, const Vec3<T>& origin,
+                                    const Vec3<T>& direction) {
   const Vec3<T>& n = s.rotation[2];
   const T facing = dot(n, direction);
   if (facing == T(0)) return {T(0), T(0), T(0), false};
@@ -45,8 +46,8 @@ struct SurfelHitGradient {
 // Derivative of a valid hit by everything that it was made of, from dL/dt, dL/du, dL/dv.
 template <class T>
 TRACEFLOW_HD SurfelHitGradient<T> intersect_backward(const SurfelFrame<T>& s, const Vec3<T>& origin,
-                                                     const Vec3<T>& direction, const SurfelHit<T>& hit, T grad_t,
-                                                     T grad_u, T grad_v) {
+                                                     const Vec3<T>& direction, const SurfelHit<T>& hit,
+                                                     T grad_t, T grad_u, T grad_v) {
   const Vec3<T>& n = s.rotation[2];
   const T facing = dot(n, direction);
   const Vec3<T> x = origin + hit.t * direction - s.position;

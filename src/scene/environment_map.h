@@ -7,8 +7,8 @@
 
 namespace traceflow {
 
-// A learnable cube map queried by the reflection direction (method §9), the peer of the environment surfels. The residual
-// field moves the direction with time: d' = normalised(d + F(d, t)), d entering F detached.
+// A learnable cube map queried by the reflection direction (method §9), the peer of the environment surfels.
+// The residual field moves the direction with time: d' = normalised(d + F(d, t)), d entering F detached.
 template <class T>
 struct BasicEnvironmentMap {
   // (6·S)×S×3 logits, faces +x −x +y −y +z −z stacked, each S×S; colour = σ(logit), bilinear within a face.

@@ -6,11 +6,13 @@ namespace traceflow {
 
 void NetworkOptions::validate() const {
   check_option(depth >= 1 && depth <= 32, "depth", depth, "1 to 32 layers");
-  check_option(width >= 16 && width <= 1024 && width % 16 == 0, "width", width, "a multiple of 16 up to 1024");
+  check_option(width >= 16 && width <= 1024 && width % 16 == 0, "width", width,
+               "a multiple of 16 up to 1024");
   check_option(skip >= 0 && skip < depth, "skip", skip, "0 (none) or a layer below depth");
   check_option(position_frequencies >= 0 && position_frequencies <= 16, "position_frequencies",
                position_frequencies, "0 to 16");
-  check_option(time_frequencies >= 0 && time_frequencies <= 16, "time_frequencies", time_frequencies, "0 to 16");
+  check_option(time_frequencies >= 0 && time_frequencies <= 16, "time_frequencies", time_frequencies,
+               "0 to 16");
 }
 
 Field make_field(const NetworkOptions& shape, int outputs, Random& random) {

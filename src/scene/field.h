@@ -20,8 +20,10 @@ struct NetworkOptions {
   void visit(Visitor& v) {
     v.field("depth", depth, "layers", "Linear layers before the heads (method §1.2).");
     v.field("width", width, "units", "Width of the hidden layers.");
-    v.field("skip", skip, "layer", "Layer (from 0) before which the encoding is concatenated again; 0 for none.");
-    v.field("position_frequencies", position_frequencies, "octaves", "Frequencies of the position's encoding.");
+    v.field("skip", skip, "layer",
+            "Layer (from 0) before which the encoding is concatenated again; 0 for none.");
+    v.field("position_frequencies", position_frequencies, "octaves",
+            "Frequencies of the position's encoding.");
     v.field("time_frequencies", time_frequencies, "octaves", "Frequencies of the time's encoding.");
   }
   void validate() const;
@@ -33,15 +35,17 @@ struct NetworkOptions {
   }
 };
 
-// The parameters of one residual field F(x, t): R³×[0,1] → R^outputs; also the shape of its gradients and moments.
-// Encoding order: x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x (three numbers each), then the same for t.
+// The parameters of one residual field F(x, t): R³×[0,1] → R^outputs; also the shape of its gradients and
+// moments. Encoding order: x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x (three numbers each), then the
+// same for t.
 template <class T>
 struct BasicField {
   NetworkOptions shape;
-  std::vector<Tensor<T>> weight;  // layer l: width × layer_inputs(l), row-major; at the skip the encoding comes first
-  std::vector<Tensor<T>> bias;    // layer l: width
-  Tensor<T> head_weight;          // outputs × width: all linear heads stacked
-  Tensor<T> head_bias;            // outputs
+  std::vector<Tensor<T>>
+      weight;  // layer l: width × layer_inputs(l), row-major; at the skip the encoding comes first
+  std::vector<Tensor<T>> bias;  // layer l: width
+  Tensor<T> head_weight;        // outputs × width: all linear heads stacked
+  Tensor<T> head_bias;          // outputs
 
   int outputs() const { return head_bias.empty() ? 0 : static_cast<int>(head_bias.dim(0)); }
 

@@ -23,8 +23,8 @@ struct SceneNormalisation {
   double scale = 1;
 };
 
-// What is reconstructed (method §1): two sets of surfels and a residual field for each, or a cube map in the place of the
-// second set. A field that is absent is F ≡ 0.
+// What is reconstructed (method §1): two sets of surfels and a residual field for each, or a cube map in the
+// place of the second set. A field that is absent is F ≡ 0.
 struct Scene {
   Surfels main;
   Surfels environment;
@@ -33,7 +33,8 @@ struct Scene {
   std::optional<EnvironmentMap> environment_map;
   Specular specular = Specular::environment_gaussians;
   SceneNormalisation normalisation;
-  float extent = 1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
+  float extent =
+      1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
   // The largest distance by which the main field lately moved a surfel: what view culling must allow for.
   float main_reach = 0;
 };

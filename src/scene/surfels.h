@@ -4,8 +4,8 @@
 
 namespace traceflow {
 
-// A set of N surfels as they are stored and trained, before activation (method §1.1). Also the shape of their gradients
-// and of Adam's moments. T is float in the program, double in references.
+// A set of N surfels as they are stored and trained, before activation (method §1.1). Also the shape of their
+// gradients and of Adam's moments. T is float in the program, double in references.
 template <class T>
 struct BasicSurfels {
   Tensor<T> position;       // N×3, world (normalised scene units)
@@ -41,8 +41,8 @@ struct BasicSurfels {
 };
 using Surfels = BasicSurfels<float>;
 
-// M surfels at one time, activated (method §1.3): what the rasteriser and the tracer see. A subset of the stored ones in
-// ascending order. Also the shape of the gradients by these values.
+// M surfels at one time, activated (method §1.3): what the rasteriser and the tracer see. A subset of the
+// stored ones in ascending order. Also the shape of the gradients by these values.
 template <class T>
 struct BasicPosedSurfels {
   Tensor<T> position;  // M×3, world
@@ -71,8 +71,9 @@ using PosedSurfels = BasicPosedSurfels<float>;
 // Zeros in the shapes of another set.
 template <class To, class From>
 BasicSurfels<To> zeros_like(const BasicSurfels<From>& s) {
-  return {Tensor<To>(s.position.shape()),      Tensor<To>(s.log_scale.shape()), Tensor<To>(s.rotation.shape()),
-          Tensor<To>(s.opacity_logit.shape()), Tensor<To>(s.sh.shape()),        Tensor<To>(s.tint_logit.shape())};
+  return {Tensor<To>(s.position.shape()), Tensor<To>(s.log_scale.shape()),
+          Tensor<To>(s.rotation.shape()), Tensor<To>(s.opacity_logit.shape()),
+          Tensor<To>(s.sh.shape()),       Tensor<To>(s.tint_logit.shape())};
 }
 template <class To, class From>
 BasicSurfels<To> convert(const BasicSurfels<From>& s) {
