@@ -33,7 +33,7 @@ PosedSurfels make_shell(const Setting& setting) {
   for (int64_t i = 0; i < surfel_count; ++i) {
     const Vec3<double> out = glm::normalize(Vec3<double>(random.normal(), random.normal(), random.normal()));
     store3(s.position.row(i), random.uniform(5, 8) * out);
-    for (int k = 0; k < 2; ++k) s.scale(i, k) = static_cast<float>(0.085 * std::exp(0.3 * random.normal()));
+    for (int k = 0; k < 2; ++k) s.scale(i, k) = static_cast<float>(0.092 * std::exp(0.3 * random.normal()));
     for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(random.normal());
     s.opacity[i] = static_cast<float>(random.uniform(setting.opacity_min, setting.opacity_max));
     for (int64_t k = 0; k < s.sh.row_size(); ++k) s.sh.row(i)[k] = static_cast<float>(0.1 * random.normal());

@@ -12,11 +12,12 @@
 namespace traceflow::trace {
 
 struct Options {
-  float t_min = 1e-3F;  // hits nearer than this are ignored; scene units
+  float t_min = 1e-3F;  // hits nearer than this are ignored; scene units, whatever the direction's length
   float alpha_min = 1.0F / 255;
   float alpha_max = 0.99F;
   float transmittance_min = 1e-4F;
-  int hits_per_pass = 64;  // k: changes speed, never the image
+  // k: hits gathered between two looks at whether the ray has ended. Changes speed, never the image.
+  int hits_per_pass = 64;
   Vec3<float> background{0};
 
   template <class Visitor>
@@ -26,7 +27,8 @@ struct Options {
     v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
     v.field("transmittance_min", transmittance_min, "",
             "A ray ends before its transmittance falls under this.");
-    v.field("hits_per_pass", hits_per_pass, "hits", "Hits held at a time; changes speed, not the image.");
+    v.field("hits_per_pass", hits_per_pass, "hits",
+            "Hits gathered before looking whether a ray has ended; changes speed, not the image.");
   }
   void validate() const;
 };
@@ -51,8 +53,8 @@ struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
   Tensor<T> origins;     // R×3
   Tensor<T> directions;  // R×3
-  // M, the density-control signal: Σ over hits of |dL/dposition| · t / 2 as EnvGS has it. The reference
-  // leaves it empty.
+  // M, the density-control signal: Σ over hits of |dL/dposition| · t / 2 as EnvGS has it, t in scene units.
+  // The reference leaves it empty.
   Tensor<T> position_gradient;
 };
 using InputGradient = BasicInputGradient<float>;
@@ -65,8 +67,8 @@ struct BvhDeleter {
 };
 using BvhPtr = std::unique_ptr<Bvh, BvhDeleter>;
 BvhPtr make_bvh();
-// (Re)builds; reuse one object across iterations. Surfels that are not finite, have no area or whose opacity
-// is under alpha_min are left out. The result does not depend on the number of threads.
+// (Re)builds; reuse one object across iterations. Surfels that are not finite, have no area, reach beyond
+// 1e15 or whose opacity is under alpha_min are left out. The result does not depend on the number of threads.
 void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh);
 
 // The hit lists that forward keeps for backward. Reuse one object across iterations.
