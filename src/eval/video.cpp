@@ -9,9 +9,8 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstdlib>
-#include <cstring>
-#include <sstream>
+#include <string>
+#include <utility>
 #include <vector>
 
 extern char** environ;
@@ -20,19 +19,35 @@ namespace traceflow::eval {
 
 namespace {
 
-bool ffmpeg_in_path() {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path == nullptr ? "" : path);
-  for (std::string folder; std::getline(folders, folder, ':');) {
-    if (::access((std::filesystem::path(folder) / "ffmpeg").c_str(), X_OK) == 0) return true;
+// Starts ffmpeg with the given arguments, reading from `input` where that is not negative. 0 or the system's
+// error.
+int spawn_ffmpeg(std::vector<std::string> words, int input, pid_t& process) {
+  words.insert(words.begin(), "ffmpeg");
+  std::vector<char*> arguments(words.size() + 1, nullptr);
+  for (size_t i = 0; i < words.size(); ++i) arguments[i] = words[i].data();
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  if (input >= 0) posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  const int error = ::posix_spawnp(&process, "ffmpeg", &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  return error;
+}
+
+// Whether the process ended well.
+bool wait_for(pid_t process) {
+  int status = 0;
+  while (::waitpid(process, &status, 0) < 0) {
+    if (errno != EINTR) return false;
   }
-  return false;
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 }  // namespace
 
 void Video::prepare(const std::filesystem::path& path) {
-  if (!ffmpeg_in_path()) {
+  pid_t process = -1;
+  if (spawn_ffmpeg({"-version"}, -1, process) != 0 || !wait_for(process)) {
     throw InputError("option", "video", "no ffmpeg on this machine", "ffmpeg in PATH",
                      "install it with `apt install ffmpeg`, or leave --video out");
   }
@@ -41,29 +56,20 @@ void Video::prepare(const std::filesystem::path& path) {
 
 void Video::start() {
   std::array<int, 2> ends{};
-  if (::pipe2(ends.data(), O_CLOEXEC) != 0)
-    throw InputError(path_.string(), "video", std::strerror(errno), "a pipe");
+  if (::pipe2(ends.data(), O_CLOEXEC) != 0) fail();
   // A relative name could begin with a dash.
   const std::string output = std::filesystem::absolute(path_).string();
-  std::vector<std::string> words = {
-      "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
-      fmt::format("{}x{}", size_[1], size_[0]), "-r", fmt::format("{}", frames_per_second_), "-i", "-",
-      // Most players want 4:2:0, which wants even sides.
-      "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-crf", "18", output};
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, ends[0], STDIN_FILENO);
-  const int error = ::posix_spawnp(&process_, "ffmpeg", &actions, nullptr, arguments.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
+  const int error = spawn_ffmpeg(
+      {"-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
+       fmt::format("{}x{}", size_[1], size_[0]), "-r", fmt::format("{}", frames_per_second_), "-i", "-",
+       // Most players want 4:2:0, which wants even sides.
+       "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-crf", "18", output},
+      ends[0], process_);
   ::close(ends[0]);
   pipe_ = ends[1];
   if (error != 0) {
     process_ = -1;
-    throw InputError(path_.string(), "ffmpeg", std::strerror(error), "a program that starts");
+    fail();
   }
 }
 
@@ -96,16 +102,13 @@ void Video::finish() {
   if (process_ < 0) return;
   ::close(pipe_);
   pipe_ = -1;
-  int status = 0;
-  while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {
-  }
-  process_ = -1;
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) fail();
+  const bool good = wait_for(std::exchange(process_, -1));
+  if (!good) fail();
 }
 
 Video::~Video() {
   if (pipe_ >= 0) ::close(pipe_);
-  if (process_ >= 0) ::waitpid(process_, nullptr, 0);
+  if (process_ >= 0) wait_for(process_);
 }
 
 }  // namespace traceflow::eval

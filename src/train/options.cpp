@@ -35,6 +35,7 @@ TrainOptions cpu_preset() {
   o.density.every = 1800;
   o.density.from = 1800;
   o.density.growth = 0.1F;
+  o.density.prune_above = 10;
   o.density.opacity_reset_every = 0;
   o.density.max_surfels = 20000;
   o.environment_density.from = 18000;

@@ -13,7 +13,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // One pass over [begin, end). `rates` holds a rate for each entry of the block. Returns how many gradients
 // are not finite.
-int64_t UpdateBlock(const AdamBlock& b) {
+int64_t update_block(const AdamBlock& b) {
   const hn::ScalableTag<float> d;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
   const auto beta1 = hn::Set(d, b.beta1);
@@ -59,7 +59,7 @@ HWY_AFTER_NAMESPACE();
 
 namespace traceflow::optimize {
 
-HWY_EXPORT(UpdateBlock);
+HWY_EXPORT(update_block);
 
 namespace {
 
@@ -96,7 +96,7 @@ int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamS
         static_cast<float>(1 / (1 - std::pow(static_cast<double>(options.beta1), step)));
     block.inverse_correction2 =
         static_cast<float>(1 / (1 - std::pow(static_cast<double>(options.beta2), step)));
-    not_finite[static_cast<size_t>(begin / grain)] = HWY_DYNAMIC_DISPATCH(UpdateBlock)(block);
+    not_finite[static_cast<size_t>(begin / grain)] = HWY_DYNAMIC_DISPATCH(update_block)(block);
   });
   int64_t total = 0;
   for (const int64_t n : not_finite) total += n;

@@ -89,7 +89,8 @@ Bins fill_bins_parallel(const BoxItem* items, uint32_t count, const Binning& bin
 
 // Leaves are tested 16 surfels at a time: a part costs as many tests as it fills leaves.
 float part_cost(const Box& box, uint32_t count) {
-  return box.area() * static_cast<float>((count + bvh_width - 1) / bvh_width);
+  const uint32_t leaves = (count + bvh_width - 1) / bvh_width;
+  return box.area() * static_cast<float>(leaves);
 }
 
 void best_on_axis(const Bins& bins, int axis, int bin_count, Cut& best) {
