@@ -85,10 +85,12 @@ std::vector<uint8_t> visible(const Saved& saved) {
   return flags;
 }
 
-int64_t evaluations(const Saved& saved) {
-  int64_t blocks = 0;
-  for (const uint16_t touched : saved.touched.values()) blocks += std::popcount(touched);
-  return blocks * pixels_per_block;
+Work work(const Saved& saved) {
+  Work result;
+  for (const uint16_t touched : saved.touched.values())
+    result.evaluated += std::popcount(touched) * pixels_per_block;
+  result.listed = saved.entries.size() * pixels_per_tile;
+  return result;
 }
 
 }  // namespace traceflow::raster

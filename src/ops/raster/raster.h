@@ -96,9 +96,13 @@ void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Op
 // After forward with `saved`: M flags, 1 where the surfel touched at least one pixel's blend.
 std::vector<uint8_t> visible(const Saved& saved);
 
-// After forward with `saved`: the pairs of a pixel and a surfel in 4×4 blocks of pixels in which the surfel
-// was blended; what the speed is measured in.
-int64_t evaluations(const Saved& saved);
+// After forward with `saved`: what its speed is measured in, as pairs of a pixel and a surfel.
+struct Work {
+  int64_t evaluated =
+      0;  // the Gaussian was computed: in 4×4 blocks of which at least one pixel blended the surfel
+  int64_t listed = 0;  // the surfel was in the list of the pixel's 16×16 tile
+};
+Work work(const Saved& saved);
 
 // The plain truth: double precision, every pixel against every surfel, both sort orders, the cut-offs of the
 // contract only.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ostream>
 #include <string>
 
 #include "base/parallel.h"
@@ -22,6 +23,8 @@ struct Case {
   double differing_share = 0.002;
   double gradient_tolerance = 1e-4;
   double gradient_share = 0.005;
+
+  friend std::ostream& operator<<(std::ostream& to, const Case& c) { return to << c.name; }
 };
 
 std::vector<Case> cases() {

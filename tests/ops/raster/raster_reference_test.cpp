@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <ostream>
 
 #include "raster_scenes.h"
 
@@ -68,6 +69,8 @@ struct Case {
   const char* name;
   Options options;
   SceneOptions scene;
+
+  friend std::ostream& operator<<(std::ostream& to, const Case& c) { return to << c.name; }
 };
 
 std::vector<Case> cases() {
