@@ -20,9 +20,9 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-template <size_t N>
-Tensor<double> row_of(const std::array<double, N>& values) {
-  Tensor<double> row(Shape{static_cast<int64_t>(N)});
+template <size_t count>
+Tensor<double> row_of(const std::array<double, count>& values) {
+  Tensor<double> row(Shape{static_cast<int64_t>(count)});
   std::copy(values.begin(), values.end(), row.data());
   return row;
 }

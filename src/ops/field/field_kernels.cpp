@@ -109,17 +109,17 @@ HWY_INLINE hn::Mask<Floats> is_positive(Floats d, const int16_t* activation) {
   return hn::RebindMask(d, hn::Gt(bits, hn::Zero(integers)));
 }
 
-// Masks a strip of Vectors vectors' width down all rows, the columns' sums in registers.
-template <int Vectors, class Activation>
+// Masks a strip of vectors vectors' width down all rows, the columns' sums in registers.
+template <int vectors, class Activation>
 HWY_INLINE void mask_strip(const Activation* activation, int64_t rows, int64_t columns, float* gradient,
                            uint16_t* rounded, float* column_sum) {
   const Floats d;
   const hn::Rebind<uint16_t, Floats> half;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
-  Vector sums[Vectors];
-  for (int v = 0; v < Vectors; ++v) sums[v] = hn::Zero(d);
+  Vector sums[vectors];
+  for (int v = 0; v < vectors; ++v) sums[v] = hn::Zero(d);
   for (int64_t i = 0; i < rows * columns; i += columns) {
-    for (int v = 0; v < Vectors; ++v) {
+    for (int v = 0; v < vectors; ++v) {
       const int64_t at = i + v * lanes;
       const Vector masked = hn::IfThenElseZero(is_positive(d, activation + at), hn::LoadU(d, gradient + at));
       hn::StoreU(masked, d, gradient + at);
@@ -127,7 +127,7 @@ HWY_INLINE void mask_strip(const Activation* activation, int64_t rows, int64_t c
       sums[v] = hn::Add(sums[v], masked);
     }
   }
-  for (int v = 0; v < Vectors; ++v) {
+  for (int v = 0; v < vectors; ++v) {
     float* sum = column_sum + v * lanes;
     hn::StoreU(hn::Add(hn::LoadU(d, sum), sums[v]), d, sum);
   }
