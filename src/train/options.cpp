@@ -69,6 +69,8 @@ void ScheduleOptions::validate() const {
                "no less than schedule.specular_from");
   check_option(sh_every > 0, "schedule.sh_every", sh_every, "a positive number");
   check_not_negative(time_jitter, "schedule.time_jitter");
+  check_share(first_times, "schedule.first_times");
+  check_not_negative(all_times_from, "schedule.all_times_from");
 }
 
 void RateOptions::validate() const {

@@ -23,6 +23,8 @@ struct ScheduleOptions {
   int sh_every = 1000;
   float time_jitter = 0.1F;
   int time_jitter_until = 20000;
+  float first_times = 1;
+  int all_times_from = 0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -38,6 +40,10 @@ struct ScheduleOptions {
     v.field("time_jitter", time_jitter, "frames",
             "Noise on the time at the start, annealed to zero (method §7.6).");
     v.field("time_jitter_until", time_jitter_until, "iteration", "Where the noise on the time ends.");
+    v.field("first_times", first_times, "",
+            "Share of the capture's duration, from its start, whose views are trained on at first.");
+    v.field("all_times_from", all_times_from, "iteration",
+            "The share has grown to the whole duration, in proportion to the iterations.");
   }
   void validate() const;
 };

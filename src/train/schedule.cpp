@@ -71,6 +71,14 @@ double Schedule::time_jitter(int iteration) const {
   return options_.schedule.time_jitter * (1.0 - static_cast<double>(iteration) / until);
 }
 
+double Schedule::seen_times(int iteration) const {
+  const int from = mark(options_.schedule.deform_from);
+  const int until = mark(options_.schedule.all_times_from);
+  if (iteration >= until) return 1;
+  const double grown = static_cast<double>(std::max(0, iteration - from)) / std::max(1, until - from);
+  return std::lerp(static_cast<double>(options_.schedule.first_times), 1.0, grown);
+}
+
 bool Schedule::densifies(int iteration, const DensityOptions& density) const {
   return iteration >= mark(density.from) && iteration < mark(density.until) && iteration > 0 &&
          iteration % interval(density.every) == 0;

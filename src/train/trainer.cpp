@@ -92,8 +92,18 @@ FrameRequest Trainer::request_for(const View& view) {
   return request;
 }
 
+const View& Trainer::draw_view() {
+  const auto [first, last] = std::minmax_element(capture_.train.begin(), capture_.train.end(),
+                                                 [](const View& a, const View& b) { return a.time < b.time; });
+  const double latest = first->time + schedule_.seen_times(iteration_) * (last->time - first->time);
+  for (;;) {
+    const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
+    if (view.time <= latest || view.time == first->time) return view;
+  }
+}
+
 LossTerms Trainer::step() {
-  const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
+  const View& view = draw_view();
   const std::shared_ptr<const ViewImages> target = load_images(capture_, view);
   const FrameRequest request = request_for(view);
   const Trainable trainable = schedule_.trainable(iteration_);

@@ -55,6 +55,8 @@ class Trainer {
   int iteration() const { return iteration_; }
 
  private:
+  // The next view among those whose times the schedule has reached.
+  const View& draw_view();
   FrameRequest request_for(const View& view);
   void control_density(int done);
   void save();
