@@ -32,8 +32,8 @@ bool on_sheet(size_t i, size_t n, size_t wanted) {
   return false;
 }
 
-std::optional<lpips::Weights> read_lpips(const std::string& path) {
-  if (!path.empty()) return lpips::read_weights(path);
+std::optional<lpips::Network> read_lpips(const std::string& path) {
+  if (!path.empty()) return lpips::network_of(lpips::read_weights(path));
   fmt::print(stderr,
              "LPIPS is null: it needs weights. scripts/export_lpips.py writes them, --lpips FILE reads them "
              "(docs/eval.md)\n");
@@ -48,7 +48,7 @@ void run_eval(const EvalArguments& a) {
   const Capture capture = capture_of(run, a.capture, a.downscale);
   const std::vector<View>& views = views_of(capture, a.split);
   for (const View& view : views) eval::check_name(capture.folder.string(), "view id", view.id);
-  const std::optional<lpips::Weights> weights = read_lpips(a.lpips);
+  const std::optional<lpips::Network> network = read_lpips(a.lpips);
 
   const std::filesystem::path folder = std::filesystem::path(a.run) / "eval" / a.split;
   std::filesystem::create_directories(folder);
@@ -61,7 +61,7 @@ void run_eval(const EvalArguments& a) {
   report.iterations = run.iterations;
   report.train_seconds = run.train_seconds;
   eval::evaluate(
-      run.subject, capture, views, weights ? &*weights : nullptr,
+      run.subject, capture, views, network ? &*network : nullptr,
       [&](const View& view, const ViewImages& images, const Frame& frame) {
         files.write(view.id, frame);
         const auto i = static_cast<size_t>(&view - views.data());

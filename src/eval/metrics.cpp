@@ -70,15 +70,15 @@ std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<f
 }
 
 Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
-                const lpips::Weights* weights) {
+                const lpips::Network* network) {
   const Tensor<float> image = from_8bit(to_8bit(colour));
   const Tensor<float> target = from_8bit(to_8bit(truth.colour));
   Metrics m;
   m.psnr = psnr(image, target, {});
   m.ssim = loss::ssim(image, target, {});
-  if (weights != nullptr && std::min(image.dim(0), image.dim(1)) >= lpips::min_side) {
-    m.lpips = lpips::distance(*weights, image, target, lpips::Input::defined);
-    m.lpips_published = lpips::distance(*weights, image, target, lpips::Input::published);
+  if (network != nullptr && std::min(image.dim(0), image.dim(1)) >= lpips::min_side) {
+    m.lpips = lpips::distance(*network, image, target, lpips::Input::defined);
+    m.lpips_published = lpips::distance(*network, image, target, lpips::Input::published);
   }
   m.normal_mae_deg = normal_mae_deg(normal, truth.normal, {});
   const auto& mask = truth.mask.values();

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/tensor.h"
-#include "eval/lpips.h"
+#include "ops/lpips/lpips.h"
 
 // How near a rendered view comes to the photograph (method §8). Every figure is absent where it cannot be
 // had.
@@ -52,9 +52,9 @@ struct Truth {
   const Tensor<float>& normal;
 };
 
-// All figures of one view. Colours are rounded to 8 bit first. weights may be null: no LPIPS.
+// All figures of one view. Colours are rounded to 8 bit first. network may be null: no LPIPS.
 Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
-                const lpips::Weights* weights);
+                const lpips::Network* network);
 
 // Each figure's mean over the views that have it.
 Metrics mean(const std::vector<Metrics>& views);

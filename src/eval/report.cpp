@@ -37,7 +37,7 @@ std::string table_line(const std::string& label, size_t width, const Metrics& m)
 }  // namespace
 
 void evaluate(const Subject& subject, const Capture& capture, const std::vector<View>& views,
-              const lpips::Weights* weights, const ViewListener& listener, Report& report) {
+              const lpips::Network* network, const ViewListener& listener, Report& report) {
   using Clock = std::chrono::steady_clock;
   report.main_surfels = subject.scene.main.count();
   report.environment_surfels = subject.scene.environment.count();
@@ -54,7 +54,7 @@ void evaluate(const Subject& subject, const Capture& capture, const std::vector<
     const std::shared_ptr<const ViewImages> images = load_images(capture, view);
     const ViewTruth truth = capture.has_truth ? load_truth(capture, view) : ViewTruth{};
     report.views.push_back({view.id, measure(frame.colour, frame.raster.normal,
-                                             {images->colour, images->mask, truth.normal}, weights)});
+                                             {images->colour, images->mask, truth.normal}, network)});
     if (listener) listener(view, *images, frame);
   }
   if (seconds > 0) report.render_fps = static_cast<double>(views.size()) / seconds;

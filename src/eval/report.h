@@ -34,7 +34,7 @@ using ViewListener = std::function<void(const View& view, const ViewImages& imag
 
 // Renders every view, measures it, and adds it to the report; sets render_fps and the surfel counts.
 void evaluate(const Subject& subject, const Capture& capture, const std::vector<View>& views,
-              const lpips::Weights* weights, const ViewListener& listener, Report& report);
+              const lpips::Network* network, const ViewListener& listener, Report& report);
 
 // The report as JSON text: figures that cannot be had are null.
 std::string report_json(const Report& report);

@@ -1,7 +1,9 @@
+#include <algorithm>
+#include <cmath>
 #include <string>
 
-#include "eval/lpips.h"
 #include "files/safetensors.h"
+#include "ops/lpips/lpips.h"
 
 namespace traceflow::lpips {
 
@@ -11,10 +13,19 @@ constexpr const char* remedy = "write the file with scripts/export_lpips.py";
 // Places of the convolutions in torchvision's vgg16().features; the numbers between are ReLU and pooling.
 constexpr int places[] = {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28};
 
+Tensor<float> read_finite(const Safetensors& file, const std::string& where, const std::string& name) {
+  Tensor<float> tensor = file.tensor<float>(name);
+  if (!std::all_of(tensor.data(), tensor.data() + tensor.size(), [](float v) { return std::isfinite(v); })) {
+    throw InputError(where, name, "a number that is not finite", "finite numbers", remedy);
+  }
+  return tensor;
+}
+
 Weights::Convolution read_convolution(const Safetensors& file, const std::string& where, int place,
                                       int64_t inputs) {
   const std::string name = "features." + std::to_string(place);
-  Weights::Convolution c{file.tensor<float>(name + ".weight"), file.tensor<float>(name + ".bias")};
+  Weights::Convolution c{read_finite(file, where, name + ".weight"),
+                         read_finite(file, where, name + ".bias")};
   const Shape& shape = c.weight.shape();
   if (shape.rank() != 4 || shape[0] < 1 || shape[1] != inputs || shape[2] != 3 || shape[3] != 3) {
     throw InputError(where, name + ".weight", shape.to_string(), "Nx" + std::to_string(inputs) + "x3x3",
@@ -28,7 +39,7 @@ Weights::Convolution read_convolution(const Safetensors& file, const std::string
 
 Tensor<float> read_linear(const Safetensors& file, const std::string& where, int stage, int64_t channels) {
   const std::string name = "lin" + std::to_string(stage) + ".model.1.weight";
-  const Tensor<float> stored = file.tensor<float>(name);
+  const Tensor<float> stored = read_finite(file, where, name);
   if (stored.size() != channels) {
     throw InputError(where, name, stored.shape().to_string(), "1x" + std::to_string(channels) + "x1x1",
                      remedy);
