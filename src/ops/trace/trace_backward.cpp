@@ -1,44 +1,51 @@
 #include "ops/trace/trace_backward.h"
 
+#include <algorithm>
+#include <bit>
+
 #include "base/parallel.h"
 #include "math/rotation.h"
 
 namespace traceflow::trace {
 
-void plan_chunk(const Saved& saved, int64_t surfels, size_t first_block, Chunk& chunk) {
-  chunk.first_block = first_block;
-  chunk.last_block = first_block;
-  size_t hits = 0;
-  do {
-    hits += saved.blocks[chunk.last_block++].surfel.size();
-  } while (chunk.last_block < saved.blocks.size() &&
-           hits + saved.blocks[chunk.last_block].surfel.size() <= records_per_chunk);
-  require(hits <= std::numeric_limits<uint32_t>::max(), "the hits of a chunk can be counted");
+namespace {
 
-  const auto buckets = static_cast<size_t>((surfels + surfels_per_bucket - 1) / surfels_per_bucket);
-  const size_t blocks = chunk.last_block - chunk.first_block;
-  chunk.block_offsets.resize(blocks);
-  parallel_for(
-      "trace count", static_cast<int64_t>(blocks),
-      [&](int64_t b) {
-        std::vector<uint32_t>& count = chunk.block_offsets[static_cast<size_t>(b)];
-        count.assign(buckets, 0);
-        for (const uint32_t s : saved.blocks[first_block + static_cast<size_t>(b)].surfel) {
-          ++count[s / surfels_per_bucket];
-        }
-      },
-      1);
-  chunk.bucket_begin.resize(buckets + 1);
-  uint32_t next = 0;
-  for (size_t bucket = 0; bucket < buckets; ++bucket) {
-    chunk.bucket_begin[bucket] = next;
-    for (std::vector<uint32_t>& offsets : chunk.block_offsets) {
-      const uint32_t count = offsets[bucket];
-      offsets[bucket] = next;
-      next += count;
+// Those that the blocks' hits name, ascending.
+std::vector<uint32_t> list_surfels(std::span<const SavedBlock> blocks, int64_t surfels) {
+  constexpr size_t word_bits = 64;
+  std::vector<uint64_t> hit(static_cast<size_t>(surfels) / word_bits + 1, 0);
+  for (const SavedBlock& block : blocks) {
+    for (const uint32_t s : block.surfel) hit[s / word_bits] |= uint64_t{1} << s % word_bits;
+  }
+  size_t count = 0;
+  for (const uint64_t word : hit) count += static_cast<size_t>(std::popcount(word));
+  std::vector<uint32_t> list;
+  list.reserve(count);
+  for (size_t i = 0; i < hit.size(); ++i) {
+    for (uint64_t word = hit[i]; word != 0; word &= word - 1) {
+      list.push_back(static_cast<uint32_t>(i * word_bits) + static_cast<uint32_t>(std::countr_zero(word)));
     }
   }
-  chunk.bucket_begin[buckets] = next;
+  return list;
+}
+
+}  // namespace
+
+std::vector<Group> make_groups(const Saved& saved, int64_t surfels) {
+  const size_t blocks = saved.blocks.size();
+  std::vector<Group> groups((blocks + blocks_per_group - 1) / blocks_per_group);
+  parallel_for(
+      "trace group surfels", static_cast<int64_t>(groups.size()),
+      [&](int64_t i) {
+        Group& group = groups[static_cast<size_t>(i)];
+        group.first_block = static_cast<size_t>(i) * blocks_per_group;
+        group.last_block = std::min(blocks, group.first_block + blocks_per_group);
+        group.surfels = list_surfels(
+            std::span(saved.blocks).subspan(group.first_block, group.last_block - group.first_block),
+            surfels);
+      },
+      1);
+  return groups;
 }
 
 std::vector<BackwardFrame> make_backward_frames(const PosedSurfels& surfels) {
@@ -57,10 +64,10 @@ std::vector<BackwardFrame> make_backward_frames(const PosedSurfels& surfels) {
 }
 
 void finish_surfels(const PosedSurfels& surfels, const std::vector<BackwardFrame>& frames,
-                    const std::vector<Record>& sums, InputGradient& gradient) {
+                    const std::vector<SurfelSums>& sums, InputGradient& gradient) {
   parallel_for("trace surfel gradients", surfels.count(), [&](int64_t i) {
     const BackwardFrame& f = frames[static_cast<size_t>(i)];
-    const Record& sum = sums[static_cast<size_t>(i)];
+    const SurfelSums& sum = sums[static_cast<size_t>(i)];
     const float* p = sum.value + part::position;
     const float* turned = sum.value + part::turn;
     if (p[0] != 0 || p[1] != 0 || p[2] != 0) {

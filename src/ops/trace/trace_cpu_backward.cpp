@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "math/blend.h"
 #include "ops/trace/trace_backward.h"
+#include "ops/trace/trace_geometry-inl.h"
 #include "ops/trace/trace_sh-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -22,15 +23,18 @@ struct RayHits {
 
 // What backward works out about each hit of a ray, kept between its loops.
 struct RayScratch {
+  std::vector<float*> row;           // of the hit's surfel
   std::vector<float> transmittance;  // before the hit
   std::vector<float> own;            // dL/dweight
-  std::vector<Record*> record;
+  std::vector<float> grad_exponent, grad_distance;
+  std::vector<float> distance;
 
+  // With room for a vector beyond the last.
   void fit(size_t count) {
-    if (own.size() >= count) return;
-    transmittance.resize(2 * count);
-    own.resize(2 * count);
-    record.resize(2 * count);
+    if (own.size() >= count + hit_lanes) return;
+    const size_t size = 2 * count + hit_lanes;
+    for (auto* v : {&transmittance, &own, &grad_exponent, &grad_distance, &distance}) v->resize(size);
+    row.resize(size);
   }
 };
 
@@ -50,12 +54,13 @@ struct RaySums {
   float remaining = 1, alpha = 0, distance = 0;
 };
 
-HWY_INLINE RaySums replay(const RayHits& hits, float* HWY_RESTRICT transmittance) {
+HWY_INLINE RaySums replay(const RayHits& hits, RayScratch& scratch) {
   RaySums sums;
   float distance_sum = 0;
   for (size_t i = 0; i < hits.count; ++i) {
     const float weight = hits.alpha[i] * sums.remaining;
-    transmittance[i] = sums.remaining;
+    scratch.transmittance[i] = sums.remaining;
+    scratch.distance[i] = hits.distance[i];
     sums.remaining *= 1 - hits.alpha[i];
     sums.alpha += weight;
     distance_sum += weight * hits.distance[i];
@@ -64,7 +69,7 @@ HWY_INLINE RaySums replay(const RayHits& hits, float* HWY_RESTRICT transmittance
   return sums;
 }
 
-// Colours of all hits: dL/dweight and dL/dcolour of each; returns dL/d(unit direction) by SH.
+// Colours of all hits: dL/dweight of each, and dL/dsh into the rows; returns dL/d(unit direction) by SH.
 template <int degree>
 HWY_INLINE Vec3<float> colours_backward(const PosedSurfels& surfels, const RayHits& hits, const RaySums& sums,
                                         const RayGradient& grad, const Vec3<float>& direction,
@@ -83,35 +88,26 @@ HWY_INLINE Vec3<float> colours_backward(const PosedSurfels& surfels, const RayHi
     rgb_store(rgb_clamp(raw), padded);
     scratch.own[i] = glm::dot(load3<float>(padded), grad.colour) + grad.alpha +
                      grad.distance * (hits.distance[i] - sums.distance) / sums.alpha;
-    rgb_store(passed, padded);
-    std::copy_n(padded, 3, scratch.record[i]->value + part::colour);
+    spread.pull(passed, scratch.row[i] + part::padded);
   }
   float grad_basis[16] = {};
   pull.finish(grad_basis);
   return sh_basis_backward(degree, direction, grad_basis);
 }
 
-// One hit's geometry: fills its record and returns dL/dorigin.
-HWY_INLINE Vec3<float> hit_backward(const BackwardFrame& frame, const UnitRay& ray, float distance,
-                                    float grad_exponent, float grad_distance, Record& record) {
-  const Vec3<float> x = ray.origin - frame.position + distance * ray.direction;
-  const float along_u = dot(frame.t_u, x), along_v = dot(frame.t_v, x);
-  const float u = along_u * frame.inverse_scale.x, v = along_v * frame.inverse_scale.y;
-  const float grad_u = -grad_exponent * u * frame.inverse_scale.x;
-  const float grad_v = -grad_exponent * v * frame.inverse_scale.y;
-  const Vec3<float> grad_x = grad_u * frame.t_u + grad_v * frame.t_v;
-  const float a = (grad_distance + dot(grad_x, ray.direction)) / dot(frame.normal, ray.direction);
-  record.value[part::position + 0] = -grad_u;
-  record.value[part::position + 1] = -grad_v;
-  record.value[part::position + 2] = a;
-  record.value[part::turn + 0] = a * along_v;
-  record.value[part::turn + 1] = -a * along_u;
-  record.value[part::turn + 2] = grad_u * along_v - grad_v * along_u;
-  record.value[part::scale + 0] = -grad_u * u;
-  record.value[part::scale + 1] = -grad_v * v;
-  record.value[part::opacity] = grad_exponent * frame.inverse_opacity;
-  record.value[part::signal] = 0.5F * distance * std::sqrt(grad_u * grad_u + grad_v * grad_v + a * a);
-  return grad_x - a * frame.normal;
+// Back to front: what each hit's opacity and distance do to the ray.
+HWY_INLINE void blend_backward(const RayHits& hits, const RaySums& sums, const RayGradient& grad,
+                               const Options& options, RayScratch& scratch) {
+  const float grad_distance = grad.distance / sums.alpha;
+  float behind = sums.remaining * dot(grad.colour, options.background);
+  for (size_t i = hits.count; i-- > 0;) {
+    const float alpha = hits.alpha[i], transmittance = scratch.transmittance[i], own = scratch.own[i];
+    const float weight = alpha * transmittance;
+    const float grad_alpha = blend_alpha_gradient(transmittance, alpha, own, behind);
+    behind += weight * own;
+    scratch.grad_exponent[i] = alpha >= options.alpha_max ? 0 : grad_alpha * alpha;
+    scratch.grad_distance[i] = weight * grad_distance;
+  }
 }
 
 // dL/d(caller's direction) = from the unit direction, and from the distance, which is in units of its length.
@@ -122,96 +118,98 @@ HWY_INLINE Vec3<float> direction_backward(const UnitRay& ray, const Vec3<float>&
 }
 
 template <int degree>
-void backward_ray(const BackwardRays& task, int64_t position, const RayHits& hits, RayScratch& scratch) {
-  const BackwardInput& input = task.input;
-  const int64_t r = input.order.ray[static_cast<size_t>(position)];
+void backward_ray(const BackwardInput& input, int64_t r, const RayHits& hits, RayScratch& scratch,
+                  InputGradient& gradient) {
   UnitRay ray;
   make_unit_ray(input.origins.row(r), input.directions.row(r), ray);
-  scratch.fit(hits.count);
-  for (size_t i = 0; i < hits.count; ++i) {
-    scratch.record[i] = task.records + task.offsets[hits.surfel[i] / surfels_per_bucket]++;
-    scratch.record[i]->ray = static_cast<uint32_t>(position - task.first_chunk_ray);
-    scratch.record[i]->surfel = hits.surfel[i];
-  }
-  const RaySums sums = replay(hits, scratch.transmittance.data());
+  const RaySums sums = replay(hits, scratch);
   const RayGradient grad(input.grad_output, r, ray.length);
   float basis[padded_basis];
   padded_sh_basis(degree, ray.direction, basis);
-  std::copy_n(basis, 16, task.bases + 16 * (position - task.first_chunk_ray));
-  Vec3<float> grad_unit =
+  const Vec3<float> by_colour =
       colours_backward<degree>(input.surfels, hits, sums, grad, ray.direction, basis, scratch);
-  Vec3<float> grad_origin(0);
-  float behind = sums.remaining * dot(grad.colour, input.options.background);
-  for (size_t i = hits.count; i-- > 0;) {
-    const float alpha = hits.alpha[i], transmittance = scratch.transmittance[i], own = scratch.own[i];
-    const float weight = alpha * transmittance;
-    const bool clamped = alpha >= input.options.alpha_max;
-    const float grad_alpha = blend_alpha_gradient(transmittance, alpha, own, behind);
-    behind += weight * own;
-    const Vec3<float> moved =
-        hit_backward(input.frames[hits.surfel[i]], ray, hits.distance[i], clamped ? 0 : grad_alpha * alpha,
-                     weight * grad.distance / sums.alpha, *scratch.record[i]);
-    grad_origin += moved;
-    grad_unit += hits.distance[i] * moved;
+  blend_backward(hits, sums, grad, input.options, scratch);
+  const RayPull by_place =
+      places_backward(input.frames.data(), ray,
+                      {hits.surfel, scratch.row.data(), scratch.distance.data(), scratch.grad_exponent.data(),
+                       scratch.grad_distance.data(), hits.count});
+  store3(gradient.origins.row(r), by_place.origin);
+  store3(gradient.directions.row(r),
+         direction_backward(ray, by_colour + by_place.direction, grad.distance, sums.distance));
+}
+
+// Room that a thread reuses.
+struct GroupScratch {
+  RayScratch ray;
+  std::vector<float*> row_of;  // of each surfel of the group
+};
+
+template <int degree>
+void backward_group_degree(const BackwardGroup& task) {
+  constexpr size_t row = row_floats(sh_coefficients(degree));
+  thread_local GroupScratch scratch;
+  const BackwardInput& input = task.input;
+  const std::vector<uint32_t>& surfels = task.group.surfels;
+  scratch.row_of.resize(static_cast<size_t>(input.surfels.count()));
+  std::fill_n(task.rows, row * surfels.size(), 0.0F);
+  for (size_t i = 0; i < surfels.size(); ++i) scratch.row_of[surfels[i]] = task.rows + row * i;
+  for (size_t b = task.group.first_block; b < task.group.last_block; ++b) {
+    const SavedBlock& block = input.saved.blocks[b];
+    const uint32_t* ray = &input.saved.order.ray[b * static_cast<size_t>(rays_per_block)];
+    size_t begin = 0;
+    for (const uint32_t end : block.ray_end) {
+      const size_t count = end - begin;
+      scratch.ray.fit(count);
+      for (size_t i = 0; i < count; ++i) scratch.ray.row[i] = scratch.row_of[block.surfel[begin + i]];
+      if (count > 0) {
+        backward_ray<degree>(input, *ray,
+                             {&block.surfel[begin], &block.distance[begin], &block.alpha[begin], count},
+                             scratch.ray, task.gradient);
+      }
+      begin = end;
+      ++ray;
+    }
   }
-  store3(task.gradient.origins.row(r), grad_origin);
-  store3(task.gradient.directions.row(r), direction_backward(ray, grad_unit, grad.distance, sums.distance));
+}
+
+void backward_group(const BackwardGroup& task) {
+  switch (sh_degree(task.input.surfels.sh.dim(1))) {
+    case 0:
+      return backward_group_degree<0>(task);
+    case 1:
+      return backward_group_degree<1>(task);
+    case 2:
+      return backward_group_degree<2>(task);
+    default:
+      return backward_group_degree<3>(task);
+  }
 }
 
 template <int degree>
-void backward_block(const BackwardRays& task) {
-  thread_local RayScratch scratch;
-  size_t begin = 0;
-  for (size_t k = 0; k < task.saved.ray_end.size(); ++k) {
-    const size_t end = task.saved.ray_end[k];
-    if (end > begin) {
-      backward_ray<degree>(
-          task, task.first_ray + static_cast<int64_t>(k),
-          {&task.saved.surfel[begin], &task.saved.distance[begin], &task.saved.alpha[begin], end - begin},
-          scratch);
+void add_rows_degree(const BackwardSums& task) {
+  constexpr size_t row = row_floats(sh_coefficients(degree));
+  const float* rows = task.rows;
+  for (const Group& group : task.groups) {
+    const auto first = std::lower_bound(group.surfels.begin(), group.surfels.end(), task.begin);
+    for (auto s = first; s != group.surfels.end() && *s < task.end; ++s) {
+      const float* from = rows + row * static_cast<size_t>(s - group.surfels.begin());
+      for (size_t i = 0; i < part::count; ++i) task.sums[*s].value[i] += from[i];
+      sh_add_sums<degree>(from + part::padded, task.sh.row(*s));
     }
-    begin = end;
+    rows += row * group.surfels.size();
   }
 }
 
-void backward_rays(const BackwardRays& task) {
-  switch (sh_degree(task.input.surfels.sh.dim(1))) {
+void add_rows(const BackwardSums& task) {
+  switch (sh_degree(task.sh.dim(1))) {
     case 0:
-      return backward_block<0>(task);
+      return add_rows_degree<0>(task);
     case 1:
-      return backward_block<1>(task);
+      return add_rows_degree<1>(task);
     case 2:
-      return backward_block<2>(task);
+      return add_rows_degree<2>(task);
     default:
-      return backward_block<3>(task);
-  }
-}
-
-void backward_bucket(const BackwardBucket& task) {
-  const hn::CappedTag<float, 16> d;
-  const size_t lanes = hn::Lanes(d);
-  HWY_ALIGN float sums[surfels_per_bucket][16] = {};
-  HWY_ALIGN float sh[surfels_per_bucket][3][16] = {};
-  for (const Record* record = task.begin; record != task.end; ++record) {
-    const auto slot = static_cast<size_t>(record->surfel - task.first_surfel);
-    const float* basis = task.bases + 16 * static_cast<size_t>(record->ray);
-    for (size_t i = 0; i < part::count; ++i) sums[slot][i] += record->value[i];
-    for (size_t i = 0; i < 16; i += lanes) {
-      const auto b = hn::Load(d, basis + i);
-      for (size_t c = 0; c < 3; ++c) {
-        float* to = sh[slot][c] + i;
-        hn::Store(hn::MulAdd(hn::Set(d, record->value[part::colour + c]), b, hn::Load(d, to)), d, to);
-      }
-    }
-  }
-  const int64_t coefficients = task.sh.dim(1);
-  for (int64_t s = task.first_surfel; s < task.last_surfel; ++s) {
-    const auto slot = static_cast<size_t>(s - task.first_surfel);
-    for (size_t i = 0; i < part::count; ++i) task.sums[s].value[i] += sums[slot][i];
-    float* row = task.sh.row(s);
-    for (int64_t k = 0; k < coefficients; ++k) {
-      for (int64_t c = 0; c < 3; ++c) row[3 * k + c] += sh[slot][c][k];
-    }
+      return add_rows_degree<3>(task);
   }
 }
 
@@ -221,46 +219,44 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace traceflow::trace {
 
-HWY_EXPORT(backward_rays);
-HWY_EXPORT(backward_bucket);
+HWY_EXPORT(backward_group);
+HWY_EXPORT(add_rows);
 
 namespace {
 
-// Room for one chunk.
-struct ChunkRoom {
-  Tensor<float> bases;
-  std::vector<Record> records;
-};
+// The groups that are held at a time. At least one.
+std::span<const Group> next_chunk(const std::vector<Group>& groups, size_t first, size_t row,
+                                  size_t& floats) {
+  size_t last = first;
+  floats = 0;
+  do {
+    floats += row * groups[last++].surfels.size();
+  } while (last < groups.size() && floats + row * groups[last].surfels.size() <= floats_per_chunk);
+  return std::span(groups).subspan(first, last - first);
+}
 
-void chunk_backward(const BackwardInput& input, const Saved& saved, Chunk& chunk, ChunkRoom& room,
-                    std::vector<Record>& sums, InputGradient& gradient) {
-  const auto first_ray = static_cast<int64_t>(chunk.first_block) * rays_per_block;
-  const auto blocks = static_cast<int64_t>(chunk.last_block - chunk.first_block);
-  const auto buckets = static_cast<int64_t>(chunk.bucket_begin.size()) - 1;
-  if (chunk.bucket_begin.back() == 0) return;
-  room.bases.resize({blocks * rays_per_block, 16});
-  if (room.records.size() < chunk.bucket_begin.back()) room.records.resize(chunk.bucket_begin.back());
+void chunk_backward(const BackwardInput& input, std::span<const Group> groups, Tensor<float>& rows,
+                    std::vector<SurfelSums>& sums, InputGradient& gradient) {
+  constexpr int64_t surfels_per_task = 256;
+  const size_t row = row_floats(input.surfels.sh.dim(1));
+  std::vector<float*> group_rows;
+  float* next = rows.data();
+  for (const Group& group : groups) {
+    group_rows.push_back(next);
+    next += row * group.surfels.size();
+  }
   parallel_for(
-      "trace backward rays", blocks,
-      [&](int64_t b) {
-        const auto k = static_cast<size_t>(b);
-        HWY_DYNAMIC_DISPATCH(backward_rays)
-        ({input, saved.blocks[chunk.first_block + k], first_ray + b * rays_per_block, first_ray,
-          chunk.block_offsets[k], room.records.data(), room.bases.data(), gradient});
+      "trace backward rays", static_cast<int64_t>(groups.size()),
+      [&](int64_t i) {
+        const auto k = static_cast<size_t>(i);
+        HWY_DYNAMIC_DISPATCH(backward_group)({input, groups[k], group_rows[k], gradient});
       },
       1);
-  parallel_for(
-      "trace backward surfels", buckets,
-      [&](int64_t b) {
-        const auto k = static_cast<size_t>(b);
-        if (chunk.bucket_begin[k] == chunk.bucket_begin[k + 1]) return;
-        const int64_t first = b * surfels_per_bucket;
-        HWY_DYNAMIC_DISPATCH(backward_bucket)
-        ({room.records.data() + chunk.bucket_begin[k], room.records.data() + chunk.bucket_begin[k + 1],
-          room.bases.data(), first, std::min(first + surfels_per_bucket, input.surfels.count()), sums.data(),
-          gradient.surfels.sh});
-      },
-      1);
+  parallel_blocks("trace backward surfels", input.surfels.count(), surfels_per_task,
+                  [&](int64_t begin, int64_t end) {
+                    HWY_DYNAMIC_DISPATCH(add_rows)
+                    ({groups, rows.data(), begin, end, sums, gradient.surfels.sh});
+                  });
 }
 
 }  // namespace
@@ -275,13 +271,16 @@ void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const T
   gradient.directions.reset({rays, 3});
   gradient.position_gradient.reset({surfels.count()});
   const std::vector<BackwardFrame> frames = make_backward_frames(surfels);
-  std::vector<Record> sums(frames.size(), Record{});
-  const BackwardInput input{surfels, origins, directions, options, grad_output, frames, saved.order};
-  Chunk chunk;
-  ChunkRoom room;
-  for (size_t block = 0; block < saved.blocks.size(); block = chunk.last_block) {
-    plan_chunk(saved, surfels.count(), block, chunk);
-    chunk_backward(input, saved, chunk, room, sums, gradient);
+  std::vector<SurfelSums> sums(frames.size(), SurfelSums{});
+  const BackwardInput input{surfels, origins, directions, options, grad_output, frames, saved};
+  const std::vector<Group> groups = make_groups(saved, surfels.count());
+  Tensor<float> rows;
+  for (size_t first = 0; first < groups.size();) {
+    size_t floats = 0;
+    const std::span<const Group> chunk = next_chunk(groups, first, row_floats(surfels.sh.dim(1)), floats);
+    if (rows.size() < static_cast<int64_t>(floats)) rows.resize({static_cast<int64_t>(floats)});
+    chunk_backward(input, chunk, rows, sums, gradient);
+    first += chunk.size();
   }
   finish_surfels(surfels, frames, sums, gradient);
 }

@@ -34,7 +34,19 @@ struct ShBasis {
     for (size_t k = 0; k < ShShape<degree>::coefficients; ++k) sum += value[k] * load3<float>(row + 3 * k);
     return sum;
   }
+  // Adds gradient ⊗ basis: dL/dsh.
+  void pull(const Rgb& gradient, float* sums) const {
+    for (size_t k = 0; k < ShShape<degree>::coefficients; ++k) {
+      for (int c = 0; c < 3; ++c) sums[3 * k + static_cast<size_t>(c)] += gradient[c] * value[k];
+    }
+  }
 };
+
+// Adds such sums to a row of the tensor.
+template <int degree>
+void sh_add_sums(const float* sums, float* row) {
+  for (size_t i = 0; i < 3 * ShShape<degree>::coefficients; ++i) row[i] += sums[i];
+}
 
 inline Rgb rgb_black() { return Rgb(0); }
 inline Rgb rgb_clamp(const Rgb& colour) { return glm::max(colour, Rgb(0)); }
@@ -142,7 +154,25 @@ struct ShBasis {
     }
     return hn::Add(sh_fold(sum), hn::Set(ShTag(), 0.5F));
   }
+  // Adds gradient ⊗ basis, dL/dsh, in vectors as `value` has them.
+  HWY_INLINE void pull(Rgb gradient, float* HWY_RESTRICT sums) const {
+    const ShTag d;
+    const ShVec repeated = sh_repeat(gradient);
+    for (size_t j = 0; j < ShShape<degree>::vectors; ++j) {
+      float* to = sums + j * sh_lanes;
+      hn::StoreU(hn::MulAdd(repeated, value[j], hn::LoadU(d, to)), d, to);
+    }
+  }
 };
+
+// Adds such sums to a row of the tensor.
+template <int degree>
+HWY_INLINE void sh_add_sums(const float* HWY_RESTRICT sums, float* HWY_RESTRICT row) {
+  for (size_t j = 0; j < ShShape<degree>::vectors; ++j) {
+    for (size_t i = 0; i < ShShape<degree>::lanes(j); ++i)
+      row[3 * j * sh_per_vector + i] += sums[j * sh_lanes + i];
+  }
+}
 
 HWY_INLINE Rgb rgb_black() { return hn::Zero(ShTag()); }
 HWY_INLINE Rgb rgb_clamp(Rgb colour) { return hn::Max(colour, hn::Zero(ShTag())); }
