@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "math/spherical_harmonics.h"
+#include "ops/lpips/lpips.h"
 
 namespace traceflow {
 
@@ -33,12 +34,14 @@ int64_t bytes_per_surfel(int degree, bool field, const NetworkOptions& network) 
 int64_t forecast_bytes(const TrainOptions& options, int64_t main, int64_t environment, int width,
                        int height) {
   const int64_t pixels = static_cast<int64_t>(width) * height;
+  const int64_t perceptual =
+      options.loss.lpips > 0 ? lpips::network_bytes + pixels * lpips::gradient_bytes_per_pixel : 0;
   const int64_t rays = options.specular == Specular::environment_gaussians ? pixels : 0;
   return main * bytes_per_surfel(options.initial.sh_degree, options.deform.main, options.deform.network) +
          environment * bytes_per_surfel(options.initial.environment_sh_degree, options.deform.environment,
                                         options.deform.environment_network) +
-         4 * planes_of_a_frame * pixels + rays * bytes_per_ray + options.capture.cache_mebibytes * mebibyte +
-         64 * mebibyte;
+         4 * planes_of_a_frame * pixels + perceptual + rays * bytes_per_ray +
+         options.capture.cache_mebibytes * mebibyte + 64 * mebibyte;
 }
 
 int64_t memory_budget_bytes(const TrainOptions& options) {

@@ -1,6 +1,8 @@
 #include "train/objective.h"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "base/parallel.h"
 #include "ops/loss/loss.h"
@@ -20,7 +22,7 @@ double psnr(const Tensor<float>& image, const Tensor<float>& target) {
 }  // namespace
 
 LossTerms evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
-                             bool normal_losses, FrameGradient& gradient) {
+                             bool normal_losses, FrameGradient& gradient, const lpips::Network* perceptual) {
   LossTerms terms;
   gradient.colour.reset(frame.colour.shape());
   gradient.normal.reset(frame.raster.normal.shape());
@@ -49,7 +51,25 @@ LossTerms evaluate_objective(const Frame& frame, const ViewImages& target, const
     terms.distortion = loss::distortion(frame.raster.distortion, options.distortion, gradient.distortion);
     terms.total += options.distortion * terms.distortion;
   }
+  if (perceptual != nullptr) {
+    terms.lpips = lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined,
+                                  options.lpips, gradient.colour);
+    terms.total += options.lpips * terms.lpips;
+  }
   return terms;
+}
+
+std::optional<lpips::Network> perceptual_network(const LossOptions& options, const Capture& capture) {
+  if (options.lpips == 0) return std::nullopt;
+  for (const View& view : capture.train) {
+    if (std::min(view.camera.width, view.camera.height) < lpips::min_side) {
+      throw InputError(
+          capture.folder.string(), view.id,
+          std::to_string(view.camera.width) + "x" + std::to_string(view.camera.height) + " pixels",
+          std::to_string(lpips::min_side) + " pixels a side, which loss.lpips needs");
+    }
+  }
+  return lpips::network_of(lpips::read_weights(options.lpips_weights));
 }
 
 }  // namespace traceflow

@@ -100,6 +100,12 @@ void LossOptions::validate() const {
   check_not_negative(normal, "loss.normal");
   check_not_negative(normal_prior, "loss.normal_prior");
   check_not_negative(distortion, "loss.distortion");
+  check_not_negative(lpips, "loss.lpips");
+  check_not_negative(lpips_from, "loss.lpips_from");
+  if (lpips > 0 && lpips_weights.empty()) {
+    throw InputError("option", "loss.lpips_weights", "nothing", "a file of weights, which loss.lpips needs",
+                     "write one with scripts/export_lpips.py");
+  }
 }
 
 void DensityOptions::validate(const std::string& group) const {

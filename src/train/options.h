@@ -94,6 +94,9 @@ struct LossOptions {
   float normal = 0.05F;
   float normal_prior = 0.05F;
   float distortion = 0;
+  float lpips = 0;
+  int lpips_from = 45000;
+  std::string lpips_weights;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -102,6 +105,10 @@ struct LossOptions {
     v.field("normal_prior", normal_prior, "",
             "Agreement with the capture's normal priors, L_tc-norm (method §7.4).");
     v.field("distortion", distortion, "", "Depth distortion (method §7.4).");
+    v.field("lpips", lpips, "", "Perceptual distance LPIPS, late in training (method §7.4).");
+    v.field("lpips_from", lpips_from, "iteration", "Where that starts.");
+    v.field("lpips_weights", lpips_weights, "",
+            "The network's weights, as scripts/export_lpips.py writes them.");
   }
   void validate() const;
 };

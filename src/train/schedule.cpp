@@ -53,6 +53,10 @@ bool Schedule::uses_normal_losses(int iteration) const {
   return iteration >= mark(options_.schedule.normal_from);
 }
 
+bool Schedule::uses_lpips(int iteration) const {
+  return options_.loss.lpips > 0 && iteration >= mark(options_.loss.lpips_from);
+}
+
 int Schedule::sh_degree(int iteration, int start, int limit) const {
   return std::clamp((iteration - start) / interval(options_.schedule.sh_every), 0, limit);
 }

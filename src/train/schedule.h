@@ -20,12 +20,14 @@ class Schedule {
   bool deforms_main(int iteration) const;
   bool deforms_environment(int iteration) const;
   bool uses_normal_losses(int iteration) const;
+  bool uses_lpips(int iteration) const;
   int sh_degree_main(int iteration) const;
   int sh_degree_environment(int iteration) const;
   // Standard deviation of the noise on the time (method §7.6), in frame intervals.
   double time_jitter(int iteration) const;
-  // Share of the capture's duration, from its start, whose views are trained on: motion is followed from where
-  // the surfels start, a little further at a time, instead of being found across the whole capture at once.
+  // Share of the capture's duration, from its start, whose views are trained on: motion is followed from
+  // where the surfels start, a little further at a time, instead of being found across the whole capture at
+  // once.
   double seen_times(int iteration) const;
 
   bool densifies_main(int iteration) const;

@@ -64,6 +64,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       capture_(std::move(capture)),
       run_{std::move(run)},
       schedule_(options),
+      perceptual_(perceptual_network(options.loss, capture_)),
       random_(seeded(options.seed)),
       scene_(initial_scene(capture_, options, random_)),
       optimiser_(scene_),
@@ -110,7 +111,8 @@ LossTerms Trainer::step() {
 
   const Frame& frame = renderer_.forward(scene_, request, true);
   const LossTerms terms = evaluate_objective(
-      frame, *target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_);
+      frame, *target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_,
+      schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   non_finite_ = {};
   if (std::isfinite(terms.total)) {
     gradient_.reset(scene_);
@@ -165,6 +167,7 @@ events::Step Trainer::step_event(const LossTerms& terms, double seconds) {
                  {"normal", terms.normal},
                  {"normal_prior", terms.normal_prior},
                  {"distortion", terms.distortion}};
+  if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
   event.psnr = health_.smoothed_psnr();
   event.seconds = seconds;
   event.surfels = counts();

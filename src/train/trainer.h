@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <optional>
 
 #include "base/random.h"
 #include "capture/capture.h"
@@ -69,6 +70,7 @@ class Trainer {
   Capture capture_;
   RunFolder run_;
   Schedule schedule_;
+  std::optional<lpips::Network> perceptual_;
   Random random_;
   Scene scene_;
   Optimiser optimiser_;

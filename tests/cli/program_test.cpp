@@ -55,6 +55,7 @@ TEST(Program, ArgumentsThatCannotBeUsedAreOneLineAndCode2) {
                                              {"train"},
                                              {"train", "-o", "x", "--no-such-flag"},
                                              {"train", "-o", "x", "--set", "loss.nromal=1"},
+                                             {"train", "-o", "x", "-d", "y", "--set", "loss.lpips=1"},
                                              {"train", "-d", "/nowhere", "-o", "/tmp/traceflow_no_run"},
                                              {"inspect", "-d", "/nowhere"}}) {
     const Outcome o = run_with(arguments);

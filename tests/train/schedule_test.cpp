@@ -35,6 +35,15 @@ TEST(Schedule, ShorterRunsScaleEveryMarkInProportion) {
   }
 }
 
+TEST(Schedule, ThePerceptualTermIsLateAndOffWithoutAWeight) {
+  TrainOptions options = paper();
+  EXPECT_FALSE(Schedule(options).uses_lpips(59999));
+  options.loss.lpips = 0.1F;
+  options.iterations = 600;
+  EXPECT_FALSE(Schedule(options).uses_lpips(449));
+  EXPECT_TRUE(Schedule(options).uses_lpips(450));
+}
+
 TEST(Schedule, PhaseTwoFreezesTheMainSurfelsButTheirTint) {
   const Trainable t = Schedule(paper()).trainable(10000);
   EXPECT_FALSE(t.main);

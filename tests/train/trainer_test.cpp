@@ -9,6 +9,8 @@
 #include "base/parallel.h"
 #include "capture/synth.h"
 #include "scene/scene_file.h"
+#include "support/narrow_lpips.h"
+#include "support/temp_folder.h"
 
 namespace traceflow {
 namespace {
@@ -18,7 +20,7 @@ namespace fs = std::filesystem;
 // A capture small enough that a run of forty iterations takes a second; made once for all tests.
 const fs::path& capture_folder() {
   static const fs::path folder = [] {
-    fs::path path = fs::path(testing::TempDir()) / ("trainer_capture_" + std::to_string(::getpid()));
+    fs::path path = fs::path(::testing::TempDir()) / ("trainer_capture_" + std::to_string(::getpid()));
     SynthOptions options;
     options.frames = 5;
     options.width = 40;
@@ -63,7 +65,7 @@ TrainOptions small_run(int iterations) {
 }
 
 Trainer make_trainer(const TrainOptions& options, const std::string& name) {
-  const fs::path run = fs::path(testing::TempDir()) / (name + "_" + std::to_string(::getpid()));
+  const fs::path run = fs::path(::testing::TempDir()) / (name + "_" + std::to_string(::getpid()));
   fs::remove_all(run);
   return Trainer(options, load_capture(capture_folder(), options.capture), run);
 }
@@ -72,7 +74,7 @@ Trainer make_trainer(const TrainOptions& options, const std::string& name) {
 std::string scene_bytes(const Scene& scene) {
   Safetensors file;
   put_scene(scene, file);
-  const fs::path path = fs::path(testing::TempDir()) / ("scene_" + std::to_string(::getpid()));
+  const fs::path path = fs::path(::testing::TempDir()) / ("scene_" + std::to_string(::getpid()));
   file.write(path);
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
@@ -139,7 +141,7 @@ TEST(Trainer, AResumedRunEndsInTheBytesOfAnUninterruptedOne) {
   whole.run(never);
 
   // Interrupt once in each phase.
-  const fs::path run = fs::path(testing::TempDir()) / ("resumed_" + std::to_string(::getpid()));
+  const fs::path run = fs::path(::testing::TempDir()) / ("resumed_" + std::to_string(::getpid()));
   fs::remove_all(run);
   const TrainOptions options = small_run(40);
   for (const int pause : {7, 13, 29, 40}) {
@@ -181,7 +183,7 @@ TEST(Trainer, ResumingWithAnotherCaptureIsRefused) {
   trainer.run(never);
   Capture other = load_capture(capture_folder(), options.capture);
   other.train.pop_back();
-  const fs::path run = fs::path(testing::TempDir()) / ("mismatch_" + std::to_string(::getpid()));
+  const fs::path run = fs::path(::testing::TempDir()) / ("mismatch_" + std::to_string(::getpid()));
   Trainer resumed(options, std::move(other), run);
   EXPECT_THROW(resumed.resume(), InputError);
 }
@@ -200,6 +202,26 @@ TEST(Trainer, EveryAblationAndPeerOfTheMethodTrains) {
       EXPECT_EQ(trainer.scene().main_field.has_value(), deform);
     }
   }
+}
+
+TEST(Trainer, ThePerceptualTermIsToldFromWhereItStarts) {
+  const TempFolder folder;
+  testing::lpips_file(testing::narrow_lpips_weights(2)).write(folder / "weights");
+  TrainOptions options = small_run(12);
+  options.loss.lpips = 0.1F;
+  options.loss.lpips_from = 30;  // of 40
+  options.loss.lpips_weights = (folder / "weights").string();
+  Trainer trainer = make_trainer(options, "perceptual");
+  std::vector<int64_t> told;
+  trainer.stream().listen([&](const events::Event& event) {
+    const auto* step = std::get_if<events::Step>(&event);
+    if (step == nullptr) return;
+    for (const events::Term& term : step->terms) {
+      if (term.name == "lpips" && term.value > 0) told.push_back(step->iteration);
+    }
+  });
+  EXPECT_EQ(trainer.run(never).ending, events::Ending::completed);
+  EXPECT_EQ(told, (std::vector<int64_t>{10, 11, 12}));
 }
 
 TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {

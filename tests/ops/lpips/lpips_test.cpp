@@ -7,9 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/random.h"
-#include "files/safetensors.h"
-#include "support/gradients.h"
+#include "support/narrow_lpips.h"
 
 namespace traceflow::lpips {
 namespace {
@@ -19,29 +17,11 @@ using traceflow::testing::all_finite;
 using traceflow::testing::central_differences;
 using traceflow::testing::expect_close;
 using traceflow::testing::expect_same_bytes_at_any_thread_count;
-
-constexpr int widths[stages] = {4, 6, 8, 5, 7};
-constexpr int places[] = {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28};
+using traceflow::testing::lpips_file;
+using traceflow::testing::narrow_lpips_weights;
 
 Tensor<float> random_tensor(const Shape& shape, Random& random, double low, double high) {
   return traceflow::testing::random_tensor<float>(shape, random, low, high);
-}
-
-// A narrow network, random but with activations of a healthy size.
-Weights random_weights(uint64_t seed) {
-  Random random(seed);
-  Weights weights;
-  int64_t inputs = 3;
-  for (int stage = 0; stage < stages; ++stage) {
-    for (int i = 0; i < convolutions_in_stage[stage]; ++i) {
-      const double bound = std::sqrt(6.0 / (9.0 * static_cast<double>(inputs)));
-      weights.convolutions.push_back({random_tensor({widths[stage], inputs, 3, 3}, random, -bound, bound),
-                                      random_tensor({widths[stage]}, random, -0.1, 0.1)});
-      inputs = widths[stage];
-    }
-    weights.linear.push_back(random_tensor({widths[stage]}, random, 0, 1));
-  }
-  return weights;
 }
 
 BasicWeights<double> in_double(const Weights& weights) {
@@ -53,25 +33,10 @@ BasicWeights<double> in_double(const Weights& weights) {
   return result;
 }
 
-Safetensors as_file(const Weights& weights) {
-  Safetensors file;
-  for (size_t i = 0; i < weights.convolutions.size(); ++i) {
-    const std::string name = "features." + std::to_string(places[i]);
-    file.add(name + ".weight", weights.convolutions[i].weight);
-    file.add(name + ".bias", weights.convolutions[i].bias);
-  }
-  for (size_t i = 0; i < weights.linear.size(); ++i) {
-    Tensor<float> linear(Shape{1, weights.linear[i].size(), 1, 1});
-    std::copy(weights.linear[i].data(), weights.linear[i].data() + weights.linear[i].size(), linear.data());
-    file.add("lin" + std::to_string(i) + ".model.1.weight", linear);
-  }
-  return file;
-}
-
 TEST(Lpips, FastPathMatchesTheReference) {
   Random random(3);
   for (const auto& [h, w] : {std::pair<int64_t, int64_t>{16, 16}, {33, 47}, {40, 22}}) {
-    const Weights weights = random_weights(static_cast<uint64_t>(h));
+    const Weights weights = narrow_lpips_weights(static_cast<uint64_t>(h));
     const Tensor<float> a = random_tensor({h, w, 3}, random, 0, 1);
     const Tensor<float> b = random_tensor({h, w, 3}, random, 0, 1);
     for (const Input input : {Input::defined, Input::published}) {
@@ -115,7 +80,7 @@ TEST(Lpips, ReferenceGivesTheClosedFormOfAnIdentityNetwork) {
 
 TEST(Lpips, ADistanceIsZeroBetweenEqualsAndSymmetric) {
   Random random(5);
-  const Weights weights = random_weights(1);
+  const Weights weights = narrow_lpips_weights(1);
   const Tensor<float> a = random_tensor({20, 24, 3}, random, 0, 1);
   const Tensor<float> b = random_tensor({20, 24, 3}, random, 0, 1);
   EXPECT_EQ(distance(network_of(weights), a, a, Input::defined), 0);
@@ -135,7 +100,7 @@ struct Images {
 // The steps are short: a longer one would now and then cross the corner of a gate or of a halving.
 TEST(Lpips, ReferenceGradientAgreesWithCentralDifferences) {
   const Images images(16, 18, 7);
-  const BasicWeights<double> weights = in_double(random_weights(9));
+  const BasicWeights<double> weights = in_double(narrow_lpips_weights(9));
   Tensor<double> a = convert<double>(images.a);
   const Tensor<double> b = convert<double>(images.b);
   for (const Input input : {Input::defined, Input::published}) {
@@ -151,7 +116,7 @@ TEST(Lpips, ReferenceGradientAgreesWithCentralDifferences) {
 TEST(Lpips, FastGradientMatchesTheReference) {
   for (const auto& [h, w] : {std::pair<int64_t, int64_t>{16, 16}, {33, 47}, {40, 22}}) {
     const Images images(h, w, 4);
-    const Weights weights = random_weights(static_cast<uint64_t>(w));
+    const Weights weights = narrow_lpips_weights(static_cast<uint64_t>(w));
     for (const Input input : {Input::defined, Input::published}) {
       Tensor<float> fast(images.a.shape());
       Tensor<double> plain(images.a.shape());
@@ -166,7 +131,7 @@ TEST(Lpips, FastGradientMatchesTheReference) {
 
 TEST(Lpips, AddsToTheGradient) {
   const Images images(20, 17, 11);
-  const Network network = network_of(random_weights(5));
+  const Network network = network_of(narrow_lpips_weights(5));
   Tensor<float> once(images.a.shape());
   distance(network, images.a, images.b, Input::defined, 1, once);
   Tensor<float> twice = once;
@@ -178,13 +143,14 @@ TEST(Lpips, AddsToTheGradient) {
 TEST(Lpips, TheGradientOfEqualImagesIsZero) {
   const Images images(16, 16, 12);
   Tensor<float> gradient(images.a.shape());
-  EXPECT_EQ(distance(network_of(random_weights(5)), images.a, images.a, Input::defined, 1, gradient), 0);
+  EXPECT_EQ(distance(network_of(narrow_lpips_weights(5)), images.a, images.a, Input::defined, 1, gradient),
+            0);
   for (const float v : gradient.values()) EXPECT_EQ(v, 0);
 }
 
 TEST(Lpips, SameBytesAtAnyThreadCount) {
   const Images images(50, 61, 6);
-  const Network network = network_of(random_weights(2));
+  const Network network = network_of(narrow_lpips_weights(2));
   expect_same_bytes_at_any_thread_count([&] {
     Tensor<double> value(Shape{1});
     Tensor<float> gradient(images.a.shape());
@@ -194,7 +160,7 @@ TEST(Lpips, SameBytesAtAnyThreadCount) {
 }
 
 TEST(Lpips, HostilePixelsShowInTheValueAndGetNoGradient) {
-  const Network network = network_of(random_weights(3));
+  const Network network = network_of(narrow_lpips_weights(3));
   for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
                           -std::numeric_limits<float>::infinity()}) {
     for (const bool in_target : {false, true}) {
@@ -218,7 +184,7 @@ TEST(Lpips, HostilePixelsShowInTheValueAndGetNoGradient) {
 // A network that is dead from its first layer on has features of no length, and so no direction to compare.
 TEST(Lpips, FeaturesOfNoLengthAreEqualAndHaveNoGradient) {
   const Images images(16, 16, 2);
-  Weights weights = random_weights(3);
+  Weights weights = narrow_lpips_weights(3);
   for (auto& convolution : weights.convolutions) {
     convolution.weight.zero();
     convolution.bias.zero();
@@ -229,7 +195,7 @@ TEST(Lpips, FeaturesOfNoLengthAreEqualAndHaveNoGradient) {
 }
 
 TEST(Lpips, ImagesThatDoNotFitAreRefused) {
-  const Network network = network_of(random_weights(3));
+  const Network network = network_of(narrow_lpips_weights(3));
   const Tensor<float> image({16, 16, 3}), other({16, 17, 3}), narrow({16, 15, 3}), grey({16, 16});
   Tensor<float> gradient({16, 17, 3});
   EXPECT_THROW(distance(network, image, other, Input::defined), InternalError);
@@ -256,8 +222,8 @@ class LpipsWeights : public ::testing::Test {
 
 TEST_F(LpipsWeights, AreReadUnderTheExportersNames) {
   Random random(8);
-  const Weights weights = random_weights(4);
-  as_file(weights).write(file_);
+  const Weights weights = narrow_lpips_weights(4);
+  lpips_file(weights).write(file_);
   const Weights back = read_weights(file_);
   const Tensor<float> a = random_tensor({16, 18, 3}, random, 0, 1);
   const Tensor<float> b = random_tensor({16, 18, 3}, random, 0, 1);
@@ -266,29 +232,29 @@ TEST_F(LpipsWeights, AreReadUnderTheExportersNames) {
 }
 
 TEST_F(LpipsWeights, OfAnotherShapeAreRefused) {
-  Weights weights = random_weights(4);
+  Weights weights = narrow_lpips_weights(4);
   weights.convolutions[3].weight = Tensor<float>(Shape{6, 5, 3, 3});
-  as_file(weights).write(file_);
+  lpips_file(weights).write(file_);
   EXPECT_THAT(refusal(), HasSubstr("features.7.weight"));
 
-  weights = random_weights(4);
+  weights = narrow_lpips_weights(4);
   weights.linear[2] = Tensor<float>(Shape{9});
-  as_file(weights).write(file_);
+  lpips_file(weights).write(file_);
   EXPECT_THAT(refusal(), HasSubstr("lin2.model.1.weight"));
 
-  weights = random_weights(4);
+  weights = narrow_lpips_weights(4);
   weights.convolutions[0].bias = Tensor<float>(Shape{3});
-  as_file(weights).write(file_);
+  lpips_file(weights).write(file_);
   EXPECT_THAT(refusal(), HasSubstr("features.0.bias"));
 
-  weights = random_weights(4);
+  weights = narrow_lpips_weights(4);
   weights.convolutions[12].weight[5] = std::numeric_limits<float>::quiet_NaN();
-  as_file(weights).write(file_);
+  lpips_file(weights).write(file_);
   EXPECT_THAT(refusal(), HasSubstr("features.28.weight"));
 
-  weights = random_weights(4);
+  weights = narrow_lpips_weights(4);
   weights.linear.pop_back();
-  as_file(weights).write(file_);
+  lpips_file(weights).write(file_);
   EXPECT_THAT(refusal(), HasSubstr("lin4.model.1.weight"));
 }
 

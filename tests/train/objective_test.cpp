@@ -1,0 +1,110 @@
+#include "train/objective.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+
+#include "support/gradients.h"
+#include "support/narrow_lpips.h"
+#include "support/temp_folder.h"
+
+namespace traceflow {
+namespace {
+
+using testing::narrow_lpips_weights;
+using testing::random_tensor;
+
+struct Fixture {
+  Fixture() {
+    Random random(1);
+    const Shape shape{20, 24, 3};
+    frame.colour = random_tensor<float>(shape, random, 0, 1);
+    frame.raster.normal = random_tensor<float>(shape, random, -1, 1);
+    frame.pseudo_normal = random_tensor<float>(shape, random, -1, 1);
+    frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1);
+    target.colour = random_tensor<float>(shape, random, 0, 1);
+    target.normal_prior = random_tensor<float>(shape, random, -1, 1);
+    options.distortion = 3;
+    options.lpips = 0.7F;
+  }
+  Frame frame;
+  ViewImages target;
+  LossOptions options;
+  lpips::Network network = lpips::network_of(narrow_lpips_weights(2));
+};
+
+TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
+  const Fixture f;
+  FrameGradient gradient;
+  const LossTerms t = evaluate_objective(f.frame, f.target, f.options, true, gradient, &f.network);
+  for (const double term : {t.l1, t.ssim, t.normal, t.normal_prior, t.distortion, t.lpips})
+    EXPECT_NE(term, 0);
+  const LossOptions& o = f.options;
+  EXPECT_NEAR(t.total,
+              (1 - o.ssim) * t.l1 + o.ssim * t.ssim + o.normal * t.normal + o.normal_prior * t.normal_prior +
+                  o.distortion * t.distortion + o.lpips * t.lpips,
+              1e-12);
+}
+
+TEST(Objective, WithoutItsNetworkTheImageHasNoPerceptualTerm) {
+  const Fixture f;
+  FrameGradient with, without;
+  const LossTerms a = evaluate_objective(f.frame, f.target, f.options, true, with, &f.network);
+  const LossTerms b = evaluate_objective(f.frame, f.target, f.options, true, without);
+  EXPECT_EQ(b.lpips, 0);
+  EXPECT_NEAR(a.total - b.total, f.options.lpips * a.lpips, 1e-12);
+  // What the network adds to the gradient is the weighted gradient of its distance.
+  Tensor<float> expected = without.colour;
+  lpips::distance(f.network, f.frame.colour, f.target.colour, lpips::Input::defined, f.options.lpips,
+                  expected);
+  EXPECT_NE(std::memcmp(with.colour.data(), without.colour.data(), with.colour.values().size_bytes()), 0);
+  EXPECT_EQ(std::memcmp(with.colour.data(), expected.data(), with.colour.values().size_bytes()), 0);
+}
+
+std::string refusal(const LossOptions& options, const Capture& capture) {
+  try {
+    perceptual_network(options, capture);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(PerceptualNetwork, IsReadWhereItHasAWeightAndRefusedByName) {
+  const TempFolder folder;
+  testing::lpips_file(narrow_lpips_weights(2)).write(folder / "weights.safetensors");
+  std::ofstream(folder / "text.safetensors") << "not a file of weights";
+  Capture capture;
+  capture.train.resize(1);
+  capture.train[0].camera.width = 16;
+  capture.train[0].camera.height = 40;
+
+  LossOptions options;
+  EXPECT_FALSE(perceptual_network(options, capture).has_value());
+  options.lpips = 0.1F;
+  options.lpips_weights = (folder / "weights.safetensors").string();
+  EXPECT_TRUE(perceptual_network(options, capture).has_value());
+  for (const char* name : {"text.safetensors", "nothing.safetensors"}) {
+    options.lpips_weights = (folder / name).string();
+    EXPECT_THAT(refusal(options, capture), ::testing::HasSubstr(name));
+  }
+  options.lpips_weights = (folder / "weights.safetensors").string();
+  capture.train[0].camera.width = 15;
+  EXPECT_THAT(refusal(options, capture), ::testing::HasSubstr("15x40"));
+}
+
+TEST(PerceptualNetwork, AWeightWithoutAFileIsRefused) {
+  LossOptions options;
+  options.lpips = 0.1F;
+  try {
+    options.validate();
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("loss.lpips_weights"));
+  }
+}
+
+}  // namespace
+}  // namespace traceflow
