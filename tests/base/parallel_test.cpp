@@ -4,7 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <atomic>
-#include <cstring>
+#include <bit>
 #include <numeric>
 #include <set>
 #include <stdexcept>
@@ -84,7 +84,7 @@ TEST(Parallel, OrderedSumHasTheSameBytesAtAnyThreadCount) {
     set_threads(threads);
     for (int repeat = 0; repeat < 5; ++repeat) {
       const float found = sum();
-      EXPECT_EQ(std::memcmp(&found, &expected, sizeof(float)), 0) << threads << " threads";
+      EXPECT_EQ(std::bit_cast<uint32_t>(found), std::bit_cast<uint32_t>(expected)) << threads << " threads";
     }
   }
 }

@@ -86,8 +86,10 @@ TEST(Tensor, EmptyTensorsHaveNoRows) {
   EXPECT_EQ(zero_rows.row_size(), 0);
   EXPECT_EQ(zero_rows.dim(1), 3);
   EXPECT_TRUE(none.values().empty());
-  const Tensor<float> copy = none;
+  Tensor<float> copy = none;
   EXPECT_TRUE(copy.empty());
+  copy.reset({2, 3});
+  EXPECT_TRUE(none.empty());
 }
 
 TEST(Tensor, ConvertKeepsShapeAndValues) {

@@ -15,11 +15,11 @@ namespace traceflow {
 
 // A small capture folder in a family's exact layout, its JSON open to change before save().
 struct FakeCapture {
-  using json = nlohmann::json;
+  using Json = nlohmann::json;
 
   TempFolder folder;
-  json dataset, metadata, scene;
-  std::map<std::string, json> cameras;
+  Json dataset, metadata, scene;
+  std::map<std::string, Json> cameras;
   int width = 12, height = 8;
 
   std::filesystem::path path() const { return folder.path(); }
@@ -29,7 +29,7 @@ struct FakeCapture {
     return static_cast<uint8_t>((37 * view + 13 * y + 7 * x + 71 * channel + x * y) % 256);
   }
 
-  static json camera(int width, int height) {
+  static Json camera(int width, int height) {
     return {{"orientation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},
             {"position", {0, 0, 0}},
             {"focal_length", 10.0},
@@ -109,7 +109,7 @@ struct InterpCapture : FakeCapture {
                {"num_exemplars", frames},
                {"ids", ids},
                {"train_ids", ids},
-               {"val_ids", json::array()}};
+               {"val_ids", Json::array()}};
   }
 };
 

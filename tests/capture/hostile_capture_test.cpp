@@ -10,7 +10,7 @@
 namespace traceflow {
 namespace {
 
-using json = nlohmann::json;
+using Json = nlohmann::json;
 
 // Loading must fail with an InputError that names the file and the field.
 void expect_refused(const std::filesystem::path& folder, const std::string& file, const std::string& field) {
@@ -60,11 +60,11 @@ TEST(HostileCapture, every_prefix_of_a_camera_is_refused) {
 }
 
 TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
-  const std::vector<std::pair<std::string, std::vector<json>>> bad = {
+  const std::vector<std::pair<std::string, std::vector<Json>>> bad = {
       {"orientation",
        {nullptr,
         3,
-        json::array(),
+        Json::array(),
         {{1, 0}, {0, 1}},
         {{2, 0, 0}, {0, 1, 0}, {0, 0, 1}},
         {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}},
@@ -72,7 +72,7 @@ TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
         {{1, 0, 0}, {0, 1, 0}, {0, 0, "1"}},
         {{1, 0, 0}, {0, 1, 0}, {0, 0, 1e308}}}},
       {"position", {nullptr, "here", {1, 2}, {1, 2, nullptr}, {1, 2, 3, 4}}},
-      {"focal_length", {nullptr, 0, -5, "10", json::array({10})}},
+      {"focal_length", {nullptr, 0, -5, "10", Json::array({10})}},
       {"principal_point", {nullptr, 6, {6}, {"6", "4"}}},
       {"image_size", {nullptr, 12, {0, 8}, {-12, 8}, {12}}},
       {"pixel_aspect_ratio", {0, -1, "1"}},
@@ -81,7 +81,7 @@ TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
       {"tangential_distortion", {0.1, {0.1, 0.1, 0.1}}},
       {"tangential", {0.1, {0.1}}}};
   for (const auto& [field, values] : bad) {
-    for (const json& value : values) {
+    for (const Json& value : values) {
       NerfDsCapture fake(1);
       fake.cameras["000000_left"][field] = value;
       fake.save();
@@ -92,13 +92,13 @@ TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
 }
 
 TEST(HostileCapture, scene_fields) {
-  const std::vector<std::pair<std::string, std::vector<json>>> bad = {
+  const std::vector<std::pair<std::string, std::vector<Json>>> bad = {
       {"center", {nullptr, 1, {1, 2}, {1, 2, "3"}}},
       {"scale", {nullptr, 0, -1, "1"}},
       {"near", {"0.1"}},
       {"far", {0.05, "2"}}};
   for (const auto& [field, values] : bad) {
-    for (const json& value : values) {
+    for (const Json& value : values) {
       NerfDsCapture fake(1);
       fake.scene[field] = value;
       fake.save();
@@ -108,7 +108,7 @@ TEST(HostileCapture, scene_fields) {
 }
 
 TEST(HostileCapture, dataset_and_metadata_fields) {
-  const std::vector<std::pair<std::string, json>> bad = {
+  const std::vector<std::pair<std::string, Json>> bad = {
       {"train_ids", "all"},     {"train_ids", {1.5}},
       {"train_ids", {nullptr}}, {"train_ids", {"../../etc/passwd"}},
       {"train_ids", {""}},      {"train_ids", {".."}},
@@ -119,14 +119,14 @@ TEST(HostileCapture, dataset_and_metadata_fields) {
     fake.save();
     expect_refused(fake.path(), "dataset.json", field);
   }
-  for (const json& time : {json("zero"), json(-1), json(nullptr), json::array({0})}) {
+  for (const Json& time : {Json("zero"), Json(-1), Json(nullptr), Json::array({0})}) {
     NerfDsCapture fake(1);
     fake.metadata["000000_left"] = {{"time_id", time}};
     fake.save();
     expect_refused(fake.path(), "metadata.json", "000000_left");
   }
   NerfDsCapture fake(1);
-  fake.dataset = json::object();
+  fake.dataset = Json::object();
   fake.save();
   expect_refused(fake.path(), "dataset.json", "train_ids");
 }

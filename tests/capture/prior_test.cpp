@@ -28,7 +28,7 @@ std::string bytes_of(const std::filesystem::path& path) {
 // own axes are OpenGL's: (x, y, z) → camera (x, −y, −z) → world.
 Vec3<float> expected_world(const Vec3<float>& prior) { return {-prior.z, -prior.y, -prior.x}; }
 
-FakeCapture::json turned() { return {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}}; }
+FakeCapture::Json turned() { return {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}}; }
 
 Vec3<float> direction(int64_t i) {
   return normalize(Vec3<float>(static_cast<float>(i % 5) - 2, static_cast<float>(i % 7) - 3, 3.5F));

@@ -242,13 +242,14 @@ TEST(SynthPrior, ErrorsAreThoseOfAnEstimatorAndGrowWithTheNoise) {
   for (const float noise : {0.5F, 1.0F, 2.0F}) {
     options.prior_noise = noise;
     const Tensor<float> prior = synth_normal_prior(options, view, images.normal);
+    const int64_t pixels = prior.size() / 3;
     double sum = 0;
-    for (int64_t i = 0; i < prior.size(); i += 3) {
-      const Vector n = load3<double>(prior.data() + i);
+    for (int64_t i = 0; i < pixels; ++i) {
+      const Vector n = load3<double>(prior.data() + 3 * i);
       ASSERT_NEAR(length(n), 1, 1e-5);
-      sum += angle_between(n, load3<double>(exact.data() + i));
+      sum += angle_between(n, load3<double>(exact.data() + 3 * i));
     }
-    const double error = sum / static_cast<double>(prior.size() / 3);
+    const double error = sum / static_cast<double>(pixels);
     EXPECT_GT(error, before);
     if (noise == 1.0F) {
       EXPECT_GT(error, 2);

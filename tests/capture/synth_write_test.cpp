@@ -14,7 +14,7 @@ namespace traceflow {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
+using Json = nlohmann::json;
 
 SynthOptions tiny_options() {
   SynthOptions options;
@@ -33,7 +33,7 @@ std::string bytes_of(const fs::path& path) {
   return text.str();
 }
 
-json json_of(const fs::path& path) { return json::parse(bytes_of(path)); }
+Json json_of(const fs::path& path) { return Json::parse(bytes_of(path)); }
 
 std::vector<std::string> files_below(const fs::path& folder) {
   std::vector<std::string> names;
@@ -49,19 +49,19 @@ TEST(SynthWrite, LayoutIsComplete) {
   const fs::path out = temp / "capture";
   write_synthetic_capture(tiny_options(), out);
 
-  const json dataset = json_of(out / "dataset.json");
+  const Json dataset = json_of(out / "dataset.json");
   EXPECT_EQ(dataset["count"], 7);
   EXPECT_EQ(dataset["train_ids"].size(), 6);
-  EXPECT_EQ(dataset["val_ids"], json::array({"000002_right"}));
-  const json metadata = json_of(out / "metadata.json");
-  for (const json& id : dataset["ids"]) {
+  EXPECT_EQ(dataset["val_ids"], Json::array({"000002_right"}));
+  const Json metadata = json_of(out / "metadata.json");
+  for (const Json& id : dataset["ids"]) {
     const auto name = id.get<std::string>();
     EXPECT_EQ(metadata[name]["time_id"], std::stoi(name));
     EXPECT_EQ(read_png(out / "rgb/1x" / (name + ".png")).shape(), Shape({18, 32, 3}));
     EXPECT_EQ(read_png(out / "mask/1x" / (name + ".png.png")).size(), 18 * 32);
     EXPECT_TRUE(fs::exists(out / "camera" / (name + ".json")));
   }
-  for (const json& id : dataset["train_ids"]) {
+  for (const Json& id : dataset["train_ids"]) {
     EXPECT_EQ(read_png(out / "normal/1x" / (id.get<std::string>() + ".png")).shape(), Shape({18, 32, 3}));
   }
   for (const char* part : {"normal", "diffuse", "specular"}) {
@@ -69,7 +69,7 @@ TEST(SynthWrite, LayoutIsComplete) {
   }
   EXPECT_EQ(read_npy(out / "truth/depth/000002_right.npy").shape(), Shape({18, 32}));
   EXPECT_EQ(read_npy(out / "points.npy").shape(), Shape({50, 3}));
-  const json scene = json_of(out / "scene.json");
+  const Json scene = json_of(out / "scene.json");
   EXPECT_EQ(scene["scale"], synth_normalisation().scale);
   EXPECT_LT(scene["near"], scene["far"]);
 }
@@ -94,14 +94,14 @@ TEST(SynthWrite, CameraFileHoldsTheCamera) {
   const TempFolder temp;
   write_synthetic_capture(tiny_options(), temp / "capture");
   const SynthView view = synth_views(tiny_options())[4];
-  const json camera = json_of(temp / "capture/camera" / (view.id + ".json"));
+  const Json camera = json_of(temp / "capture/camera" / (view.id + ".json"));
   for (int row = 0; row < 3; ++row) {
     EXPECT_EQ(camera["position"][row], view.camera.position[row]);
     for (int column = 0; column < 3; ++column) {
       EXPECT_EQ(camera["orientation"][row][column], view.camera.camera_from_world[column][row]);
     }
   }
-  EXPECT_EQ(camera["image_size"], json::array({32, 18}));
+  EXPECT_EQ(camera["image_size"], Json::array({32, 18}));
 }
 
 TEST(SynthWrite, ReaderFindsWhatWasWritten) {

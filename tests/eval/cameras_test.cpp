@@ -157,6 +157,7 @@ TEST(Orbit, KeepsToTheAngleTheCamerasSpan) {
 
 TEST(Orbit, GoesRoundWhereTheCamerasDo) {
   std::vector<Camera<float>> cameras;
+  cameras.reserve(12);
   for (int i = 0; i < 12; ++i) cameras.push_back(looking_at_origin(2 * std::numbers::pi * i / 12, 3, 1));
   Vec3<float> sum(0);
   for (const Shot& shot : orbit_around_cameras(cameras, 36)) {

@@ -51,6 +51,7 @@ void write_raw(const std::filesystem::path& path, int width, int height, int dep
     png_set_tRNS(png, info, transparency.data(), static_cast<int>(transparency.size()), nullptr);
   }
   std::vector<png_bytep> pointers;
+  pointers.reserve(rows.size());
   for (const auto& row : rows) pointers.push_back(const_cast<png_bytep>(row.data()));
   png_set_rows(png, info, pointers.data());
   png_write_png(png, info, PNG_TRANSFORM_IDENTITY, nullptr);

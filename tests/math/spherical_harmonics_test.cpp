@@ -71,11 +71,11 @@ TEST(SphericalHarmonics, ObeyTheAdditionTheorem) {
     const auto at_x = basis_at(x), at_y = basis_at(y);
     const double c = dot(x, y);
     const std::array<double, 4> legendre{1, c, (3 * c * c - 1) / 2, (5 * c * c * c - 3 * c) / 2};
-    for (int l = 0; l <= degree_max; ++l) {
+    for (size_t l = 0; l <= static_cast<size_t>(degree_max); ++l) {
       double sum = 0;
-      for (size_t k = static_cast<size_t>(l * l); k < static_cast<size_t>((l + 1) * (l + 1)); ++k)
-        sum += at_x[k] * at_y[k];
-      EXPECT_NEAR(sum, (2 * l + 1) / (4 * std::numbers::pi) * legendre[static_cast<size_t>(l)], 1e-12);
+      for (size_t k = l * l; k < (l + 1) * (l + 1); ++k) sum += at_x[k] * at_y[k];
+      const auto orders = static_cast<double>(2 * l + 1);
+      EXPECT_NEAR(sum, orders / (4 * std::numbers::pi) * legendre[l], 1e-12);
     }
   }
 }

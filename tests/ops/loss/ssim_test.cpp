@@ -25,7 +25,8 @@ Pair<double> picture(int64_t height, int64_t width) {
   Random random(2);
   Pair<double> p{Tensor<double>({height, width, 3}), Tensor<double>({height, width, 3})};
   for (int64_t i = 0; i < p.image.size(); ++i) {
-    const auto x = static_cast<double>(i / 3 % width), y = static_cast<double>(i / 3 / width);
+    const int64_t column = i / 3 % width, row = i / 3 / width;
+    const auto x = static_cast<double>(column), y = static_cast<double>(row);
     p.target[i] = 0.5 + 0.4 * std::sin(x / 20) * std::cos(y / 15) + random.uniform(-0.002, 0.002);
     p.image[i] = p.target[i] + 0.05 * std::sin(x / 3) + random.uniform(-0.002, 0.002);
   }
