@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 
 std::filesystem::path toml_file(const std::string& text) {
   static const TempFolder folder;
-  const auto path = folder / "options.toml";
+  auto path = folder / "options.toml";
   std::ofstream(path) << text;
   return path;
 }

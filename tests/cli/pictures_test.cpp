@@ -48,6 +48,7 @@ class Pictures : public testing::Test {
   int run_verb(std::vector<std::string> words) {
     words.insert(words.begin(), "traceflow");
     std::vector<const char*> arguments;
+    arguments.reserve(words.size());
     for (const std::string& word : words) arguments.push_back(word.c_str());
     testing::internal::CaptureStderr();
     testing::internal::CaptureStdout();

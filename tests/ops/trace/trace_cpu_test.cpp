@@ -244,9 +244,10 @@ TEST(Trace, RaysTogetherAndAloneAgree) {
   scene.origins = Tensor<float>({side * side, 3});
   scene.directions = Tensor<float>({side * side, 3});
   for (int64_t r = 0; r < side * side; ++r) {
+    const int64_t column = r % side - side / 2, row = r / side - side / 2;
     store3(scene.origins.row(r), Vec3<float>(0, 0, -3));
-    store3(scene.directions.row(r), Vec3<float>(0.01F * static_cast<float>(r % side - side / 2),
-                                                0.01F * static_cast<float>(r / side - side / 2), 1));
+    store3(scene.directions.row(r),
+           Vec3<float>(0.01F * static_cast<float>(column), 0.01F * static_cast<float>(row), 1));
   }
   const Traced together = trace(scene, {});
   EXPECT_GT(together.hits, 10 * side * side);
