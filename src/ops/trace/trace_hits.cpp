@@ -20,15 +20,6 @@ uint32_t name(const Hits& hits, size_t i, const uint32_t* names) {
   return names ? names[hits.surfel[i]] : hits.surfel[i];
 }
 
-void order_ties(Hits& hits, size_t begin, size_t end, const uint32_t* names) {
-  for (size_t i = begin + 1; i < end; ++i) {
-    for (size_t j = i; j > begin && name(hits, j, names) < name(hits, j - 1, names); --j) {
-      std::swap(hits.surfel[j], hits.surfel[j - 1]);
-      std::swap(hits.alpha[j], hits.alpha[j - 1]);
-    }
-  }
-}
-
 }  // namespace
 
 void Hits::grow(size_t wanted) {
@@ -53,23 +44,24 @@ void swap(Hits& a, Hits& b) noexcept {
   std::swap(a.capacity_, b.capacity_);
 }
 
-void HitSorter::place(const uint32_t* rank, Hits& hits, const uint32_t* names) {
+// Ranks add up to what 0, 1, 2, … do where they all differ, else to less.
+bool HitSorter::place(const uint32_t* rank, Hits& hits) {
+  const size_t n = hits.count;
   sorted_.count = 0;
-  sorted_.reserve_more(hits.count);
-  for (size_t i = 0; i < hits.count; ++i) {
-    const uint32_t to = rank[i];
+  sorted_.reserve_more(n);
+  size_t sum = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const size_t to = rank[i];
+    sum += to;
     sorted_.distance[to] = hits.distance[i];
     sorted_.alpha[to] = hits.alpha[i];
     sorted_.surfel[to] = hits.surfel[i];
   }
-  sorted_.count = hits.count;
-  swap(sorted_, hits);
-  for (size_t begin = 0; begin + 1 < hits.count;) {
-    size_t end = begin + 1;
-    while (end < hits.count && hits.distance[end] == hits.distance[begin]) ++end;
-    if (end - begin > 1) order_ties(hits, begin, end, names);
-    begin = end;
-  }
+  if (2 * sum + n != n * n) return false;
+  std::copy_n(sorted_.distance, n, hits.distance);
+  std::copy_n(sorted_.alpha, n, hits.alpha);
+  std::copy_n(sorted_.surfel, n, hits.surfel);
+  return true;
 }
 
 // Distances are not negative, so their bits order as they do.

@@ -39,8 +39,10 @@ class HitSorter {
   // Up to so many hits each is placed by counting the ones before it.
   static constexpr size_t most_ranked = 192;
 
+  // Puts each hit at its rank, which is the number of nearer ones. False, and nothing is done, where two hits
+  // have one distance and so one rank.
+  bool place(const uint32_t* rank, Hits& hits);
   // `names`: the surfel of what each hit names, null where hits name surfels.
-  void place(const uint32_t* rank, Hits& hits, const uint32_t* names);
   void sort_many(Hits& hits, const uint32_t* names);
 
  private:

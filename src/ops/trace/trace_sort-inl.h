@@ -16,33 +16,44 @@ HWY_BEFORE_NAMESPACE();
 namespace traceflow::trace::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Where each hit belongs when sorted by distance, those of equal distance in the order in which they came.
-HWY_INLINE void rank_hits(const Hits& hits, uint32_t* HWY_RESTRICT rank) {
+// How many hits are nearer than each of those in `vectors` vectors from `first` on.
+template <size_t vectors>
+HWY_INLINE void count_nearer(const Hits& hits, size_t first, uint32_t* HWY_RESTRICT rank) {
   const Tag d;
   const hn::RebindToSigned<Tag> di;
   const auto one = hn::Set(di, 1);
   const size_t lanes = hn::Lanes(d);
-  for (size_t i = 0; i < hits.count; i += lanes) {
-    const Vec own = hn::LoadU(d, hits.distance + i);
-    auto sum = hn::Zero(di);
-    size_t j = 0;
-    for (; j < i; ++j) {
-      const auto before = hn::RebindMask(di, hn::Le(hn::Set(d, hits.distance[j]), own));
-      sum = hn::IfThenElse(before, hn::Add(sum, one), sum);
+  Vec own[vectors];
+  hn::Vec<decltype(di)> sum[vectors];
+  for (size_t k = 0; k < vectors; ++k) {
+    own[k] = hn::LoadU(d, hits.distance + first + k * lanes);
+    sum[k] = hn::Zero(di);
+  }
+  for (size_t j = 0; j < hits.count; ++j) {
+    const Vec other = hn::Set(d, hits.distance[j]);
+    for (size_t k = 0; k < vectors; ++k) {
+      const auto nearer = hn::RebindMask(di, hn::Lt(other, own[k]));
+      sum[k] = hn::IfThenElse(nearer, hn::Add(sum[k], one), sum[k]);
     }
-    const auto lane = hn::Iota(di, static_cast<int>(i));
-    for (; j < std::min(i + lanes, hits.count); ++j) {
-      const Vec other = hn::Set(d, hits.distance[j]);
-      const auto earlier = hn::Gt(lane, hn::Set(di, static_cast<int>(j)));
-      const auto before = hn::Or(hn::RebindMask(di, hn::Lt(other, own)),
-                                 hn::And(hn::RebindMask(di, hn::Eq(other, own)), earlier));
-      sum = hn::IfThenElse(before, hn::Add(sum, one), sum);
+  }
+  for (size_t k = 0; k < vectors; ++k) {
+    hn::StoreU(sum[k], di, reinterpret_cast<int32_t*>(rank + first + k * lanes));
+  }
+}
+
+HWY_NOINLINE inline void rank_hits(const Hits& hits, uint32_t* HWY_RESTRICT rank) {
+  const size_t lanes = hn::Lanes(Tag());
+  for (size_t first = 0; first < hits.count; first += 4 * lanes) {
+    const size_t left = hits.count - first;
+    if (left <= lanes) {
+      count_nearer<1>(hits, first, rank);
+    } else if (left <= 2 * lanes) {
+      count_nearer<2>(hits, first, rank);
+    } else if (left <= 3 * lanes) {
+      count_nearer<3>(hits, first, rank);
+    } else {
+      count_nearer<4>(hits, first, rank);
     }
-    for (; j < hits.count; ++j) {
-      const auto before = hn::RebindMask(di, hn::Lt(hn::Set(d, hits.distance[j]), own));
-      sum = hn::IfThenElse(before, hn::Add(sum, one), sum);
-    }
-    hn::StoreU(sum, di, reinterpret_cast<int32_t*>(rank + i));
   }
 }
 
@@ -55,7 +66,7 @@ HWY_INLINE void sort_hits(Hits& hits, HitSorter& sorter, const uint32_t* names =
   }
   uint32_t rank[HitSorter::most_ranked + bvh_width];
   rank_hits(hits, rank);
-  sorter.place(rank, hits, names);
+  if (!sorter.place(rank, hits)) sorter.sort_many(hits, names);
 }
 
 // Drops what lies behind the hit at which the ray ends. That hit stays: more hits in front can only end the
