@@ -51,6 +51,7 @@ struct FrameGradient {
   Tensor<float> distortion;     // H×W
   Tensor<float> alpha;          // H×W
   Tensor<float> depth;          // H×W
+  Tensor<float> main_position;  // M×3, of the posed main surfels
 };
 
 // Which parts of a scene a backward pass must reach. What is off is left at zero and its work is skipped

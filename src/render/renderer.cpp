@@ -164,6 +164,9 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   // Rasterise.
   raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
                    grad_raster_, grad_raster_input_);
+  for (int64_t i = 0; i < grad_frame.main_position.size(); ++i) {
+    grad_raster_input_.surfels.position[i] += grad_frame.main_position[i];
+  }
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;
   gradient.camera.position += grad_raster_input_.camera.position;
   const std::vector<uint8_t> drawn = raster::visible(*raster_saved_);

@@ -53,4 +53,17 @@ Neighbours nearest_neighbours(const Tensor<float>& points, int k) {
   return result;
 }
 
+Neighbours spread_neighbours(const Tensor<float>& points, int k, int stride) {
+  const Neighbours all = nearest_neighbours(points, k * stride);
+  const int64_t count = points.dim(0);
+  Neighbours kept{Tensor<int32_t>({count, k}), Tensor<float>({count, k})};
+  for (int64_t i = 0; i < count; ++i) {
+    for (int n = 0; n < k; ++n) {
+      kept.index(i, n) = all.index(i, (n + 1) * stride - 1);
+      kept.distance2(i, n) = all.distance2(i, (n + 1) * stride - 1);
+    }
+  }
+  return kept;
+}
+
 }  // namespace traceflow

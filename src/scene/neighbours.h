@@ -11,5 +11,7 @@ struct Neighbours {
   Tensor<float> distance2;  // N×k, squared
 };
 Neighbours nearest_neighbours(const Tensor<float>& points, int k);
+// Every stride-th of the k·stride nearest others: as many, but from farther around.
+Neighbours spread_neighbours(const Tensor<float>& points, int k, int stride);
 
 }  // namespace traceflow

@@ -17,6 +17,7 @@ struct LossTerms {
   double normal = 0;        // L_norm
   double normal_prior = 0;  // L_tc-norm
   double distortion = 0;
+  double rigidity = 0;
   double lpips = 0;
   double psnr = 0;  // dB, of the image as it is, not rounded
 };

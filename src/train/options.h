@@ -94,6 +94,8 @@ struct LossOptions {
   float normal = 0.05F;
   float normal_prior = 0.05F;
   float distortion = 0;
+  float rigidity = 0;
+  float rigidity_strain = 0.2F;
   float lpips = 0;
   int lpips_from = 45000;
   std::string lpips_weights;
@@ -105,6 +107,10 @@ struct LossOptions {
     v.field("normal_prior", normal_prior, "",
             "Agreement with the capture's normal priors, L_tc-norm (method §7.4).");
     v.field("distortion", distortion, "", "Depth distortion (method §7.4).");
+    v.field("rigidity", rigidity, "",
+            "Neighbouring main surfels keep their distances while the field moves them (not in the paper).");
+    v.field("rigidity_strain", rigidity_strain, "",
+            "Relative stretch from which neighbours count as parted.");
     v.field("lpips", lpips, "", "Perceptual distance LPIPS, late in training (method §7.4).");
     v.field("lpips_from", lpips_from, "iteration", "Where that starts.");
     v.field("lpips_weights", lpips_weights, "",

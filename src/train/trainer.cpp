@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "files/options_json.h"
+#include "ops/loss/rigidity.h"
 #include "scene/scene_file.h"
 #include "train/initialise.h"
 
@@ -14,6 +15,9 @@ namespace traceflow {
 namespace {
 
 constexpr int checkpoint_version = 1;
+// A surfel is bound to 8 of its 32 nearest: enough to hold a shape, far enough to hold it beyond a wrinkle.
+constexpr int bonds_each = 8;
+constexpr int bond_stride = 4;
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) {
@@ -34,6 +38,16 @@ int64_t metadata_number(const Safetensors& file, const std::string& key) {
     throw InputError("checkpoint", key, found == file.metadata.end() ? "nothing" : found->second, "a number");
   }
   return std::stoll(found->second);
+}
+
+void check_bonds(const Neighbours& bonds, int64_t surfels) {
+  bool fits =
+      bonds.index.shape() == Shape{surfels, bonds_each} && bonds.distance2.shape() == bonds.index.shape();
+  for (const int32_t j : bonds.index.values()) fits = fits && j >= -1 && j < surfels;
+  if (!fits) {
+    throw InputError("checkpoint", "bonds", bonds.index.shape().to_string(),
+                     Shape{surfels, bonds_each}.to_string());
+  }
 }
 
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
@@ -94,8 +108,9 @@ FrameRequest Trainer::request_for(const View& view) {
 }
 
 const View& Trainer::draw_view() {
-  const auto [first, last] = std::minmax_element(capture_.train.begin(), capture_.train.end(),
-                                                 [](const View& a, const View& b) { return a.time < b.time; });
+  const auto [first, last] =
+      std::minmax_element(capture_.train.begin(), capture_.train.end(),
+                          [](const View& a, const View& b) { return a.time < b.time; });
   const double latest = first->time + schedule_.seen_times(iteration_) * (last->time - first->time);
   for (;;) {
     const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
@@ -110,13 +125,17 @@ LossTerms Trainer::step() {
   const Trainable trainable = schedule_.trainable(iteration_);
 
   const Frame& frame = renderer_.forward(scene_, request, true);
-  const LossTerms terms = evaluate_objective(
+  grad_frame_.main_position.resize({0});
+  grad_rest_.resize({0});
+  LossTerms terms = evaluate_objective(
       frame, *target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_,
       schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
+  if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame, terms);
   non_finite_ = {};
   if (std::isfinite(terms.total)) {
     gradient_.reset(scene_);
     renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
+    for (int64_t i = 0; i < grad_rest_.size(); ++i) gradient_.main.position[i] += grad_rest_[i];
     if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
     if (trainable.environment && scene_.environment.count() > 0) {
       environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
@@ -130,6 +149,17 @@ LossTerms Trainer::step() {
   return terms;
 }
 
+void Trainer::add_rigidity(const Frame& frame, LossTerms& terms) {
+  if (frame.main.count() == 0) return;
+  if (bonds_.index.empty()) bonds_ = spread_neighbours(scene_.main.position, bonds_each, bond_stride);
+  grad_frame_.main_position.reset(frame.main.position.shape());
+  grad_rest_.reset(scene_.main.position.shape());
+  terms.rigidity = loss::rigidity(scene_.main.position, frame.main.position, frame.subset, bonds_,
+                                  options_.loss.rigidity_strain, options_.loss.rigidity, grad_rest_,
+                                  grad_frame_.main_position);
+  terms.total += options_.loss.rigidity * terms.rigidity;
+}
+
 void Trainer::control_density(int done) {
   const auto tell = [&](events::DensityChanged change, bool reset) {
     change.iteration = done;
@@ -139,6 +169,7 @@ void Trainer::control_density(int done) {
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
     tell(main_density_.update(scene_.main, optimiser_.main(), scene_.extent, caps_.main, random_), reset);
+    bonds_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
     const bool reset = schedule_.resets_environment_opacity(done);
@@ -166,7 +197,8 @@ events::Step Trainer::step_event(const LossTerms& terms, double seconds) {
                  {"ssim", terms.ssim},
                  {"normal", terms.normal},
                  {"normal_prior", terms.normal_prior},
-                 {"distortion", terms.distortion}};
+                 {"distortion", terms.distortion},
+                 {"rigidity", terms.rigidity}};
   if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
   event.psnr = health_.smoothed_psnr();
   event.seconds = seconds;
@@ -229,6 +261,10 @@ Safetensors Trainer::checkpoint() const {
   optimiser_.put(file);
   main_density_.put(file);
   environment_density_.put(file);
+  if (!bonds_.index.empty()) {
+    file.add("bonds/index", bonds_.index);
+    file.add("bonds/distance2", bonds_.distance2);
+  }
   file.add("views/order", views_.order());
   Tensor<int64_t> random(Shape{4});
   for (size_t i = 0; i < 4; ++i) random[static_cast<int64_t>(i)] = std::bit_cast<int64_t>(random_.state()[i]);
@@ -269,6 +305,11 @@ void Trainer::resume() {
   environment_density_ =
       DensityControl("environment", options_.environment_density, scene_.environment.count());
   environment_density_.get(file);
+  bonds_ = {};
+  if (file.has("bonds/index")) {
+    bonds_ = {file.tensor<int32_t>("bonds/index"), file.tensor<float>("bonds/distance2")};
+    check_bonds(bonds_, scene_.main.count());
+  }
   views_.set_state(file.tensor<int32_t>("views/order"), metadata_number(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");
   const Tensor<double> health = file.tensor<double>("health");

@@ -7,6 +7,7 @@
 #include "base/random.h"
 #include "capture/capture.h"
 #include "render/renderer.h"
+#include "scene/neighbours.h"
 #include "scene/run_folder.h"
 #include "train/density.h"
 #include "train/events.h"
@@ -59,6 +60,8 @@ class Trainer {
   // The next view among those whose times the schedule has reached.
   const View& draw_view();
   FrameRequest request_for(const View& view);
+  // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
+  void add_rigidity(const Frame& frame, LossTerms& terms);
   void control_density(int done);
   void save();
   Safetensors checkpoint() const;
@@ -75,6 +78,8 @@ class Trainer {
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
+  Neighbours bonds_;         // of the main surfels, for loss.rigidity; empty until wanted
+  Tensor<float> grad_rest_;  // dL/d(stored positions) of that term
   SurfelCaps caps_;
   ViewOrder views_;
   Health health_;

@@ -71,6 +71,28 @@ TEST(Renderer, CullingChangesNoPixel) {
   expect_equal(depth, culled.raster.depth, "depth");
 }
 
+TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {
+  Fixture f;
+  f.request.cull = true;
+  f.request.deform_main = false;
+  Renderer renderer(RenderOptions{});
+  const Frame& frame = renderer.forward(f.scene, f.request, true);
+  ASSERT_LT(frame.subset.size(), 600U);
+  FrameGradient grad_frame;
+  grad_frame.colour.reset(frame.colour.shape());
+  grad_frame.main_position.reset(frame.main.position.shape());
+  Random random(4);
+  for (float& v : grad_frame.main_position.values()) v = static_cast<float>(random.normal());
+  SceneGradient gradient;
+  gradient.reset(f.scene);
+  renderer.backward(f.scene, f.request, Trainable{}, grad_frame, gradient);
+  Tensor<float> expected(f.scene.main.position.shape());
+  for (size_t i = 0; i < frame.subset.size(); ++i) {
+    std::copy_n(grad_frame.main_position.row(static_cast<int64_t>(i)), 3, expected.row(frame.subset[i]));
+  }
+  expect_equal(gradient.main.position, expected, "position");
+}
+
 TEST(Renderer, WithoutReflectionsTheImageIsTheDiffuseOne) {
   Fixture f;
   f.request.specular = false;

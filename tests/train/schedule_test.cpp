@@ -35,6 +35,18 @@ TEST(Schedule, ShorterRunsScaleEveryMarkInProportion) {
   }
 }
 
+TEST(Schedule, TimesAreReachedInProportion) {
+  TrainOptions o;
+  o.schedule.first_times = 0.1F;
+  o.schedule.all_times_from = 33000;
+  const Schedule schedule(o);
+  EXPECT_FLOAT_EQ(static_cast<float>(schedule.seen_times(0)), 0.1F);
+  EXPECT_FLOAT_EQ(static_cast<float>(schedule.seen_times(3000)), 0.1F);
+  EXPECT_FLOAT_EQ(static_cast<float>(schedule.seen_times(18000)), 0.55F);
+  EXPECT_EQ(schedule.seen_times(33000), 1);
+  EXPECT_EQ(Schedule(TrainOptions{}).seen_times(0), 1) << "the paper trains on all times from the start";
+}
+
 TEST(Schedule, ThePerceptualTermIsLateAndOffWithoutAWeight) {
   TrainOptions options = paper();
   EXPECT_FALSE(Schedule(options).uses_lpips(59999));

@@ -1,0 +1,82 @@
+#include <cmath>
+#include <vector>
+
+#include "base/parallel.h"
+#include "math/types.h"
+#include "ops/loss/rigidity.h"
+
+namespace traceflow::loss {
+
+namespace {
+
+// What one edge adds: its value, and the pull of its far end on its near end at rest and posed.
+struct Edge {
+  bool counts = false;
+  float value = 0;
+  Vec3<float> at_rest{0}, posed{0};
+};
+
+struct Ends {
+  Vec3<float> rest, posed;  // far end less near end
+};
+
+Edge measure(const Ends& ends, float reach, float strain2) {
+  const float rest_length = glm::length(ends.rest);
+  const float posed_length = glm::length(ends.posed);
+  const float inverse_reach = 1 / reach;
+  const float e = (posed_length - rest_length) * inverse_reach;
+  if (!(rest_length > 0) || !(posed_length > 0) || !std::isfinite(e)) return {};
+  const float sum = e * e + strain2;
+  const float slope = 2 * e * strain2 / (sum * sum) * inverse_reach;
+  return {true, e * e / sum, slope / rest_length * ends.rest, -slope / posed_length * ends.posed};
+}
+
+}  // namespace
+
+double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, std::span<const int32_t> subset,
+                const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,
+                Tensor<float>& grad_posed) {
+  const int64_t k = edges.index.dim(1), count = posed.dim(0);
+  const auto strain2 = static_cast<float>(strain * strain);
+  const auto stored = [&](int64_t i) { return subset.empty() ? i : int64_t{subset[static_cast<size_t>(i)]}; };
+  std::vector<int32_t> posed_at(static_cast<size_t>(rest.dim(0)), -1);
+  for (int64_t i = 0; i < count; ++i) posed_at[static_cast<size_t>(stored(i))] = static_cast<int32_t>(i);
+
+  std::vector<Edge> pulls(static_cast<size_t>(count * k));
+  parallel_for("loss: rigidity edges", count, [&](int64_t i) {
+    const int64_t near = stored(i);
+    const Vec3<float> p = load3<float>(rest.row(near)), x = load3<float>(posed.row(i));
+    const float reach = std::sqrt(edges.distance2(near, k - 1));
+    for (int64_t n = 0; n < k; ++n) {
+      const int32_t far = edges.index(near, n);
+      const int32_t j = far < 0 ? -1 : posed_at[static_cast<size_t>(far)];
+      if (j < 0) continue;
+      const Ends ends{load3<float>(rest.row(far)) - p, load3<float>(posed.row(j)) - x};
+      pulls[static_cast<size_t>(i * k + n)] = measure(ends, reach, strain2);
+    }
+  });
+
+  double sum = 0;
+  int64_t counted = 0;
+  for (const Edge& edge : pulls) {
+    sum += edge.value;
+    counted += edge.counts ? 1 : 0;
+  }
+  if (counted == 0) return 0;
+  const auto scale = static_cast<float>(weight / static_cast<double>(counted));
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t near = stored(i);
+    for (int64_t n = 0; n < k; ++n) {
+      const Edge& edge = pulls[static_cast<size_t>(i * k + n)];
+      if (!edge.counts) continue;
+      const int32_t far = edges.index(near, n);
+      add3(grad_rest.row(near), scale * edge.at_rest);
+      add3(grad_rest.row(far), -scale * edge.at_rest);
+      add3(grad_posed.row(i), scale * edge.posed);
+      add3(grad_posed.row(posed_at[static_cast<size_t>(far)]), -scale * edge.posed);
+    }
+  }
+  return sum / static_cast<double>(counted);
+}
+
+}  // namespace traceflow::loss
