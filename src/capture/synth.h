@@ -23,7 +23,7 @@ constexpr std::array<std::string_view, 2> enum_names(SynthScene) { return {"ball
 
 struct SynthOptions {
   SynthScene scene = SynthScene::balls;
-  int frames = 40;
+  int frames = 80;
   int width = 240;
   int height = 135;
   int64_t seed = 0;
