@@ -13,6 +13,7 @@ namespace {
 
 std::vector<std::string> ids_of(const std::vector<View>& views) {
   std::vector<std::string> ids;
+  ids.reserve(views.size());
   for (const View& view : views) ids.push_back(view.id);
   return ids;
 }
