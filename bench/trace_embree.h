@@ -19,7 +19,7 @@ namespace traceflow::bench {
 // How surfels are traced elsewhere: Embree, a quad per surfel, a buffer of the k nearest hits filled in the
 // filter callback, traced again from the last hit until the ray has ended. Where the buffer is full, a hit
 // behind all of it is accepted, which shortens the ray.
-template <int k>
+template <int nearest>
 class EmbreeTracer {
  public:
   EmbreeTracer(const PosedSurfels& surfels, const trace::Options& options)
@@ -62,7 +62,7 @@ class EmbreeTracer {
   struct Context {
     RTCIntersectContext embree;  // first: Embree hands back its address
     const EmbreeTracer* tracer;
-    std::array<Hit, k> hits;
+    std::array<Hit, nearest> hits;
     int count;
     Hit last;  // of the pass before
   };
@@ -101,13 +101,13 @@ class EmbreeTracer {
     if (radius2 > radius * radius) return;
     Hit hit{ray->tfar, 0, at->primID};
     if (!context.last.before(hit)) return;
-    if (context.count == k && !hit.before(context.hits[k - 1])) {
+    if (context.count == nearest && !hit.before(context.hits[nearest - 1])) {
       args->valid[0] = -1;
       return;
     }
     hit.alpha = blend_alpha(self.rules_, self.surfels_.opacity[hit.surfel], std::exp(-0.5F * radius2)).value;
     if (hit.alpha == 0) return;
-    int place = context.count < k ? context.count++ : k - 1;
+    int place = context.count < nearest ? context.count++ : nearest - 1;
     for (; place > 0 && hit.before(context.hits[static_cast<size_t>(place) - 1]); --place) {
       context.hits[static_cast<size_t>(place)] = context.hits[static_cast<size_t>(place) - 1];
     }
@@ -162,7 +162,7 @@ class EmbreeTracer {
         distance += weight * hit.t;
         transmittance *= 1 - hit.alpha;
       }
-      ended = ended || context.count < k;
+      ended = ended || context.count < nearest;
       if (context.count > 0) context.last = context.hits[static_cast<size_t>(context.count) - 1];
     }
     store3(output.colour.row(r), sum + transmittance * options_.background);
