@@ -87,7 +87,7 @@ CameraArc arc_around(const Vector& target, double distance, double elevation) {
   CameraArc arc;
   arc.target = target;
   arc.distance = distance;
-  arc.half_angle = 0.63;
+  arc.half_angle = 0.5;
   arc.elevation = elevation;
   arc.elevation_swing = 0.07;
   arc.test_azimuth = 0.08;
@@ -104,13 +104,13 @@ Pose glossy_ball_pose(double time) {
   const double phase = 2 * pi * time;
   const double height = 0.16 + 0.035 * (1 - std::cos(2 * phase));
   return {{0.35 + 0.05 * std::sin(phase), -0.10 + 0.05 * std::sin(2 * phase), height},
-          rotation_about(axis_y, 1.2 * std::sin(phase))};
+          rotation_about(axis_y, 0.7 * std::sin(phase))};
 }
 
 Pose turning_box_pose(double time) {
   const double phase = 2 * pi * time;
   return {{-0.50 + 0.03 * std::sin(phase), -0.08 + 0.14 * std::sin(phase), 0.09},
-          rotation_about(axis_z, 0.4 + 0.8 * std::sin(phase))};
+          rotation_about(axis_z, 0.4 + 0.5 * std::sin(phase))};
 }
 
 AnimatedScene balls() {

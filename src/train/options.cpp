@@ -45,7 +45,7 @@ TrainOptions cpu_preset() {
   o.rates.position = 1.5e-3F;
   o.rates.position_end = 1.5e-5F;
   o.rates.tint = 0.003F;
-  o.rates.field = 2e-3F;
+  o.rates.field = 1e-3F;
   o.rates.field_end = 3e-4F;
   o.schedule.deform_from = 6000;
   o.schedule.normal_from = 0;
@@ -73,8 +73,8 @@ TrainOptions cpu_preset() {
 
 TrainOptions demo_preset() {
   TrainOptions o = cpu_preset();
-  o.iterations = 3600;
-  o.density.max_surfels = 14000;
+  o.iterations = 6000;
+  o.density.max_surfels = 16000;
   o.initial.max_points = 8000;
   o.environment_density.max_surfels = 8000;
   return o;
