@@ -17,7 +17,7 @@ void check_not_negative(double value, const char* name) {
 // be), and motion is followed from the first pictures on.
 TrainOptions cpu_preset() {
   TrainOptions o;
-  o.iterations = 4500;
+  o.iterations = 8000;
   o.save_every = 1000;
   o.initial.max_points = 12000;
   o.initial.sh_degree = 2;
