@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <mutex>
 #include <vector>
 
@@ -13,6 +14,8 @@ namespace traceflow {
 // Number of threads that parallel loops use. 0 chooses the machine's cores.
 void set_threads(int count);
 int thread_count();
+// Whether the caller is inside a loop that several threads share.
+bool in_parallel_loop();
 
 namespace detail {
 
@@ -37,6 +40,12 @@ class ExceptionBridge {
   std::exception_ptr first_;
 };
 
+#ifdef __SANITIZE_THREAD__
+// run(block) for every block. The thread sanitizer does not see how OpenMP's runtime orders its threads and
+// takes the end of every loop for a race; under it the same blocks are dealt to threads that it does see.
+void deal_to_plain_threads(int64_t blocks, const std::function<void(int64_t)>& run);
+#endif
+
 }  // namespace detail
 
 // f(begin, end) over [0, n) in blocks of `grain`, dealt to threads as they come free. Which elements share a
@@ -48,10 +57,15 @@ void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
   const profile::Scope scope(description);
   const int64_t blocks = (n + grain - 1) / grain;
   detail::ExceptionBridge bridge;
-#pragma omp parallel for schedule(dynamic, 1) num_threads(thread_count()) if (blocks > 1)
-  for (int64_t block = 0; block < blocks; ++block) {
+  const auto run = [&](int64_t block) {
     bridge.run([&] { f(block * grain, std::min(n, (block + 1) * grain)); });
-  }
+  };
+#ifdef __SANITIZE_THREAD__
+  detail::deal_to_plain_threads(blocks, run);
+#else
+#pragma omp parallel for schedule(dynamic, 1) num_threads(thread_count()) if (blocks > 1)
+  for (int64_t block = 0; block < blocks; ++block) run(block);
+#endif
   bridge.rethrow();
 }
 

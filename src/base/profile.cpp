@@ -1,11 +1,11 @@
 #include "base/profile.h"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cstring>
 #include <mutex>
+
+#include "base/parallel.h"
 
 namespace traceflow::profile {
 
@@ -18,7 +18,7 @@ std::vector<Entry> table;
 }  // namespace
 
 Scope::Scope(const char* name) : name_(nullptr) {
-  if (!enabled.load(std::memory_order_relaxed) || omp_in_parallel()) return;
+  if (!enabled.load(std::memory_order_relaxed) || in_parallel_loop()) return;
   name_ = name;
   start_ = std::chrono::steady_clock::now();
 }
