@@ -108,7 +108,7 @@ struct CameraArc {
   double half_angle = 0.6;        // the azimuth sweeps there and back over ± this, radians
   double elevation = 0.25;        // mean, radians
   double elevation_swing = 0.06;  // radians
-  double test_azimuth = 0.08;     // of the right camera against the left, radians
+  double test_azimuth = 0.06;     // of the right camera against the left, radians
 };
 
 struct AnimatedScene {

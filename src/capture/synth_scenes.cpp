@@ -90,7 +90,7 @@ CameraArc arc_around(const Vector& target, double distance, double elevation) {
   arc.half_angle = 0.5;
   arc.elevation = elevation;
   arc.elevation_swing = 0.07;
-  arc.test_azimuth = 0.08;
+  arc.test_azimuth = 0.06;
   return arc;
 }
 
