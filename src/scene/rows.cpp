@@ -37,6 +37,7 @@ void edit_rows(Surfels& surfels, const RowEdit& edit) {
 }
 
 void append_rows(Surfels& surfels, const Surfels& more) {
+  if (more.count() == 0) return;
   std::vector<const Tensor<float>*> added;
   more.for_each([&](const char*, const Tensor<float>& tensor) { added.push_back(&tensor); });
   size_t group = 0;
