@@ -80,7 +80,7 @@ TEST(SynthViews, CamerasAreRotationsThatLookAtTheObject) {
                                               normalize(other.camera.position - target)));
     }
   }
-  EXPECT_GT(widest, 60);
+  EXPECT_GT(widest, 50);
   EXPECT_LT(widest, 90);
 }
 
