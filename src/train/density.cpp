@@ -40,10 +40,11 @@ void DensityControl::accumulate(const Tensor<float>& signal, const Tensor<uint8_
   }
 }
 
-std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, float extent, int64_t cap,
-                                                        bool& at_cap) const {
+std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, const SceneSize& size,
+                                                        int64_t cap, bool& at_cap) const {
   const int64_t count = surfels.count();
   const float faint = std::log(options_.prune_opacity / (1 - options_.prune_opacity));
+  const float widest = std::min(options_.prune_above * size.extent, options_.prune_above_cloud * size.cloud);
   std::vector<Fate> fate(static_cast<size_t>(count), Fate::keep);
   std::vector<int64_t> growing;
   int64_t left = 0;
@@ -52,7 +53,7 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
     Fate& f = fate[static_cast<size_t>(i)];
     if (!(surfels.opacity_logit[i] >= faint)) {
       f = Fate::prune_transparent;
-    } else if (!(scale <= options_.prune_above * extent)) {
+    } else if (!(scale <= widest)) {
       f = Fate::prune_large;
     } else {
       ++left;
@@ -72,17 +73,17 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
     growing.resize(static_cast<size_t>(allowed));
   }
   for (const int64_t i : growing) {
-    const bool small = largest_scale(surfels, i) <= options_.clone_below * extent;
+    const bool small = largest_scale(surfels, i) <= options_.clone_below * size.extent;
     fate[static_cast<size_t>(i)] = small ? Fate::clone : Fate::split;
   }
   return fate;
 }
 
-events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& moments, float extent,
+events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& moments, const SceneSize& size,
                                               int64_t cap, Random& random) {
   events::DensityChanged change;
   change.set = set_;
-  const std::vector<Fate> fate = fates(surfels, extent, cap, change.at_cap);
+  const std::vector<Fate> fate = fates(surfels, size, cap, change.at_cap);
   const auto each = [&](Fate wanted, auto&& f) {
     int64_t found = 0;
     for (size_t i = 0; i < fate.size(); ++i) {

@@ -11,6 +11,12 @@
 
 namespace traceflow {
 
+// How large a scene is, in its own units.
+struct SceneSize {
+  float extent;  // of the cameras (method §7.6)
+  float cloud;   // radius of the capture's points
+};
+
 // Density control of one set of surfels (method §7.7): surfels whose centre gradient is large multiply, the
 // faint and the oversized go, and the count never passes the cap.
 class DensityControl {
@@ -22,9 +28,8 @@ class DensityControl {
   // Adds an iteration's signal (N) of the surfels that it touched (N flags).
   void accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched);
 
-  // Clones, splits and prunes; forgets the statistics. `extent` in scene units; `cap` the most surfels there
-  // may be.
-  events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, float extent, int64_t cap,
+  // Clones, splits and prunes; forgets the statistics. `cap`: the most surfels there may be.
+  events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, const SceneSize& size, int64_t cap,
                                 Random& random);
 
   // Lowers every opacity to at most options.opacity_reset and clears that group's moments.
@@ -35,7 +40,7 @@ class DensityControl {
 
  private:
   enum class Fate : uint8_t { keep, clone, split, prune_transparent, prune_large };
-  std::vector<Fate> fates(const Surfels& surfels, float extent, int64_t cap, bool& at_cap) const;
+  std::vector<Fate> fates(const Surfels& surfels, const SceneSize& size, int64_t cap, bool& at_cap) const;
   float mean_signal(int64_t i) const { return seen_[i] > 0 ? sum_[i] / seen_[i] : 0; }
 
   std::string set_;

@@ -242,6 +242,26 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   return s;
 }
 
+float cloud_radius(const Tensor<float>& points) {
+  const Tensor<float> finite = points.empty() ? Tensor<float>({0, 3}) : finite_points(points);
+  const auto count = static_cast<size_t>(finite.dim(0));
+  if (count == 0) return 1;
+  const auto pick = [](std::vector<float>& values, size_t place) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(place), values.end());
+    return values[place];
+  };
+  std::vector<float> values(count);
+  Vec3<float> median(0);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t i = 0; i < count; ++i) values[i] = finite(static_cast<int64_t>(i), axis);
+    median[axis] = pick(values, count / 2);
+  }
+  for (size_t i = 0; i < count; ++i) {
+    values[i] = glm::length(load3<float>(finite.row(static_cast<int64_t>(i))) - median);
+  }
+  return pick(values, (count - 1) * 9 / 10);
+}
+
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
   const Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
   if (points.dim(0) == 0) {

@@ -58,6 +58,7 @@ TrainOptions cpu_preset() {
   o.density.until = 45000;
   o.density.growth = 0.2F;
   o.density.prune_above = 10;
+  o.density.prune_above_cloud = 0.5F;
   o.density.opacity_reset_every = 0;
   o.density.max_surfels = 20000;
   o.environment_density.from = 3000;

@@ -130,6 +130,7 @@ struct DensityOptions {
   float growth = 1;
   float prune_opacity = 0.05F;
   float prune_above = 0.1F;
+  float prune_above_cloud = 1000;
   int opacity_reset_every = 3000;
   float opacity_reset = 0.01F;
   int max_surfels = 300000;
@@ -147,6 +148,8 @@ struct DensityOptions {
             "At most this share of the set multiplies at a time, the strongest signals first.");
     v.field("prune_opacity", prune_opacity, "", "Surfels fainter than this go.");
     v.field("prune_above", prune_above, "extents", "Surfels wider than this go.");
+    v.field("prune_above_cloud", prune_above_cloud, "clouds",
+            "Likewise, in radii of the cloud of the capture's points.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
             "Interval of opacity resets; 0 for none.");
     v.field("opacity_reset", opacity_reset, "", "Opacity that a reset leaves at most.");

@@ -85,6 +85,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       main_density_("main", options.density, scene_.main.count()),
       environment_density_("environment", options.environment_density, scene_.environment.count()),
       caps_(surfel_caps(options, capture_.train.at(0).camera.width, capture_.train.at(0).camera.height)),
+      cloud_radius_(cloud_radius(capture_.points)),
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render) {}
@@ -168,12 +169,12 @@ void Trainer::control_density(int done) {
   };
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
-    tell(main_density_.update(scene_.main, optimiser_.main(), scene_.extent, caps_.main, random_), reset);
+    tell(main_density_.update(scene_.main, optimiser_.main(), size_of_scene(), caps_.main, random_), reset);
     bonds_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
     const bool reset = schedule_.resets_environment_opacity(done);
-    tell(environment_density_.update(scene_.environment, optimiser_.environment(), scene_.extent,
+    tell(environment_density_.update(scene_.environment, optimiser_.environment(), size_of_scene(),
                                      caps_.environment, random_),
          reset);
   }

@@ -63,6 +63,7 @@ class Trainer {
   // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
   void add_rigidity(const Frame& frame, LossTerms& terms);
   void control_density(int done);
+  SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
   void save();
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
@@ -81,6 +82,7 @@ class Trainer {
   Neighbours bonds_;         // of the main surfels, for loss.rigidity; empty until wanted
   Tensor<float> grad_rest_;  // dL/d(stored positions) of that term
   SurfelCaps caps_;
+  float cloud_radius_;
   ViewOrder views_;
   Health health_;
   Renderer renderer_;

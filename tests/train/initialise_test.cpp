@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include <cmath>
 
 #include "math/rotation.h"
@@ -105,6 +107,18 @@ TEST(Neighbours, AgreeWithABruteForceSearch) {
     for (int64_t k = 0; k < 4; ++k)
       ASSERT_NEAR(found.distance2(i, k), distances[static_cast<size_t>(k)], 1e-5F);
   }
+}
+
+TEST(CloudRadius, HoldsNineTenthsAndForgivesStrays) {
+  Tensor<float> points({101, 3});
+  for (int64_t i = 0; i < 101; ++i) {
+    points(i, 0) = 5 + 0.02F * static_cast<float>(i - 50);
+    points(i, 1) = -3;
+  }
+  points(0, 2) = 1e6F;
+  points(100, 1) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_NEAR(cloud_radius(points), 0.9F, 0.03F);
+  EXPECT_EQ(cloud_radius(Tensor<float>({0, 3})), 1);
 }
 
 }  // namespace
