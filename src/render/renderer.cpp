@@ -41,8 +41,8 @@ Tensor<float> Frame::specular_image() const {
 }
 
 void SceneGradient::reset(const Scene& scene) {
-  main = zeros_like<float>(scene.main);
-  environment = zeros_like<float>(scene.environment);
+  main.reset_like(scene.main);
+  environment.reset_like(scene.environment);
   if (scene.main_field) main_field = zeros_like<float>(*scene.main_field);
   if (scene.environment_field) environment_field = zeros_like<float>(*scene.environment_field);
   if (scene.environment_map) {
@@ -126,18 +126,25 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
   frame_.specular_rays = trace_output_.colour;
 }
 
-void Renderer::backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
-                        const FrameGradient& grad_frame, SceneGradient& gradient) {
-  const Field* field = field_if(scene.main_field, request.deform_main);
+void Renderer::begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors) {
+  const Shape none{0};
   const Shape image = frame_.raster.alpha.shape();
+  const Shape depths = faces || mirrors ? image : none;
   grad_raster_.tint.reset(image);
-  grad_raster_.depth.reset(image);
-  grad_raster_.median_depth.reset(image);
-  grad_raster_.normal.reset(frame_.raster.normal.shape());
+  grad_raster_.depth.reset(depths);
+  grad_raster_.median_depth.reset(depths);
+  grad_raster_.normal.reset(mirrors ? frame_.raster.normal.shape() : none);
   grad_raster_.alpha = grad_frame.alpha;
   grad_raster_.distortion = grad_frame.distortion;
   if (!grad_frame.normal.empty()) grad_raster_.normal = grad_frame.normal;
   if (!grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
+}
+
+void Renderer::backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
+                        const FrameGradient& grad_frame, SceneGradient& gradient) {
+  const Field* field = field_if(scene.main_field, request.deform_main);
+  const bool faces = trainable.main && !grad_frame.pseudo_normal.empty();
+  begin_raster_gradient(grad_frame, faces, trainable.main && !frame_.traced.pixel.empty());
 
   // Shade.
   shade::backward(frame_.raster.colour, frame_.raster.tint, std::span<const int32_t>(frame_.traced.pixel),
@@ -156,12 +163,13 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
     }
   }
   // Surface.
-  if (trainable.main && !grad_frame.pseudo_normal.empty()) {
+  if (faces) {
     surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                                      frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,
                                      grad_raster_.depth, grad_raster_.median_depth, gradient.camera);
   }
   // Rasterise.
+  if (options_.depth_ratio == 0) grad_raster_.median_depth.resize({0});
   raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
                    grad_raster_, grad_raster_input_);
   for (int64_t i = 0; i < grad_frame.main_position.size(); ++i) {

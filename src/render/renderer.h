@@ -27,6 +27,9 @@ class Renderer {
 
  private:
   void forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
+  // Starts the gradient of the rasterised layers; those that nothing asks for stay empty. faces, mirrors:
+  // whether gradients of pseudo-normals and of mirrored rays will be added.
+  void begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors);
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                          SceneGradient& gradient);
   bool reflects(const Scene& scene, const FrameRequest& request) const;

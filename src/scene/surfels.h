@@ -18,6 +18,16 @@ struct BasicSurfels {
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint_logit.empty(); }
 
+  // Zeros in the shapes of another set, in the memory that is there.
+  void reset_like(const BasicSurfels& other) {
+    position.reset(other.position.shape());
+    log_scale.reset(other.log_scale.shape());
+    rotation.reset(other.rotation.shape());
+    opacity_logit.reset(other.opacity_logit.shape());
+    sh.reset(other.sh.shape());
+    tint_logit.reset(other.tint_logit.shape());
+  }
+
   // f(name, tensor) for every group, in the order above. An environment has no tint group.
   template <class F>
   void for_each(F&& f) {

@@ -25,9 +25,12 @@ LossTerms evaluate_objective(const Frame& frame, const ViewImages& target, const
                              bool normal_losses, FrameGradient& gradient, const lpips::Network* perceptual) {
   LossTerms terms;
   gradient.colour.reset(frame.colour.shape());
-  gradient.normal.reset(frame.raster.normal.shape());
-  gradient.pseudo_normal.reset(frame.raster.normal.shape());
-  gradient.distortion.resize({0});
+  const bool consistency = normal_losses && options.normal > 0;
+  const bool prior = normal_losses && options.normal_prior > 0 && !target.normal_prior.empty();
+  const Shape none{0};
+  gradient.normal.reset(consistency || prior ? frame.raster.normal.shape() : none);
+  gradient.pseudo_normal.reset(consistency ? frame.raster.normal.shape() : none);
+  gradient.distortion.resize(none);
 
   terms.psnr = psnr(frame.colour, target.colour);
   terms.l1 = loss::l1(frame.colour, target.colour, 1 - options.ssim, gradient.colour);
@@ -36,12 +39,12 @@ LossTerms evaluate_objective(const Frame& frame, const ViewImages& target, const
     terms.ssim = loss::ssim_loss(frame.colour, target.colour, options.ssim, gradient.colour);
     terms.total += options.ssim * terms.ssim;
   }
-  if (normal_losses && options.normal > 0) {
+  if (consistency) {
     terms.normal = loss::normal_consistency(frame.raster.normal, frame.pseudo_normal, options.normal,
                                             gradient.normal, gradient.pseudo_normal);
     terms.total += options.normal * terms.normal;
   }
-  if (normal_losses && options.normal_prior > 0 && !target.normal_prior.empty()) {
+  if (prior) {
     terms.normal_prior =
         loss::normal_prior(frame.raster.normal, target.normal_prior, options.normal_prior, gradient.normal);
     terms.total += options.normal_prior * terms.normal_prior;

@@ -66,6 +66,13 @@ HWY_INLINE void load_block(const OutputGradient& g, const Vec3<float>& backgroun
   }
 }
 
+// Which outputs a gradient is asked by: what nobody asks is left out of the loops.
+enum class Asked {
+  colour,    // colour, tint and alpha
+  geometry,  // and normal and expected depth
+  all        // and median depth and distortion
+};
+
 // The sums of a surfel over pixels, lane by lane, in the order of SplatGradient.
 template <class D>
 struct Sums {
@@ -79,9 +86,8 @@ struct Sums {
         log_opacity = red = green = blue = tint = normal_x = normal_y = normal_z = hn::Zero(d);
   }
 
-  // Adds one hit per lane; moves the state in front of it. `with_depths` is false where no gradient of
-  // distortion or median depth is asked for.
-  template <bool with_depths>
+  // Adds one hit per lane; moves the state in front of it.
+  template <Asked asked>
   HWY_INLINE void add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f, uint32_t place,
                       const SavedBlock& saved, size_t lane, BlockState& state) {
     const Int<D> di;
@@ -100,16 +106,25 @@ struct Sums {
     const auto weight = hn::Mul(alpha, transmittance);
     const auto z = f.z(d, s);
 
-    auto own = hn::MulAdd(z, load(state.z), load(state.constant));
+    auto own = load(state.constant);
+    auto grad_z = hn::Zero(d);
+    if constexpr (asked != Asked::colour) {
+      own = hn::MulAdd(z, load(state.z), own);
+      grad_z = hn::Mul(weight, load(state.z));
+    }
     own = hn::MulAdd(set(s.colour[0]), load(state.colour[0]), own);
     own = hn::MulAdd(set(s.colour[1]), load(state.colour[1]), own);
     own = hn::MulAdd(set(s.colour[2]), load(state.colour[2]), own);
     own = hn::MulAdd(set(s.tint), load(state.tint), own);
-    own = hn::MulAdd(set(s.normal[0]), load(state.normal[0]), own);
-    own = hn::MulAdd(set(s.normal[1]), load(state.normal[1]), own);
-    own = hn::MulAdd(set(s.normal[2]), load(state.normal[2]), own);
-    auto grad_z = hn::Mul(weight, load(state.z));
-    if constexpr (with_depths) {
+    if constexpr (asked != Asked::colour) {
+      own = hn::MulAdd(set(s.normal[0]), load(state.normal[0]), own);
+      own = hn::MulAdd(set(s.normal[1]), load(state.normal[1]), own);
+      own = hn::MulAdd(set(s.normal[2]), load(state.normal[2]), own);
+      normal_x = hn::MulAdd(weight, load(state.normal[0]), normal_x);
+      normal_y = hn::MulAdd(weight, load(state.normal[1]), normal_y);
+      normal_z = hn::MulAdd(weight, load(state.normal[2]), normal_z);
+    }
+    if constexpr (asked == Asked::all) {
       // dL/dw_i = g (m² A + M2 - 2 m M1), dL/dm_i = 2 g w (m A - M1)
       const auto inverse_z = f.inverse_z(d, s);
       const auto scale = set(o.m_scale);
@@ -133,23 +148,23 @@ struct Sums {
     green = hn::MulAdd(weight, load(state.colour[1]), green);
     blue = hn::MulAdd(weight, load(state.colour[2]), blue);
     tint = hn::MulAdd(weight, load(state.tint), tint);
-    normal_x = hn::MulAdd(weight, load(state.normal[0]), normal_x);
-    normal_y = hn::MulAdd(weight, load(state.normal[1]), normal_y);
-    normal_z = hn::MulAdd(weight, load(state.normal[2]), normal_z);
 
     // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero where α is clamped.
     const auto is_free = hn::And(hit, hn::Lt(f.opacity, alpha_max));
     const auto g = hn::IfThenElseZero(is_free, hn::Mul(alpha, grad_alpha));
     log_opacity = hn::Add(log_opacity, g);
-    add_plane(f, hn::IfThenElseZero(on_plane, g), hn::IfThenElseZero(on_plane, grad_z), z, on_plane);
+    add_plane<asked>(f, hn::IfThenElseZero(on_plane, g), hn::IfThenElseZero(on_plane, grad_z), z, on_plane);
     // The low-pass: ρ = 2 (dx² + dy²).
     const auto by_centre = hn::IfThenZeroElse(on_plane, g);
     centre_x = hn::MulAdd(by_centre, f.dx, centre_x);
     centre_y = hn::MulAdd(by_centre, f.dy, centre_y);
-    z_centre = hn::Add(z_centre, hn::IfThenZeroElse(on_plane, grad_z));
+    if constexpr (asked != Asked::colour) {
+      z_centre = hn::Add(z_centre, hn::IfThenZeroElse(on_plane, grad_z));
+    }
   }
 
   // The plane's hit: u = nu/w, v = nv/w, z = z_plane/w, ρ = u² + v².
+  template <Asked asked>
   HWY_INLINE void add_plane(const Footprint<D>& f, V<D> g, V<D> grad_z, V<D> z, M<D> on_plane) {
     const auto inverse_w = hn::IfThenElseZero(on_plane, f.inverse_w);
     const auto u = hn::Mul(hn::IfThenElseZero(on_plane, f.nu), inverse_w);
@@ -157,8 +172,12 @@ struct Sums {
     const auto gw = hn::Mul(g, inverse_w);
     const auto grad_nu = hn::Neg(hn::Mul(gw, u));
     const auto grad_nv = hn::Neg(hn::Mul(gw, v));
-    const auto zw = hn::Mul(grad_z, inverse_w);
-    const auto grad_w = hn::NegMulAdd(zw, z, hn::Mul(gw, hn::MulAdd(u, u, hn::Mul(v, v))));
+    auto grad_w = hn::Mul(gw, hn::MulAdd(u, u, hn::Mul(v, v)));
+    if constexpr (asked != Asked::colour) {
+      const auto zw = hn::Mul(grad_z, inverse_w);
+      grad_w = hn::NegMulAdd(zw, z, grad_w);
+      z_plane = hn::Add(zw, z_plane);
+    }
     u_x = hn::MulAdd(grad_nu, f.x, u_x);
     u_y = hn::MulAdd(grad_nu, f.y, u_y);
     u_1 = hn::Add(grad_nu, u_1);
@@ -168,7 +187,6 @@ struct Sums {
     w_x = hn::MulAdd(grad_w, f.x, w_x);
     w_y = hn::MulAdd(grad_w, f.y, w_y);
     w_1 = hn::Add(grad_w, w_1);
-    z_plane = hn::Add(zw, z_plane);
   }
 
   // The sum over the lanes of every member.
@@ -203,7 +221,7 @@ struct Sums {
   }
 };
 
-template <bool with_depths>
+template <Asked asked>
 class TileUnblender {
  public:
   HWY_INLINE TileUnblender(const KernelOptions& o, const TileLists& lists, const SavedBlock* blocks,
@@ -256,8 +274,8 @@ class TileUnblender {
       const int block = std::countr_zero(touched);
       for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
         const PixelCentres<Pixels> at{hn::Load(d, x_[block] + lane), hn::Load(d, y_[block] + lane)};
-        sums.template add<with_depths>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
-                                       state_.blocks[block]);
+        sums.template add<asked>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
+                                 state_.blocks[block]);
       }
     }
     sums.reduce(d, &saved_.scratch.gradients[entry.entry].u_x);
@@ -270,8 +288,8 @@ class TileUnblender {
       const TileEntry entry = lists_.entries[hits[place].place];
       const Splat& splat = saved_.splats[entry.surfel];
       Sums<OnePixel> sums(d);
-      sums.template add<with_depths>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
-                                     state_.blocks[block]);
+      sums.template add<asked>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
+                               state_.blocks[block]);
       float values[Sums<OnePixel>::padded];
       sums.reduce(d, values);
       float* const to = &saved_.scratch.gradients[entry.entry].u_x;
@@ -288,10 +306,10 @@ class TileUnblender {
   alignas(64) float y_[blocks_per_tile][pixels_per_block];
 };
 
-template <bool with_depths>
+template <Asked asked>
 HWY_INLINE void unblend(SortOrder order, const KernelOptions& o, const TileLists& lists,
                         const SavedBlock* blocks, const Saved& saved, TileState& state) {
-  TileUnblender<with_depths> tile(o, lists, blocks, saved, state);
+  TileUnblender<asked> tile(o, lists, blocks, saved, state);
   if (order == SortOrder::centre) {
     tile.in_list_order();
   } else {
@@ -309,10 +327,12 @@ void unblend_tile(SortOrder order, const KernelOptions& o, int64_t index, TileMe
     load_block(grad_output, o.background, lists.block_x(block), lists.block_y(block), saved.width,
                saved.height, blocks[block], state.blocks[block]);
   }
-  if (grad_output.distortion.empty() && grad_output.median_depth.empty()) {
-    unblend<false>(order, o, lists, blocks, saved, state);
+  if (!grad_output.distortion.empty() || !grad_output.median_depth.empty()) {
+    unblend<Asked::all>(order, o, lists, blocks, saved, state);
+  } else if (!grad_output.normal.empty() || !grad_output.depth.empty()) {
+    unblend<Asked::geometry>(order, o, lists, blocks, saved, state);
   } else {
-    unblend<true>(order, o, lists, blocks, saved, state);
+    unblend<Asked::colour>(order, o, lists, blocks, saved, state);
   }
 }
 
