@@ -98,6 +98,26 @@ struct Directions {
   }
 };
 
+// f(the four values of each 2×2 pixels, in reading order), channel by channel.
+template <class T, class F>
+Tensor<T> reduce_fours(const Tensor<float>& x, const F& f) {
+  const int64_t h = x.dim(0) / 2, w = x.dim(1) / 2, channels = x.dim(2);
+  Tensor<T> y;
+  y.resize({h, w, channels});
+  parallel_for(
+      "lpips: halve", h,
+      [&](int64_t i) {
+        for (int64_t j = 0; j < w; ++j) {
+          const float* a = x.data() + (2 * i * x.dim(1) + 2 * j) * channels;
+          const float* b = a + x.dim(1) * channels;
+          T* out = y.data() + (i * w + j) * channels;
+          for (int64_t c = 0; c < channels; ++c) out[c] = f(a[c], a[c + channels], b[c], b[c + channels]);
+        }
+      },
+      rows_per_block);
+  return y;
+}
+
 }  // namespace
 
 Tensor<float> convolve_relu(const Tensor<float>& x, const Network::Convolution& convolution) {
@@ -151,44 +171,15 @@ Tensor<float> convolve_relu_backward(Tensor<float>& grad_y, const Tensor<uint8_t
 }
 
 Tensor<float> halve(const Tensor<float>& x) {
-  const int64_t h = x.dim(0) / 2, w = x.dim(1) / 2, channels = x.dim(2);
-  Tensor<float> y;
-  y.resize({h, w, channels});
-  parallel_for(
-      "lpips: halve", h,
-      [&](int64_t i) {
-        for (int64_t j = 0; j < w; ++j) {
-          const float* a = x.data() + (2 * i * x.dim(1) + 2 * j) * channels;
-          const float* b = a + x.dim(1) * channels;
-          float* out = y.data() + (i * w + j) * channels;
-          for (int64_t c = 0; c < channels; ++c) {
-            out[c] = std::max(std::max(a[c], a[c + channels]), std::max(b[c], b[c + channels]));
-          }
-        }
-      },
-      rows_per_block);
-  return y;
+  return reduce_fours<float>(
+      x, [](float a, float b, float c, float d) { return std::max(std::max(a, b), std::max(c, d)); });
 }
 
 Tensor<uint8_t> largest_places(const Tensor<float>& x) {
-  const int64_t h = x.dim(0) / 2, w = x.dim(1) / 2, channels = x.dim(2);
-  Tensor<uint8_t> places;
-  places.resize({h, w, channels});
-  parallel_for(
-      "lpips: halve", h,
-      [&](int64_t i) {
-        for (int64_t j = 0; j < w; ++j) {
-          const float* a = x.data() + (2 * i * x.dim(1) + 2 * j) * channels;
-          const float* b = a + x.dim(1) * channels;
-          uint8_t* out = places.data() + (i * w + j) * channels;
-          for (int64_t c = 0; c < channels; ++c) {
-            const float four[] = {a[c], a[c + channels], b[c], b[c + channels]};
-            out[c] = static_cast<uint8_t>(std::max_element(four, four + 4) - four);
-          }
-        }
-      },
-      rows_per_block);
-  return places;
+  return reduce_fours<uint8_t>(x, [](float a, float b, float c, float d) {
+    const float four[] = {a, b, c, d};
+    return static_cast<uint8_t>(std::max_element(four, four + 4) - four);
+  });
 }
 
 void halve_backward(const Tensor<float>& grad_halved, const Tensor<uint8_t>& places, Tensor<float>& grad_x) {
