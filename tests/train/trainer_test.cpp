@@ -189,6 +189,31 @@ TEST(Trainer, ResumingWithAnotherCaptureIsRefused) {
   EXPECT_THROW(resumed.resume(), InputError);
 }
 
+TEST(Trainer, BondsThatDoNotFitTheSurfelsAreRefused) {
+  const TrainOptions options = small_run(6);
+  Trainer trainer = make_trainer(options, "bonds");
+  trainer.run(never);
+  const RunFolder run{fs::path(::testing::TempDir()) / ("bonds_" + std::to_string(::getpid()))};
+  const Safetensors sound = Safetensors::read(run.checkpoint());
+  const Tensor<int32_t> index = sound.tensor<int32_t>("bonds/index");
+  ASSERT_GT(index.size(), 0);
+  const auto resume_with = [&](const Tensor<int32_t>& bonds) {
+    Safetensors file = sound;
+    file.add("bonds/index", bonds);
+    file.write(run.checkpoint());
+    Trainer(options, load_capture(capture_folder(), options.capture), run.folder).resume();
+  };
+  EXPECT_NO_THROW(resume_with(index));
+  Tensor<int32_t> bonds = index;
+  bonds[3] = static_cast<int32_t>(index.dim(0));  // no such surfel
+  EXPECT_THROW(resume_with(bonds), InputError);
+  bonds[3] = -2;
+  EXPECT_THROW(resume_with(bonds), InputError);
+  bonds = index;
+  bonds.resize({index.dim(0) - 1, index.dim(1)});
+  EXPECT_THROW(resume_with(bonds), InputError);
+}
+
 TEST(Trainer, EveryAblationAndPeerOfTheMethodTrains) {
   for (const Specular specular :
        {Specular::none, Specular::environment_gaussians, Specular::environment_map}) {
