@@ -66,4 +66,20 @@ Neighbours spread_neighbours(const Tensor<float>& points, int k, int stride) {
   return kept;
 }
 
+Tensor<int32_t> nearest_of(const Tensor<float>& points, const Tensor<float>& queries) {
+  require(!points.empty(), "there is a point to be nearest", points.shape().to_string());
+  const Cloud cloud{points};
+  const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  Tensor<int32_t> nearest({queries.dim(0)});
+  parallel_for("scene: nearest of", queries.dim(0), [&](int64_t i) {
+    size_t index = 0;
+    float distance2 = 0;
+    nanoflann::KNNResultSet<float> found(1);
+    found.init(&index, &distance2);
+    tree.findNeighbors(found, queries.row(i), nanoflann::SearchParams());
+    nearest[i] = static_cast<int32_t>(index);
+  });
+  return nearest;
+}
+
 }  // namespace traceflow

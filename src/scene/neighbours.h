@@ -13,5 +13,7 @@ struct Neighbours {
 Neighbours nearest_neighbours(const Tensor<float>& points, int k);
 // Every stride-th of the k·stride nearest others: as many, but from farther around.
 Neighbours spread_neighbours(const Tensor<float>& points, int k, int stride);
+// For each of M queries (M×3) the nearest of N ≥ 1 points.
+Tensor<int32_t> nearest_of(const Tensor<float>& points, const Tensor<float>& queries);
 
 }  // namespace traceflow

@@ -10,6 +10,7 @@
 #include "math/symmetric_eigen.h"
 #include "scene/neighbours.h"
 #include "scene/rows.h"
+#include "train/sightings.h"
 
 namespace traceflow {
 
@@ -17,7 +18,6 @@ namespace {
 
 constexpr int neighbours_for_scale = 3;
 constexpr int neighbours_for_normal = 10;
-constexpr size_t views_for_colour = 8;
 // Neighbours at one place would give a scale of zero, whose logarithm is not a number.
 constexpr float least_distance2 = 1e-10F;
 
@@ -74,72 +74,20 @@ void set_rotations_from_neighbours(Surfels& s) {
   });
 }
 
-// Views in the order of their distance from time 0.
-std::vector<const View*> earliest_views(const Capture& capture) {
-  std::vector<const View*> views;
-  for (const View& view : capture.train) views.push_back(&view);
-  std::stable_sort(views.begin(), views.end(),
-                   [](const View* a, const View* b) { return a->time < b->time; });
-  views.resize(std::min(views.size(), views_for_colour));
-  return views;
-}
-
-// What the earliest photographs show where surfels project: calls f(surfel, view's images, column, row) for
-// every surfel and every such view that has it in frame. Surfels run in parallel.
-template <class F>
-void for_each_sighting(const Surfels& s, const Capture& capture, const F& f) {
-  const std::vector<const View*> views = earliest_views(capture);
-  std::vector<std::shared_ptr<const ViewImages>> images;
-  images.reserve(views.size());
-  for (const View* view : views) images.push_back(load_images(capture, *view));
-  parallel_for("initialise: look at photographs", s.count(), [&](int64_t i) {
-    for (size_t v = 0; v < views.size(); ++v) {
-      const Camera<float>& camera = views[v]->camera;
-      const Vec3<float> x = camera.point_in_camera(load3<float>(s.position.row(i)));
-      if (!(x.z > 0)) continue;
-      const Vec2<float> at = camera.project(x);
-      const bool in_frame = at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
-                            at.y < static_cast<float>(camera.height);
-      if (in_frame) f(i, *images[v], static_cast<int64_t>(at.x), static_cast<int64_t>(at.y));
-    }
-  });
-}
-
-// The median colour of each surfel's sightings; grey where there is none. The median forgives the views in
-// which something stands before it.
-void set_colours_from_views(Surfels& s, const Capture& capture) {
-  std::vector<std::array<std::vector<float>, 3>> seen(static_cast<size_t>(s.count()));
-  for_each_sighting(s, capture, [&](int64_t i, const ViewImages& images, int64_t x, int64_t y) {
-    for (size_t c = 0; c < 3; ++c) {
-      seen[static_cast<size_t>(i)][c].push_back(images.colour(y, x, static_cast<int64_t>(c)));
-    }
-  });
+// Grey where nothing is known.
+void set_colours(Surfels& s, const Sightings& sightings) {
   for (int64_t i = 0; i < s.count(); ++i) {
-    for (size_t c = 0; c < 3; ++c) {
-      std::vector<float>& values = seen[static_cast<size_t>(i)][c];
-      if (values.empty()) continue;
-      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-      std::nth_element(values.begin(), middle, values.end());
-      s.sh(i, 0, static_cast<int64_t>(c)) = (*middle - 0.5F) / static_cast<float>(sh_c0);
+    if (!sightings.any[static_cast<size_t>(i)]) continue;
+    for (int64_t c = 0; c < 3; ++c) {
+      s.sh(i, 0, c) = (sightings.colour(i, c) - 0.5F) / static_cast<float>(sh_c0);
     }
   }
 }
 
-// For each surfel, sightings outside the masks less those inside: positive for still surroundings, negative
-// on the moving object, zero where it was never seen.
-std::vector<int> balance_outside_masks(const Surfels& s, const Capture& capture) {
-  std::vector<int> balance(static_cast<size_t>(s.count()), 0);
-  for_each_sighting(s, capture, [&](int64_t i, const ViewImages& images, int64_t x, int64_t y) {
-    balance[static_cast<size_t>(i)] += !images.mask.empty() && images.mask(y, x) ? -1 : 1;
-  });
-  return balance;
-}
-
-void set_tint_from_masks(Surfels& s, const Capture& capture, const InitialOptions& options) {
-  const std::vector<int> balance = balance_outside_masks(s, capture);
+void set_tint_from_masks(Surfels& s, const Sightings& sightings, const InitialOptions& options) {
   for (int64_t i = 0; i < s.count(); ++i) {
-    s.tint_logit[i] =
-        logit(balance[static_cast<size_t>(i)] < 0 ? options.tint_in_mask : options.tint_outside_mask);
+    const bool on_object = sightings.outside[static_cast<size_t>(i)] < 0;
+    s.tint_logit[i] = logit(on_object ? options.tint_in_mask : options.tint_outside_mask);
   }
 }
 
@@ -232,13 +180,13 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   Surfels s = surfels_at_points(thinned(points, limit, random), as_environment, random);
   s.tint_logit = {};
   // What the camera sees beside the object is also what the object mirrors.
-  const std::vector<int> balance = balance_outside_masks(s, capture);
+  const Sightings sightings = look_at(s, earliest_photographs(capture));
+  set_colours(s, sightings);
   RowEdit surroundings;
   for (int64_t i = 0; i < s.count(); ++i) {
-    if (balance[static_cast<size_t>(i)] > 0) surroundings.keep(i);
+    if (sightings.outside[static_cast<size_t>(i)] > 0) surroundings.keep(i);
   }
   edit_rows(s, surroundings);
-  set_colours_from_views(s, capture);
   return s;
 }
 
@@ -274,9 +222,11 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
   scene.normalisation = capture.normalisation;
   scene.extent = capture.extent;
   scene.main = surfels_at_points(thinned(points, limit, random), options.initial, random);
-  if (options.initial.colours_from_views) set_colours_from_views(scene.main, capture);
-  if (options.initial.tint_in_mask > 0 && capture.has_masks) {
-    set_tint_from_masks(scene.main, capture, options.initial);
+  const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks;
+  if (options.initial.colours_from_views || by_masks) {
+    const Sightings sightings = look_at(scene.main, earliest_photographs(capture));
+    if (options.initial.colours_from_views) set_colours(scene.main, sightings);
+    if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
   }
   if (options.deform.main)
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);

@@ -10,10 +10,10 @@ namespace traceflow {
 // The scene that training starts from (method §7.8): main surfels at the capture's points, environment
 // surfels (or a map) around them, fields at zero. Throws InputError when the capture has no points to start
 // from.
+Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
+
 // Radius of the ball around the points' median that holds nine tenths of them, in scene units.
 float cloud_radius(const Tensor<float>& points);
-
-Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
 // Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);

@@ -109,6 +109,22 @@ TEST(Neighbours, AgreeWithABruteForceSearch) {
   }
 }
 
+TEST(Neighbours, NearestOfAgreesWithABruteForceSearch) {
+  Random random(5);
+  Tensor<float> points({200, 3}), queries({50, 3});
+  for (float& v : points.values()) v = static_cast<float>(random.uniform(-1, 1));
+  for (float& v : queries.values()) v = static_cast<float>(random.uniform(-1, 1));
+  const Tensor<int32_t> nearest = nearest_of(points, queries);
+  for (int64_t i = 0; i < queries.dim(0); ++i) {
+    const auto distance = [&](int64_t j) {
+      return length(load3<float>(points.row(j)) - load3<float>(queries.row(i)));
+    };
+    int64_t best = 0;
+    for (int64_t j = 1; j < points.dim(0); ++j) best = distance(j) < distance(best) ? j : best;
+    EXPECT_EQ(nearest[i], best);
+  }
+}
+
 TEST(CloudRadius, HoldsNineTenthsAndForgivesStrays) {
   Tensor<float> points({101, 3});
   for (int64_t i = 0; i < 101; ++i) {

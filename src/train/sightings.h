@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "capture/capture.h"
+#include "scene/surfels.h"
+
+namespace traceflow {
+
+// What the earliest photographs show of each of N surfels, while the scene still stands as its points do.
+// A surfel counts as seen in a photograph where no other one stands clearly before it; one that is seen in
+// none takes over what its nearest seen neighbour has: the back of an object belongs to its front, and the
+// wall behind an object to the wall beside it.
+struct Sightings {
+  Tensor<float> colour;      // N×3, the median of its colours: it forgives the odd wrong one
+  std::vector<int> outside;  // sightings outside the masks less those inside: < 0 on the moving object
+  std::vector<uint8_t> any;  // 0 where nothing is known, which is only when no surfel is seen at all
+};
+
+struct Photograph {
+  Camera<float> camera;
+  std::shared_ptr<const ViewImages> images;
+};
+// The first few by time.
+std::vector<Photograph> earliest_photographs(const Capture& capture);
+
+// `surfels` as they start: as wide as their neighbours are apart.
+Sightings look_at(const Surfels& surfels, std::span<const Photograph> photographs);
+
+}  // namespace traceflow
