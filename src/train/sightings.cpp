@@ -13,13 +13,13 @@ namespace traceflow {
 namespace {
 
 constexpr size_t earliest_count = 8;
-// A surfel hides what lies behind a square around it, this part of its width to either side, by more than so
-// many widths. Neighbours on a plane that is seen at a slant do not hide each other down to an angle of asin
-// 0.7/4 = 10°.
-constexpr float hiding_reach = 0.7F;
-constexpr float hiding_widths = 4;
+// A surfel hides what lies behind a square around it, this many of its widths to either side so that
+// scattered ones leave no holes, by more than so many widths. Neighbours on a plane that is seen at a slant
+// do not hide each other down to an angle of asin 1.5/8 = 11°.
+constexpr float hiding_reach = 1.5F;
+constexpr float hiding_widths = 8;
 // No square goes further to either side than this, in pixels.
-constexpr float widest_square = 12;
+constexpr float widest_square = 32;
 
 float width_of(const Surfels& s, int64_t i) { return std::exp(s.log_scale(i, 0)); }
 
