@@ -12,9 +12,6 @@ namespace traceflow {
 // from.
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
-// Radius of the ball around the points' median that holds nine tenths of them, in scene units.
-float cloud_radius(const Tensor<float>& points);
-
 // Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);
 // Surfels drawn uniformly in cells of the box around the points and the cameras, `environment_box` times as
@@ -27,5 +24,8 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
 // `limit` of them.
 Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points, int64_t limit,
                                const InitialOptions& options, Random& random);
+
+// Radius of the ball around the points' median that holds nine tenths of them, in scene units.
+float cloud_radius(const Tensor<float>& points);
 
 }  // namespace traceflow

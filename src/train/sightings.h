@@ -19,11 +19,12 @@ struct Sightings {
   std::vector<uint8_t> any;  // 0 where nothing is known, which is only when no surfel is seen at all
 };
 
+// A training view with its pixels.
 struct Photograph {
   Camera<float> camera;
   std::shared_ptr<const ViewImages> images;
 };
-// The first few by time.
+// The eight earliest by time, or all where there are fewer.
 std::vector<Photograph> earliest_photographs(const Capture& capture);
 
 // `surfels` as they start: as wide as their neighbours are apart.
