@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "files/options_json.h"
+#include "ops/deform/deform.h"
 #include "scene/ply.h"
 #include "scene/rows.h"
 
@@ -49,26 +50,12 @@ bool finite_row(const Tensor<float>& tensor, int64_t row) {
   return std::all_of(values, values + tensor.row_size(), [](float v) { return std::isfinite(v); });
 }
 
-void add_residual(const Tensor<float>& residual, int first, Tensor<float>& values) {
-  for (int64_t i = 0; i < residual.dim(0); ++i) {
-    for (int64_t c = 0; c < values.row_size(); ++c) values.row(i)[c] += residual(i, first + c);
-  }
-}
-
 // Stored values with the field's residuals added, still before activation. Surfels that are not finite are
 // left out, as pictures leave them out.
 Surfels posed(const Surfels& stored, const Field* field, std::optional<float> time,
               field::Precision precision) {
-  Surfels result = stored;
-  if (field != nullptr && time) {
-    Tensor<float> residual;
-    field::forward(*field, stored.position, *time, precision, residual, nullptr);
-    add_residual(residual, residual::position, result.position);
-    add_residual(residual, residual::rotation, result.rotation);
-    add_residual(residual, residual::log_scale, result.log_scale);
-    add_residual(residual, residual::opacity, result.opacity_logit);
-    if (result.has_tint()) add_residual(residual, residual::tint, result.tint_logit);
-  }
+  Surfels result =
+      field != nullptr && time ? deform::displaced(stored, *field, *time, precision) : Surfels(stored);
   RowEdit finite;
   for (int64_t i = 0; i < result.count(); ++i) {
     bool all = true;

@@ -24,6 +24,10 @@ struct Saved {
 void forward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
              int sh_degree, field::Precision precision, PosedSurfels& posed, Saved* saved);
 
+// The stored surfels with the residuals of `time` added and no activation: a scene of its own that stands
+// still there, as an export at one time holds it. Not differentiable.
+Surfels displaced(const Surfels& stored, const Field& field, float time, field::Precision precision);
+
 // Adds to grad_stored (shapes of stored) and to grad_field (null when the forward pass had none or it is
 // frozen). Reads the activated values back from `posed`, the forward pass's output.
 void backward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,

@@ -110,13 +110,18 @@ ResidualRow residual_gradient(const PosedSurfels& posed, const PosedSurfels& gra
   return grad;
 }
 
+// Adds a row of residuals, or of their gradient, to the stored values that they belong to.
+void add_to_row(const ResidualRow& row, Surfels& stored, int64_t to) {
+  for (int k = 0; k < 3; ++k) stored.position(to, k) += row[residual::position + k];
+  for (int k = 0; k < 4; ++k) stored.rotation(to, k) += row[residual::rotation + k];
+  for (int k = 0; k < 2; ++k) stored.log_scale(to, k) += row[residual::log_scale + k];
+  stored.opacity_logit[to] += row[residual::opacity];
+  if (stored.has_tint()) stored.tint_logit[to] += row[residual::tint];
+}
+
 void add_to_stored(const ResidualRow& grad, const Tensor<float>& grad_sh, int64_t from, Surfels& grad_stored,
                    int64_t to) {
-  for (int k = 0; k < 3; ++k) grad_stored.position(to, k) += grad[residual::position + k];
-  for (int k = 0; k < 4; ++k) grad_stored.rotation(to, k) += grad[residual::rotation + k];
-  for (int k = 0; k < 2; ++k) grad_stored.log_scale(to, k) += grad[residual::log_scale + k];
-  grad_stored.opacity_logit[to] += grad[residual::opacity];
-  if (grad_stored.has_tint()) grad_stored.tint_logit[to] += grad[residual::tint];
+  add_to_row(grad, grad_stored, to);
   float* sh = grad_stored.sh.row(to);
   const float* more = grad_sh.row(from);
   for (int64_t k = 0; k < grad_sh.row_size(); ++k) sh[k] += more[k];
@@ -141,6 +146,15 @@ void forward(const Surfels& stored, const Field* field, float time, std::span<co
   parallel_for("deform pose", rows.count, [&](int64_t i) {
     if (!pose(stored, rows.at(i), load_residuals(kept.residuals, i), posed, i)) hide(posed, i);
   });
+}
+
+Surfels displaced(const Surfels& stored, const Field& field, float time, field::Precision precision) {
+  Tensor<float> residuals;
+  field::forward(field, stored.position, time, precision, residuals, nullptr);
+  Surfels result = stored;
+  parallel_for("deform displace", stored.count(),
+               [&](int64_t i) { add_to_row(load_residuals(residuals, i), result, i); });
+  return result;
 }
 
 void backward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,

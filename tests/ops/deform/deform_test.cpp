@@ -187,6 +187,23 @@ TEST(Deform, IsTheSameWithoutSaving) {
   EXPECT_TRUE(same_bytes(posed.position, run(stored, &field).posed.position));
 }
 
+TEST(Deform, DisplacedSurfelsStandWhereTheFieldMovesThem) {
+  for (const bool main : {true, false}) {
+    const Field field =
+        testing::random_field(small, main ? residual::main_outputs : residual::environment_outputs);
+    const Surfels stored = random_surfels(70, main);
+    const Surfels displaced = deform::displaced(stored, field, test_time, Precision::fp32);
+    const PosedSurfels expected = run(stored, &field).posed;
+    const PosedSurfels found = run(displaced, nullptr).posed;
+    std::vector<Tensor<float>> tensors;
+    testing::for_each_posed(found, [&](const char*, const Tensor<float>& t) { tensors.push_back(t); });
+    size_t next = 0;
+    testing::for_each_posed(expected, [&](const char* name, const Tensor<float>& t) {
+      EXPECT_TRUE(same_bytes(tensors[next++], t)) << name;
+    });
+  }
+}
+
 TEST(Deform, IsTheSameBytesAtAnyThreadCount) {
   const Surfels stored = random_surfels(5003, true);
   const Field field = testing::random_field(small, residual::main_outputs);
