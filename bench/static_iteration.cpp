@@ -52,8 +52,12 @@ void static_iteration(benchmark::State& state) {
   Optimiser optimiser(s.scene);
   SceneGradient gradient;
   FrameGradient grad_frame;
-  Trainable trainable{
-      .main = true, .tint = false, .main_field = false, .environment = false, .environment_field = false};
+  Trainable trainable{.main = true,
+                      .tint = false,
+                      .main_field = false,
+                      .environment = false,
+                      .environment_field = false,
+                      .camera = false};
   for (auto _ : state) {
     const Frame& frame = renderer.forward(s.scene, s.request, true);
     evaluate_objective(frame, s.target, s.options.loss, false, grad_frame);

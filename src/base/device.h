@@ -1,11 +1,19 @@
 #pragma once
 
+#include <array>
+#include <string_view>
+
 // Marks a function that runs on the host and, when compiled by nvcc, on the device too.
 #if defined(__CUDACC__)
 #define TRACEFLOW_HD __host__ __device__
 #else
 #define TRACEFLOW_HD
 #endif
+
+// Marks the declaration of a function that is defined only in programs that are linked with the CUDA code: in
+// others its address is null. A caller with tensors on the CUDA device never meets that case, since nothing
+// could have put them there.
+#define TRACEFLOW_WITH_CUDA [[gnu::weak]]
 
 // For a small function that a loop must swallow whole in order to be vectorised, whatever the loop's target
 // is.
@@ -15,5 +23,6 @@ namespace traceflow {
 
 // Where a tensor lives and where the op that reads it runs.
 enum class Device { cpu, cuda };
+constexpr std::array<std::string_view, 2> enum_names(Device) { return {"cpu", "cuda"}; }
 
 }  // namespace traceflow

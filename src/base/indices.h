@@ -1,18 +1,19 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string>
 
 #include "base/error.h"
+#include "base/tensor.h"
 
 namespace traceflow {
 
 // Throws InternalError unless the indices rise strictly within [0, limit): what lets threads write one entry
-// each.
-inline void require_ascending(std::span<const int32_t> indices, int64_t limit) {
+// each. Indices on another device are made there by the program's own code and are taken as they are.
+inline void require_ascending(const Tensor<int32_t>& indices, int64_t limit) {
+  if (indices.device() != Device::cpu) return;
   int64_t previous = -1;
-  for (const int32_t index : indices) {
+  for (const int32_t index : indices.values()) {
     if (index > previous && index < limit) {
       previous = index;
       continue;

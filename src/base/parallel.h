@@ -7,6 +7,8 @@
 #include <mutex>
 #include <vector>
 
+#include "base/device.h"
+#include "base/error.h"
 #include "base/profile.h"
 
 namespace traceflow {
@@ -75,6 +77,26 @@ void parallel_for(const char* description, int64_t n, F&& f, int64_t grain = 102
   parallel_blocks(description, n, grain, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) f(i);
   });
+}
+
+namespace cuda {
+// f(i) for every i in [0, n) as a kernel. Defined in base/kernel.h; the .cu file beside a functor
+// instantiates it.
+template <class F>
+TRACEFLOW_WITH_CUDA void for_each_index(const char* description, int64_t n, const F& f);
+}  // namespace cuda
+
+// The element-wise steps of ops that run on any device: f is a functor of plain numbers and addresses whose
+// operator() is TRACEFLOW_HD.
+template <class F>
+void parallel_for(Device device, const char* description, int64_t n, const F& f, int64_t grain = 1024) {
+  if (device == Device::cpu) {
+    parallel_for(description, n, f, grain);
+    return;
+  }
+  void (*const for_each)(const char*, int64_t, const F&) = &cuda::for_each_index<F>;
+  require(for_each != nullptr, "a step has code for the CUDA device", description);
+  for_each(description, n, f);
 }
 
 // Sum of f(i) over [0, n) in a fixed order: per block of `grain` first, then over the blocks.

@@ -11,8 +11,9 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
-#include "base/device.h"
+#include "base/device_memory.h"
 #include "base/error.h"
 
 namespace traceflow {
@@ -37,26 +38,26 @@ class Shape {
   int rank_ = 0;
 };
 
-// A contiguous row-major array that owns its memory (64-byte aligned) and knows its device. Copies are deep.
-// T is a plain number. resize() keeps the allocation where it is large enough, so a tensor kept across
-// iterations stops allocating; the content after resize() is unspecified.
+// A contiguous row-major array that owns its memory (64-byte aligned) and knows its device. Copies are deep
+// and on the same device. T is a plain number, or a struct of such. resize() keeps the allocation where it is
+// large enough, so a tensor kept across iterations stops allocating; the content after resize() is
+// unspecified. Elements may be read and written by the host only where the device is the CPU; elsewhere
+// data() is an address for kernels.
 template <class T>
 class Tensor {
   static_assert(std::is_trivially_copyable_v<T>);
 
  public:
   Tensor() = default;
-  explicit Tensor(const Shape& shape, Device device = Device::cpu) : device_(device) {
+  explicit Tensor(const Shape& shape, Device device = Device::cpu) : memory_(nullptr, Free{device}) {
     resize(shape);
     zero();
   }
-  Tensor(const Tensor& other) : device_(other.device_) { *this = other; }
+  Tensor(const Tensor& other) { *this = other; }
   // A tensor that was moved from is empty.
   Tensor(Tensor&& other) noexcept { swap(other); }
   Tensor& operator=(const Tensor& other) {
-    if (this == &other) return *this;
-    resize(other.shape_);
-    std::copy(other.data(), other.data() + other.size(), data());
+    if (this != &other) copy_from(other, other.device());
     return *this;
   }
   Tensor& operator=(Tensor&& other) noexcept {
@@ -70,7 +71,20 @@ class Tensor {
   int64_t size() const { return size_; }
   bool empty() const { return size_ == 0; }
   int64_t dim(int i) const { return shape_[i]; }
-  Device device() const { return device_; }
+  Device device() const { return memory_.get_deleter().device; }
+
+  // The same numbers on a device.
+  Tensor on(Device device) const {
+    Tensor result;
+    result.copy_from(*this, device);
+    return result;
+  }
+  // Moves to a device, leaving the content behind: for what is about to be resized and written. Keeps the
+  // memory where the device is the same.
+  Tensor& place(Device device) {
+    if (device != this->device()) *this = Tensor(memory_type(nullptr, Free{device}));
+    return *this;
+  }
 
   T* data() { return memory_.get(); }
   const T* data() const { return memory_.get(); }
@@ -95,7 +109,11 @@ class Tensor {
   void resize(const Shape& shape) {
     const int64_t wanted = shape.elements();
     if (wanted > capacity_) {
-      memory_.reset(static_cast<T*>(::operator new(static_cast<size_t>(wanted) * sizeof(T), alignment)));
+      const Device device = this->device();
+      memory_.reset();  // first, so that both do not stand side by side
+      shape_ = Shape();
+      size_ = capacity_ = 0;
+      memory_.reset(static_cast<T*>(memory::allocate(device, static_cast<size_t>(wanted) * sizeof(T))));
       capacity_ = wanted;
     }
     shape_ = shape;
@@ -106,28 +124,48 @@ class Tensor {
     resize(shape);
     zero();
   }
-  void fill(T value) { std::fill(data(), data() + size_, value); }
-  void zero() { fill(T{}); }
+  void fill(T value) {
+    require(device() == Device::cpu, "a tensor is filled on the host");
+    std::fill(data(), data() + size_, value);
+  }
+  void zero() { memory::zero(device(), data(), bytes()); }
 
   void swap(Tensor& other) noexcept {
     std::swap(memory_, other.memory_);
     std::swap(shape_, other.shape_);
     std::swap(size_, other.size_);
     std::swap(capacity_, other.capacity_);
-    std::swap(device_, other.device_);
   }
 
  private:
-  static constexpr std::align_val_t alignment{64};
   struct Free {
-    void operator()(T* p) const { ::operator delete(p, alignment); }
+    Device device = Device::cpu;
+    void operator()(T* p) const noexcept { memory::release(device, p); }
   };
-  std::unique_ptr<T, Free> memory_;
+  using memory_type = std::unique_ptr<T, Free>;
+
+  explicit Tensor(memory_type memory) : memory_(std::move(memory)) {}
+
+  size_t bytes() const { return static_cast<size_t>(size_) * sizeof(T); }
+  void copy_from(const Tensor& other, Device device) {
+    place(device);
+    resize(other.shape_);
+    memory::copy(device, data(), other.device(), other.data(), bytes());
+  }
+
+  memory_type memory_;
   Shape shape_;
   int64_t size_ = 0;
   int64_t capacity_ = 0;
-  Device device_ = Device::cpu;
 };
+
+// A list as a tensor of one dimension, on the CPU.
+template <class T>
+Tensor<T> tensor_of(const std::vector<T>& list) {
+  Tensor<T> tensor(Shape{static_cast<int64_t>(list.size())});
+  std::copy(list.begin(), list.end(), tensor.data());
+  return tensor;
+}
 
 // The same numbers in another scalar type, e.g. to hand float parameters to a double-precision reference.
 template <class To, class From>

@@ -30,7 +30,7 @@ struct FrameRequest {
 // A picture with all its layers.
 struct Frame {
   PosedSurfels main;            // what was rasterised
-  std::vector<int32_t> subset;  // which stored main surfels these are; empty means all
+  Tensor<int32_t> subset;       // which stored main surfels these are; empty means all
   PosedSurfels environment;     // what was traced
   raster::Output raster;        // diffuse colour, alpha, tint, normal, depths, distortion
   Tensor<float> pseudo_normal;  // H×W×3 when asked for
@@ -62,6 +62,7 @@ struct Trainable {
   bool main_field = true;
   bool environment = true;  // environment surfels, or the map
   bool environment_field = true;
+  bool camera = true;  // its pose
 };
 
 // dL/d(parameters of a scene), with the signals that density control accumulates.

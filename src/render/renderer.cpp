@@ -21,7 +21,7 @@ int stored_degree(const Surfels& surfels) { return surfels.count() > 0 ? sh_degr
 float largest_move(const Surfels& stored, const Frame& frame) {
   float largest2 = 0;
   for (int64_t i = 0; i < frame.main.count(); ++i) {
-    const int64_t k = frame.subset.empty() ? i : frame.subset[static_cast<size_t>(i)];
+    const int64_t k = frame.subset.empty() ? i : frame.subset[i];
     const Vec3<float> move = load3<float>(frame.main.position.row(i)) - load3<float>(stored.position.row(k));
     const float length2 = dot(move, move);
     if (length2 > largest2 && std::isfinite(length2)) largest2 = length2;
@@ -33,9 +33,8 @@ float largest_move(const Surfels& stored, const Frame& frame) {
 
 Tensor<float> Frame::specular_image() const {
   Tensor<float> image(colour.shape());
-  for (size_t k = 0; k < traced.pixel.size(); ++k) {
-    store3(image.data() + 3 * static_cast<int64_t>(traced.pixel[k]),
-           load3<float>(specular_rays.row(static_cast<int64_t>(k))));
+  for (int64_t k = 0; k < traced.pixel.size(); ++k) {
+    store3(image.data() + 3 * int64_t{traced.pixel[k]}, load3<float>(specular_rays.row(k)));
   }
   return image;
 }
@@ -69,7 +68,7 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   const raster::Options raster_options = options_.raster_options(scene.extent);
 
   // Choose the surfels that can show, and pose them.
-  frame_.subset.clear();
+  frame_.subset.resize({0});
   bool nothing_in_view = false;
   if (request.cull) {
     frame_.subset =
@@ -94,21 +93,21 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   }
 
   // Mirror the view at what was drawn.
-  frame_.traced.pixel.clear();
-  frame_.traced.weight.clear();
+  frame_.traced.pixel.resize({0});
+  frame_.traced.weight.resize({0});
   frame_.specular_rays.resize({0, 3});
   if (reflects(scene, request)) {
     forward_specular(scene, request, keep_for_backward);
   }
-  shade::forward(frame_.raster.colour, frame_.raster.tint, std::span<const int32_t>(frame_.traced.pixel),
-                 frame_.specular_rays, frame_.colour);
+  shade::forward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.specular_rays,
+                 frame_.colour);
   return frame_;
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
   frame_.traced = surface::select_pixels(frame_.raster.alpha, frame_.raster.tint, frame_.raster.normal,
                                          options_.select, request.probes, request.probe_seed);
-  surface::reflection_rays(request.camera, std::span<const int32_t>(frame_.traced.pixel), frame_.raster.depth,
+  surface::reflection_rays(request.camera, frame_.traced.pixel, frame_.raster.depth,
                            frame_.raster.median_depth, frame_.raster.normal, options_.depth_ratio, origins_,
                            directions_);
   if (scene.specular == Specular::environment_map) {
@@ -147,9 +146,9 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   begin_raster_gradient(grad_frame, faces, trainable.main && !frame_.traced.pixel.empty());
 
   // Shade.
-  shade::backward(frame_.raster.colour, frame_.raster.tint, std::span<const int32_t>(frame_.traced.pixel),
-                  std::span<const float>(frame_.traced.weight), frame_.specular_rays, grad_frame.colour,
-                  grad_raster_.colour, grad_raster_.tint, grad_trace_.colour);
+  shade::backward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.traced.weight,
+                  frame_.specular_rays, grad_frame.colour, grad_raster_.colour, grad_raster_.tint,
+                  grad_trace_.colour);
   // Trace and reflect.
   if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, gradient);
   if (frame_.main.count() == 0 || !(trainable.main || trainable.tint || trainable.main_field)) return;
@@ -166,10 +165,12 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   if (faces) {
     surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                                      frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,
-                                     grad_raster_.depth, grad_raster_.median_depth, gradient.camera);
+                                     grad_raster_.depth, grad_raster_.median_depth,
+                                     trainable.camera ? &gradient.camera : nullptr);
   }
   // Rasterise.
   if (options_.depth_ratio == 0) grad_raster_.median_depth.resize({0});
+  grad_raster_input_.wants_camera = trainable.camera;
   raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
                    grad_raster_, grad_raster_input_);
   for (int64_t i = 0; i < grad_frame.main_position.size(); ++i) {
@@ -177,11 +178,11 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   }
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;
   gradient.camera.position += grad_raster_input_.camera.position;
-  const std::vector<uint8_t> drawn = raster::visible(*raster_saved_);
+  raster::visible(*raster_saved_, drawn_);
   for (int64_t i = 0; i < frame_.main.count(); ++i) {
-    const int64_t k = frame_.subset.empty() ? i : frame_.subset[static_cast<size_t>(i)];
+    const int64_t k = frame_.subset.empty() ? i : frame_.subset[i];
     gradient.main_signal[k] = grad_raster_input_.screen_gradient[i];
-    gradient.main_visible[k] = drawn[static_cast<size_t>(i)];
+    gradient.main_visible[k] = drawn_[i];
   }
   // Deform.
   deform::backward(scene.main, field, request.time, frame_.subset, frame_.main, main_saved_,
@@ -191,7 +192,6 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
 
 void Renderer::backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                                  SceneGradient& gradient) {
-  const std::span<const int32_t> pixels(frame_.traced.pixel);
   Tensor<float>* grad_origins = &grad_trace_input_.origins;
   Tensor<float>* grad_directions = &grad_trace_input_.directions;
   if (scene.specular == Specular::environment_map) {
@@ -214,10 +214,10 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
     }
   }
   if (!trainable.main) return;
-  surface::reflection_rays_backward(request.camera, pixels, frame_.raster.depth, frame_.raster.median_depth,
-                                    frame_.raster.normal, options_.depth_ratio, *grad_origins,
-                                    *grad_directions, grad_raster_.depth, grad_raster_.median_depth,
-                                    grad_raster_.normal, gradient.camera);
+  surface::reflection_rays_backward(
+      request.camera, frame_.traced.pixel, frame_.raster.depth, frame_.raster.median_depth,
+      frame_.raster.normal, options_.depth_ratio, *grad_origins, *grad_directions, grad_raster_.depth,
+      grad_raster_.median_depth, grad_raster_.normal, trainable.camera ? &gradient.camera : nullptr);
 }
 
 }  // namespace traceflow

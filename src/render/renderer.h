@@ -42,6 +42,7 @@ class Renderer {
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;
   reflection_map::Saved map_saved_;
+  Tensor<uint8_t> drawn_;               // which posed surfels were drawn
   Tensor<float> origins_, directions_;  // P×3, the mirrored rays
 
   raster::OutputGradient grad_raster_;

@@ -32,8 +32,8 @@ struct Pyramid {
 
 }  // namespace
 
-std::vector<int32_t> surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane,
-                                     float reach) {
+Tensor<int32_t> surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane,
+                                float reach) {
   const Pyramid pyramid(camera);
   const int64_t count = surfels.count();
   std::vector<uint8_t> in_view(static_cast<size_t>(count));
@@ -49,7 +49,7 @@ std::vector<int32_t> surfels_in_view(const Surfels& surfels, const Camera<float>
   for (int64_t i = 0; i < count; ++i) {
     if (in_view[static_cast<size_t>(i)]) indices.push_back(static_cast<int32_t>(i));
   }
-  return indices;
+  return tensor_of(indices);
 }
 
 }  // namespace traceflow

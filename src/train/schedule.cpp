@@ -38,6 +38,7 @@ Trainable Schedule::trainable(int iteration) const {
   t.tint = now != Phase::diffuse;
   t.environment = now != Phase::diffuse;
   t.environment_field = deforms_environment(iteration);
+  t.camera = false;
   return t;
 }
 

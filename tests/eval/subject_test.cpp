@@ -148,7 +148,7 @@ TEST_F(Export, AMissingEnvironmentIsAWarning) {
   std::filesystem::remove(folder_ / "environment.ply");
   const Subject back = read_ply_subject(folder_ / "main.ply", {});
   EXPECT_THAT(back.warning, testing::HasSubstr("environment.ply"));
-  EXPECT_EQ(render(back, camera_in_scene(), 0).traced.pixel.size(), 0U);
+  EXPECT_EQ(render(back, camera_in_scene(), 0).traced.pixel.size(), 0);
 }
 
 TEST_F(Export, NotesFromAHostileFileAreRefused) {

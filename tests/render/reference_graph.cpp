@@ -32,7 +32,7 @@ class Graph {
                             pseudo_);
     specular_.reset({0, 3});
     if (s_.specular) forward_specular();
-    shade::forward(raster_.colour, raster_.tint, std::span<const int32_t>(pixels_), specular_, colour_);
+    shade::forward(raster_.colour, raster_.tint, tensor_of(pixels_), specular_, colour_);
     return losses();
   }
 
@@ -47,12 +47,12 @@ class Graph {
     grad_.tint.reset(raster_.tint.shape());
     const std::vector<float> weights(pixels_.size(), 1.0F);
     Tensor<double> grad_specular;
-    shade::backward(raster_.colour, raster_.tint, std::span<const int32_t>(pixels_),
-                    std::span<const float>(weights), specular_, grad_colour_, grad_.colour, grad_.tint,
-                    grad_specular);
+    shade::backward(raster_.colour, raster_.tint, tensor_of(pixels_), std::span<const float>(weights),
+                    specular_, grad_colour_, grad_.colour, grad_.tint, grad_specular);
     if (s_.specular) backward_specular(grad_specular, g);
     surface::pseudo_normals_backward(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha,
-                                     s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth, g.camera);
+                                     s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth,
+                                     &g.camera);
     raster::BasicInputGradient<double> input;
     raster::backward_reference(main_, p_.camera, s_.raster, grad_, input);
     g.camera.camera_from_world += input.camera.camera_from_world;
@@ -63,8 +63,8 @@ class Graph {
 
   void reflect() {
     pixels_ = all_pixels(p_.camera);
-    surface::reflection_rays(p_.camera, std::span<const int32_t>(pixels_), raster_.depth,
-                             raster_.median_depth, raster_.normal, s_.depth_ratio, origins_, directions_);
+    surface::reflection_rays(p_.camera, tensor_of(pixels_), raster_.depth, raster_.median_depth,
+                             raster_.normal, s_.depth_ratio, origins_, directions_);
   }
   const Tensor<double>& directions() const { return directions_; }
 
@@ -106,10 +106,9 @@ class Graph {
                                  s_.environment_points, s_.time, input.surfels, g.environment,
                                  s_.deform ? &g.environment_field : nullptr);
     }
-    surface::reflection_rays_backward(p_.camera, std::span<const int32_t>(pixels_), raster_.depth,
-                                      raster_.median_depth, raster_.normal, s_.depth_ratio, input.origins,
-                                      input.directions, grad_.depth, grad_.median_depth, grad_.normal,
-                                      g.camera);
+    surface::reflection_rays_backward(p_.camera, tensor_of(pixels_), raster_.depth, raster_.median_depth,
+                                      raster_.normal, s_.depth_ratio, input.origins, input.directions,
+                                      grad_.depth, grad_.median_depth, grad_.normal, &g.camera);
   }
 
   double losses() {

@@ -77,7 +77,7 @@ TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {
   f.request.deform_main = false;
   Renderer renderer(RenderOptions{});
   const Frame& frame = renderer.forward(f.scene, f.request, true);
-  ASSERT_LT(frame.subset.size(), 600U);
+  ASSERT_LT(frame.subset.size(), 600);
   FrameGradient grad_frame;
   grad_frame.colour.reset(frame.colour.shape());
   grad_frame.main_position.reset(frame.main.position.shape());
@@ -87,8 +87,8 @@ TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {
   gradient.reset(f.scene);
   renderer.backward(f.scene, f.request, Trainable{}, grad_frame, gradient);
   Tensor<float> expected(f.scene.main.position.shape());
-  for (size_t i = 0; i < frame.subset.size(); ++i) {
-    std::copy_n(grad_frame.main_position.row(static_cast<int64_t>(i)), 3, expected.row(frame.subset[i]));
+  for (int64_t i = 0; i < frame.subset.size(); ++i) {
+    std::copy_n(grad_frame.main_position.row(i), 3, expected.row(frame.subset[i]));
   }
   expect_equal(gradient.main.position, expected, "position");
 }
@@ -113,7 +113,7 @@ TEST(Renderer, SkippingPixelsThatDoNotReflectChangesTheImageByLessThanHalfAStep)
   Renderer skipping(RenderOptions{});
   const Tensor<float> expected = exact.forward(f.scene, f.request).colour;
   const Frame& frame = skipping.forward(f.scene, f.request);
-  EXPECT_LT(frame.traced.pixel.size(), static_cast<size_t>(64 * 48));
+  EXPECT_LT(frame.traced.pixel.size(), 64 * 48);
   for (int64_t i = 0; i < expected.size(); ++i)
     ASSERT_NEAR(frame.colour[i], expected[i], 1.0F / 512 + 1e-6F) << i;
 }
@@ -125,7 +125,7 @@ TEST(Renderer, ColourIsTheBlendOfItsLayers) {
   const Frame& frame = renderer.forward(f.scene, f.request);
   const Tensor<float> specular = frame.specular_image();
   ASSERT_FALSE(frame.traced.pixel.empty());
-  for (const int32_t p : frame.traced.pixel) {
+  for (const int32_t p : frame.traced.pixel.values()) {
     for (int64_t c = 0; c < 3; ++c) {
       const int64_t i = 3 * int64_t{p} + c;
       const float a = frame.raster.tint[p];

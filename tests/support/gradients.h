@@ -22,6 +22,11 @@ Tensor<T> random_tensor(const Shape& shape, Random& random, double low, double h
   return tensor;
 }
 
+template <class T>
+std::vector<T> list_of(const Tensor<T>& tensor) {
+  return {tensor.values().begin(), tensor.values().end()};
+}
+
 // d value() / d input[i] for every i; value reads `input`.
 template <class F>
 Tensor<double> central_differences(Tensor<double>& input, F&& value, double step = 1e-5) {

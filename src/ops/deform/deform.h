@@ -1,7 +1,5 @@
 #pragma once
 
-#include <span>
-
 #include "ops/field/field.h"
 #include "scene/surfels.h"
 
@@ -21,7 +19,7 @@ struct Saved {
 // Poses the stored surfels whose indices `subset` lists (ascending; empty means all) at `time`. `field` null:
 // F ≡ 0. sh_degree: how many degrees are copied out. saved may be null when no backward follows. A surfel
 // that has a non-finite stored value or residual is posed with opacity 0, so that nothing downstream sees it.
-void forward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
+void forward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
              int sh_degree, field::Precision precision, PosedSurfels& posed, Saved* saved);
 
 // The stored surfels with the residuals of `time` added and no activation: a scene of its own that stands
@@ -30,7 +28,7 @@ Surfels displaced(const Surfels& stored, const Field& field, float time, field::
 
 // Adds to grad_stored (shapes of stored) and to grad_field (null when the forward pass had none or it is
 // frozen). Reads the activated values back from `posed`, the forward pass's output.
-void backward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
+void backward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
               Surfels& grad_stored, Field* grad_field);
 

@@ -15,14 +15,14 @@ using ResidualRow = std::array<float, residual::main_outputs>;
 
 // The subset as a list of stored rows: `at(i)` is posed surfel i's.
 struct Rows {
-  Rows(const Surfels& stored, std::span<const int32_t> listed)
-      : subset(listed), count(listed.empty() ? stored.count() : static_cast<int64_t>(listed.size())) {
-    require(listed.empty() || (listed.front() >= 0 && listed.back() < stored.count()),
+  Rows(const Surfels& stored, const Tensor<int32_t>& listed)
+      : subset(listed), count(listed.empty() ? stored.count() : listed.size()) {
+    require(listed.empty() || (listed[0] >= 0 && listed[listed.size() - 1] < stored.count()),
             "a subset lists stored surfels in ascending order", std::to_string(stored.count()));
   }
-  int64_t at(int64_t i) const { return subset.empty() ? i : subset[static_cast<size_t>(i)]; }
+  int64_t at(int64_t i) const { return subset.empty() ? i : subset[i]; }
 
-  std::span<const int32_t> subset;
+  const Tensor<int32_t>& subset;
   int64_t count;
 };
 
@@ -129,7 +129,7 @@ void add_to_stored(const ResidualRow& grad, const Tensor<float>& grad_sh, int64_
 
 }  // namespace
 
-void forward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
+void forward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
              int sh_degree, field::Precision precision, PosedSurfels& posed, Saved* saved) {
   thread_local Saved unsaved;
   Saved& kept = saved == nullptr ? unsaved : *saved;
@@ -157,7 +157,7 @@ Surfels displaced(const Surfels& stored, const Field& field, float time, field::
   return result;
 }
 
-void backward(const Surfels& stored, const Field* field, float time, std::span<const int32_t> subset,
+void backward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
               Surfels& grad_stored, Field* grad_field) {
   thread_local Tensor<float> scratch;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <span>
-
 #include "base/tensor.h"
 #include "scene/neighbours.h"
 
@@ -16,11 +14,11 @@ namespace traceflow::loss {
 // or anything not finite are left out. rest: N×3; posed: M×3, the surfels that `subset` lists (ascending;
 // empty means all N). Returns the term's value and ADDS weight · dterm/dinput to the gradients, in the order
 // of the edges. The mean of nothing is 0.
-double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, std::span<const int32_t> subset,
+double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tensor<int32_t>& subset,
                 const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,
                 Tensor<float>& grad_posed);
 double rigidity_reference(const Tensor<double>& rest, const Tensor<double>& posed,
-                          std::span<const int32_t> subset, const Neighbours& edges, double strain,
+                          const Tensor<int32_t>& subset, const Neighbours& edges, double strain,
                           double weight, Tensor<double>& grad_rest, Tensor<double>& grad_posed);
 
 }  // namespace traceflow::loss

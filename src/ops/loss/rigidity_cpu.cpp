@@ -33,12 +33,12 @@ Edge measure(const Ends& ends, float reach, float strain2) {
 
 }  // namespace
 
-double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, std::span<const int32_t> subset,
+double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tensor<int32_t>& subset,
                 const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,
                 Tensor<float>& grad_posed) {
   const int64_t k = edges.index.dim(1), count = posed.dim(0);
   const auto strain2 = static_cast<float>(strain * strain);
-  const auto stored = [&](int64_t i) { return subset.empty() ? i : int64_t{subset[static_cast<size_t>(i)]}; };
+  const auto stored = [&](int64_t i) { return subset.empty() ? i : int64_t{subset[i]}; };
   std::vector<int32_t> posed_at(static_cast<size_t>(rest.dim(0)), -1);
   for (int64_t i = 0; i < count; ++i) posed_at[static_cast<size_t>(stored(i))] = static_cast<int32_t>(i);
 

@@ -8,9 +8,9 @@
 namespace traceflow::loss {
 
 double rigidity_reference(const Tensor<double>& rest, const Tensor<double>& posed,
-                          std::span<const int32_t> subset, const Neighbours& edges, double strain,
+                          const Tensor<int32_t>& subset, const Neighbours& edges, double strain,
                           double weight, Tensor<double>& grad_rest, Tensor<double>& grad_posed) {
-  const auto stored = [&](int64_t i) { return subset.empty() ? i : int64_t{subset[static_cast<size_t>(i)]}; };
+  const auto stored = [&](int64_t i) { return subset.empty() ? i : int64_t{subset[i]}; };
   const auto finite = [](const Vec3<double>& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
   };

@@ -75,14 +75,13 @@ void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Op
   chain(surfels, camera, saved, gradient);
 }
 
-std::vector<uint8_t> visible(const Saved& saved) {
-  std::vector<uint8_t> flags(static_cast<size_t>(saved.count));
+void visible(const Saved& saved, Tensor<uint8_t>& flags) {
+  flags.resize({saved.count});
   for (int64_t i = 0; i < saved.count; ++i) {
     const auto begin = saved.touched.data() + saved.entry_begin[i];
     const auto end = saved.touched.data() + saved.entry_begin[i + 1];
-    flags[static_cast<size_t>(i)] = std::any_of(begin, end, [](uint16_t blocks) { return blocks != 0; });
+    flags[i] = std::any_of(begin, end, [](uint16_t blocks) { return blocks != 0; }) ? 1 : 0;
   }
-  return flags;
 }
 
 Work work(const Saved& saved) {

@@ -3,7 +3,6 @@
 #include <array>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "base/options.h"
 #include "base/tensor.h"
@@ -70,6 +69,7 @@ template <class T>
 struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
   CameraGradient<T> camera;
+  bool wants_camera = true;  // false: the camera's gradient is left at zero
   // M, the density-control signal (method §3.6): the norm of dL/d(projected centre) in normalised device
   // units (pixels times half the image size, as 2DGS), low-pass part included. The reference leaves it empty.
   Tensor<T> screen_gradient;
@@ -93,8 +93,8 @@ void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Opt
 void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
               const Saved& saved, const OutputGradient& grad_output, InputGradient& gradient);
 
-// After forward with `saved`: M flags, 1 where the surfel touched at least one pixel's blend.
-std::vector<uint8_t> visible(const Saved& saved);
+// After forward with `saved`: M flags (resized), 1 where the surfel touched at least one pixel's blend.
+void visible(const Saved& saved, Tensor<uint8_t>& flags);
 
 // After forward with `saved`: what its speed is measured in, as pairs of a pixel and a surfel.
 struct Work {

@@ -156,6 +156,7 @@ void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved
     total.camera_from_world += p.camera_from_world;
     total.position += p.position;
   }
+  if (!gradient.wants_camera) total = {};
   gradient.camera = {Mat3<float>(total.camera_from_world), Vec3<float>(total.position)};
 }
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <span>
-
 #include "base/tensor.h"
 
 // Blends the diffuse and the specular image: C = (1 − α_spec)·C_diffuse + α_spec·C_specular (method §6).
@@ -10,16 +8,16 @@
 namespace traceflow::shade {
 
 // diffuse: H×W×3; tint: H×W; pixels: P indices of traced pixels, ascending; specular: P×3. colour: H×W×3,
-// resized.
+// resized. Runs where the pictures are.
 template <class T>
-void forward(const Tensor<T>& diffuse, const Tensor<T>& tint, std::span<const int32_t> pixels,
+void forward(const Tensor<T>& diffuse, const Tensor<T>& tint, const Tensor<int32_t>& pixels,
              const Tensor<T>& specular, Tensor<T>& colour);
 
 // Sets grad_diffuse (H×W×3) and grad_specular (P×3); adds to grad_tint (H×W). weights: P, each traced pixel's
 // gradient weight for tint and specular (1/share for probes, method §4.4).
 template <class T>
-void backward(const Tensor<T>& diffuse, const Tensor<T>& tint, std::span<const int32_t> pixels,
-              std::span<const float> weights, const Tensor<T>& specular, const Tensor<T>& grad_colour,
+void backward(const Tensor<T>& diffuse, const Tensor<T>& tint, const Tensor<int32_t>& pixels,
+              const Tensor<float>& weights, const Tensor<T>& specular, const Tensor<T>& grad_colour,
               Tensor<T>& grad_diffuse, Tensor<T>& grad_tint, Tensor<T>& grad_specular);
 
 }  // namespace traceflow::shade

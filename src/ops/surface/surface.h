@@ -1,8 +1,5 @@
 #pragma once
 
-#include <span>
-#include <vector>
-
 #include "base/options.h"
 #include "base/tensor.h"
 #include "math/camera.h"
@@ -18,18 +15,18 @@ namespace traceflow::surface {
 template <class T>
 void pseudo_normals(const Camera<T>& camera, const Tensor<T>& depth, const Tensor<T>& median_depth,
                     const Tensor<T>& alpha, T depth_ratio, Tensor<T>& normal);
-// Adds to grad_depth, grad_median_depth (H×W) and grad_camera. A pixel whose own gradient is not finite
-// passes none on.
+// Adds to grad_depth, grad_median_depth (H×W) and, unless it is null, grad_camera. A pixel whose own gradient
+// is not finite passes none on.
 template <class T>
 void pseudo_normals_backward(const Camera<T>& camera, const Tensor<T>& depth, const Tensor<T>& median_depth,
                              const Tensor<T>& alpha, T depth_ratio, const Tensor<T>& grad_normal,
                              Tensor<T>& grad_depth, Tensor<T>& grad_median_depth,
-                             CameraGradient<T>& grad_camera);
+                             CameraGradient<T>* grad_camera);
 
 // Which pixels are traced (method §4.4), ascending, and the weight of each one's gradient.
 struct TracedPixels {
-  std::vector<int32_t> pixel;  // row-major index
-  std::vector<float> weight;   // 1, or 1/share for pixels drawn at random
+  Tensor<int32_t> pixel;  // row-major index
+  Tensor<float> weight;   // 1, or 1/share for pixels drawn at random
 };
 
 struct SelectOptions {
@@ -58,16 +55,16 @@ TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint
 // depths, normal, camera pose. Where the normal is zero or something is not finite the direction is zero,
 // which every tracer answers with its background.
 template <class T>
-void reflection_rays(const Camera<T>& camera, std::span<const int32_t> pixels, const Tensor<T>& depth,
+void reflection_rays(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
                      const Tensor<T>& median_depth, const Tensor<T>& normal, T depth_ratio,
                      Tensor<T>& origins, Tensor<T>& directions);
-// Adds to grad_depth, grad_median_depth, grad_normal and grad_camera. A ray whose gradient is not finite
-// passes none on.
+// Adds to grad_depth, grad_median_depth, grad_normal and, unless it is null, grad_camera. A ray whose
+// gradient is not finite passes none on.
 template <class T>
-void reflection_rays_backward(const Camera<T>& camera, std::span<const int32_t> pixels,
-                              const Tensor<T>& depth, const Tensor<T>& median_depth, const Tensor<T>& normal,
-                              T depth_ratio, const Tensor<T>& grad_origins, const Tensor<T>& grad_directions,
+void reflection_rays_backward(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
+                              const Tensor<T>& median_depth, const Tensor<T>& normal, T depth_ratio,
+                              const Tensor<T>& grad_origins, const Tensor<T>& grad_directions,
                               Tensor<T>& grad_depth, Tensor<T>& grad_median_depth, Tensor<T>& grad_normal,
-                              CameraGradient<T>& grad_camera);
+                              CameraGradient<T>* grad_camera);
 
 }  // namespace traceflow::surface

@@ -123,7 +123,7 @@ template <class T>
 void pseudo_normals_backward(const Camera<T>& camera, const Tensor<T>& depth, const Tensor<T>& median_depth,
                              const Tensor<T>& alpha, T depth_ratio, const Tensor<T>& grad_normal,
                              Tensor<T>& grad_depth, Tensor<T>& grad_median_depth,
-                             CameraGradient<T>& grad_camera) {
+                             CameraGradient<T>* grad_camera) {
   const DepthImage<T> image = checked(camera, depth, median_depth, alpha, depth_ratio);
   const int64_t height = image.height(), width = image.width();
   require(grad_normal.shape() == Shape({height, width, 3}) && grad_depth.shape() == depth.shape() &&
@@ -153,7 +153,7 @@ void pseudo_normals_backward(const Camera<T>& camera, const Tensor<T>& depth, co
     }
     partial[static_cast<size_t>(begin / band_rows)] = sum;
   });
-  add_in_order(partial, grad_camera);
+  if (grad_camera != nullptr) add_in_order(partial, *grad_camera);
 }
 
 template void pseudo_normals(const Camera<float>&, const Tensor<float>&, const Tensor<float>&,
@@ -162,9 +162,9 @@ template void pseudo_normals(const Camera<double>&, const Tensor<double>&, const
                              const Tensor<double>&, double, Tensor<double>&);
 template void pseudo_normals_backward(const Camera<float>&, const Tensor<float>&, const Tensor<float>&,
                                       const Tensor<float>&, float, const Tensor<float>&, Tensor<float>&,
-                                      Tensor<float>&, CameraGradient<float>&);
+                                      Tensor<float>&, CameraGradient<float>*);
 template void pseudo_normals_backward(const Camera<double>&, const Tensor<double>&, const Tensor<double>&,
                                       const Tensor<double>&, double, const Tensor<double>&, Tensor<double>&,
-                                      Tensor<double>&, CameraGradient<double>&);
+                                      Tensor<double>&, CameraGradient<double>*);
 
 }  // namespace traceflow::surface

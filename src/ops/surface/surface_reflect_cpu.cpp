@@ -11,7 +11,7 @@ namespace {
 constexpr int64_t rays_per_block = 2048;
 
 template <class T>
-void check_shapes(const Camera<T>& camera, std::span<const int32_t> pixels, const Tensor<T>& depth,
+void check_shapes(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
                   const Tensor<T>& median_depth, const Tensor<T>& normal) {
   require(depth.shape() == Shape({camera.height, camera.width}) && median_depth.shape() == depth.shape() &&
               normal.shape() == Shape({camera.height, camera.width, 3}),
@@ -22,17 +22,17 @@ void check_shapes(const Camera<T>& camera, std::span<const int32_t> pixels, cons
 }  // namespace
 
 template <class T>
-void reflection_rays(const Camera<T>& camera, std::span<const int32_t> pixels, const Tensor<T>& depth,
+void reflection_rays(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
                      const Tensor<T>& median_depth, const Tensor<T>& normal, T depth_ratio,
                      Tensor<T>& origins, Tensor<T>& directions) {
   check_shapes(camera, pixels, depth, median_depth, normal);
-  const auto count = static_cast<int64_t>(pixels.size());
+  const auto count = pixels.size();
   origins.resize({count, 3});
   directions.resize({count, 3});
   parallel_for(
       "surface: reflection rays", count,
       [&](int64_t i) {
-        const int64_t pixel = pixels[static_cast<size_t>(i)];
+        const int64_t pixel = pixels[i];
         const Vec3<T> ray = pixel_ray(camera, pixel / camera.width, pixel % camera.width);
         const T z = surface_depth(depth[pixel], median_depth[pixel], depth_ratio);
         const Vec3<T> origin = camera.position + z * ray;
@@ -44,13 +44,13 @@ void reflection_rays(const Camera<T>& camera, std::span<const int32_t> pixels, c
 }
 
 template <class T>
-void reflection_rays_backward(const Camera<T>& camera, std::span<const int32_t> pixels,
-                              const Tensor<T>& depth, const Tensor<T>& median_depth, const Tensor<T>& normal,
-                              T depth_ratio, const Tensor<T>& grad_origins, const Tensor<T>& grad_directions,
+void reflection_rays_backward(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
+                              const Tensor<T>& median_depth, const Tensor<T>& normal, T depth_ratio,
+                              const Tensor<T>& grad_origins, const Tensor<T>& grad_directions,
                               Tensor<T>& grad_depth, Tensor<T>& grad_median_depth, Tensor<T>& grad_normal,
-                              CameraGradient<T>& grad_camera) {
+                              CameraGradient<T>* grad_camera) {
   check_shapes(camera, pixels, depth, median_depth, normal);
-  const auto count = static_cast<int64_t>(pixels.size());
+  const auto count = pixels.size();
   require(grad_origins.shape() == Shape({count, 3}) && grad_directions.shape() == grad_origins.shape() &&
               grad_depth.shape() == depth.shape() && grad_median_depth.shape() == depth.shape() &&
               grad_normal.shape() == normal.shape(),
@@ -60,7 +60,7 @@ void reflection_rays_backward(const Camera<T>& camera, std::span<const int32_t> 
                   [&](int64_t begin, int64_t end) {
                     CameraGradient<T> sum;
                     for (int64_t i = begin; i < end; ++i) {
-                      const int64_t pixel = pixels[static_cast<size_t>(i)];
+                      const int64_t pixel = pixels[i];
                       const int64_t row = pixel / camera.width, column = pixel % camera.width;
                       const Vec3<T> ray = pixel_ray(camera, row, column);
                       const T z = surface_depth(depth[pixel], median_depth[pixel], depth_ratio);
@@ -80,22 +80,22 @@ void reflection_rays_backward(const Camera<T>& camera, std::span<const int32_t> 
                     }
                     partial[static_cast<size_t>(begin / rays_per_block)] = sum;
                   });
-  add_in_order(partial, grad_camera);
+  if (grad_camera != nullptr) add_in_order(partial, *grad_camera);
 }
 
-template void reflection_rays(const Camera<float>&, std::span<const int32_t>, const Tensor<float>&,
+template void reflection_rays(const Camera<float>&, const Tensor<int32_t>&, const Tensor<float>&,
                               const Tensor<float>&, const Tensor<float>&, float, Tensor<float>&,
                               Tensor<float>&);
-template void reflection_rays(const Camera<double>&, std::span<const int32_t>, const Tensor<double>&,
+template void reflection_rays(const Camera<double>&, const Tensor<int32_t>&, const Tensor<double>&,
                               const Tensor<double>&, const Tensor<double>&, double, Tensor<double>&,
                               Tensor<double>&);
-template void reflection_rays_backward(const Camera<float>&, std::span<const int32_t>, const Tensor<float>&,
+template void reflection_rays_backward(const Camera<float>&, const Tensor<int32_t>&, const Tensor<float>&,
                                        const Tensor<float>&, const Tensor<float>&, float,
                                        const Tensor<float>&, const Tensor<float>&, Tensor<float>&,
-                                       Tensor<float>&, Tensor<float>&, CameraGradient<float>&);
-template void reflection_rays_backward(const Camera<double>&, std::span<const int32_t>, const Tensor<double>&,
+                                       Tensor<float>&, Tensor<float>&, CameraGradient<float>*);
+template void reflection_rays_backward(const Camera<double>&, const Tensor<int32_t>&, const Tensor<double>&,
                                        const Tensor<double>&, const Tensor<double>&, double,
                                        const Tensor<double>&, const Tensor<double>&, Tensor<double>&,
-                                       Tensor<double>&, Tensor<double>&, CameraGradient<double>&);
+                                       Tensor<double>&, Tensor<double>&, CameraGradient<double>*);
 
 }  // namespace traceflow::surface

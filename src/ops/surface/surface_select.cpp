@@ -26,7 +26,8 @@ TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint
                            const SelectOptions& options, bool probes, uint64_t seed) {
   require(tint.shape() == alpha.shape() && normal.size() == 3 * alpha.size(),
           "alpha, tint and normal show the same picture", alpha.shape().to_string());
-  TracedPixels traced;
+  std::vector<int32_t> pixels;
+  std::vector<float> weights;
   for (int64_t pixel = 0; pixel < alpha.size(); ++pixel) {
     if (!(alpha[pixel] >= options.min_alpha)) continue;
     const Vec3<float> n = load3<float>(normal.data() + 3 * pixel);
@@ -34,10 +35,10 @@ TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint
     const bool matters = tint[pixel] >= options.min_tint;
     const bool probe = !matters && probes && hashed_uniform(seed, pixel) < options.probe_share;
     if (!matters && !probe) continue;
-    traced.pixel.push_back(static_cast<int32_t>(pixel));
-    traced.weight.push_back(matters ? 1.0F : 1.0F / options.probe_share);
+    pixels.push_back(static_cast<int32_t>(pixel));
+    weights.push_back(matters ? 1.0F : 1.0F / options.probe_share);
   }
-  return traced;
+  return {tensor_of(pixels), tensor_of(weights)};
 }
 
 }  // namespace traceflow::surface

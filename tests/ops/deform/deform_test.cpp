@@ -28,7 +28,7 @@ struct Pass {
   Field grad_field;
 };
 
-Pass run(const Surfels& stored, const Field* field, std::span<const int32_t> subset = {}, int sh_degree = 3,
+Pass run(const Surfels& stored, const Field* field, const Tensor<int32_t>& subset = {}, int sh_degree = 3,
          Precision precision = Precision::fp32) {
   Pass pass;
   deform::Saved saved;
@@ -118,7 +118,7 @@ TEST(Deform, ASubsetIsASliceOfTheWhole) {
   std::vector<int32_t> subset;
   for (int32_t i = 3; i < 1500; i += i % 5 + 1) subset.push_back(i);
   const Pass whole = run(stored, &field);
-  const Pass part = run(stored, &field, subset);
+  const Pass part = run(stored, &field, tensor_of(subset));
   const auto count = static_cast<int64_t>(subset.size());
   ASSERT_EQ(part.posed.count(), count);
 
@@ -141,7 +141,7 @@ TEST(Deform, ASubsetsGradientIsScatteredToItsRows) {
   const Field field = testing::random_field(small, residual::main_outputs);
   std::vector<int32_t> subset(100);
   std::iota(subset.begin(), subset.end(), 120);
-  const Pass part = run(stored, &field, subset);
+  const Pass part = run(stored, &field, tensor_of(subset));
 
   deform::Saved saved;
   PosedSurfels posed, grad_posed;
@@ -292,7 +292,7 @@ TEST(DeformHostile, NoSurfelsAndOneSurfel) {
 TEST(DeformHostile, ASubsetBeyondTheSurfelsIsRefused) {
   const Surfels stored = random_surfels(10, true);
   const std::vector<int32_t> subset = {3, 10};
-  EXPECT_THROW(run(stored, nullptr, subset), InternalError);
+  EXPECT_THROW(run(stored, nullptr, tensor_of(subset)), InternalError);
 }
 
 }  // namespace

@@ -43,7 +43,8 @@ struct Gradients {
 
 Gradients reference(const Cloud& c, double weight = 1) {
   Gradients g{0, Tensor<double>(c.rest.shape()), Tensor<double>(c.posed.shape())};
-  g.value = rigidity_reference(c.rest, c.posed, c.subset, c.edges, strain, weight, g.rest, g.posed);
+  g.value =
+      rigidity_reference(c.rest, c.posed, tensor_of(c.subset), c.edges, strain, weight, g.rest, g.posed);
   return g;
 }
 
@@ -54,8 +55,8 @@ struct FastGradients {
 
 FastGradients fast(const Cloud& c, double weight = 1) {
   FastGradients g{0, Tensor<float>(c.rest.shape()), Tensor<float>(c.posed.shape())};
-  g.value = rigidity(convert<float>(c.rest), convert<float>(c.posed), c.subset, c.edges, strain, weight,
-                     g.rest, g.posed);
+  g.value = rigidity(convert<float>(c.rest), convert<float>(c.posed), tensor_of(c.subset), c.edges, strain,
+                     weight, g.rest, g.posed);
   return g;
 }
 

@@ -150,7 +150,8 @@ TEST_P(Orders, a_surfel_without_opacity_is_absent) {
   run(with, options(), a);
   run(without, options(), b);
   expect_same_bytes(a, b);
-  const auto flags = visible(*a.saved);
+  Tensor<uint8_t> flags;
+  visible(*a.saved, flags);
   for (size_t i = 0; i < flags.size(); i += 2) EXPECT_EQ(flags[i], 0);
 }
 
@@ -171,7 +172,8 @@ TEST_P(Orders, alpha_stays_within_zero_and_one) {
 TEST_P(Orders, visible_marks_the_surfels_that_have_a_gradient) {
   Result result;
   run(scene_of(8), options(), result);
-  const auto flags = visible(*result.saved);
+  Tensor<uint8_t> flags;
+  visible(*result.saved, flags);
   int64_t seen = 0;
   for (int64_t i = 0; i < result.gradient.surfels.count(); ++i) {
     const float g = std::abs(result.gradient.surfels.tint[i]);
@@ -320,7 +322,9 @@ TEST_P(Orders, draw_nothing_from_nothing) {
   run(scene, options(), result);
   EXPECT_EQ(result.output.colour(3, 4, 1), options().background.y);
   EXPECT_EQ(result.output.alpha(3, 4), 0);
-  EXPECT_TRUE(visible(*result.saved).empty());
+  Tensor<uint8_t> flags;
+  visible(*result.saved, flags);
+  EXPECT_TRUE(flags.empty());
   scene = scene_of(1);
   scene.camera.width = 0;
   run(scene, options(), result);

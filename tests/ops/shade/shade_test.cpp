@@ -28,7 +28,7 @@ struct Picture {
 
   Tensor<T> colour() const {
     Tensor<T> out;
-    forward(diffuse, tint, std::span(pixels), specular, out);
+    forward(diffuse, tint, tensor_of(pixels), specular, out);
     return out;
   }
 
@@ -36,7 +36,7 @@ struct Picture {
   std::vector<Tensor<T>> gradients(const Tensor<T>& grad_colour) const {
     Tensor<T> grad_diffuse, grad_specular, grad_tint(tint.shape());
     grad_tint.fill(1);
-    backward(diffuse, tint, std::span(pixels), std::span(weights), specular, grad_colour, grad_diffuse,
+    backward(diffuse, tint, tensor_of(pixels), tensor_of(weights), specular, grad_colour, grad_diffuse,
              grad_tint, grad_specular);
     return {grad_diffuse, grad_tint, grad_specular};
   }
@@ -48,7 +48,7 @@ TEST(Shade, BlendsTracedPixelsAndLeavesTheOthers) {
   tint.fill(0.25F);
   specular.fill(1.0F);
   const std::vector<int32_t> pixels{1};
-  forward(diffuse, tint, std::span(pixels), specular, colour);
+  forward(diffuse, tint, tensor_of(pixels), specular, colour);
   for (int64_t i = 0; i < 9; ++i) EXPECT_FLOAT_EQ(colour[i], i / 3 == 1 ? 0.625F : 0.5F);
 }
 

@@ -24,7 +24,7 @@ Gradients<T> gradients_of(const SurfaceScene& s, const Tensor<double>& grad_norm
   Gradients<T> g{Tensor<T>(s.depth.shape()), Tensor<T>(s.depth.shape()), {}};
   pseudo_normals_backward(convert<T>(s.camera), convert<T>(s.depth), convert<T>(s.median_depth),
                           convert<T>(s.alpha), static_cast<T>(s.depth_ratio), convert<T>(grad_normal),
-                          g.depth, g.median_depth, g.camera);
+                          g.depth, g.median_depth, &g.camera);
   return g;
 }
 

@@ -14,7 +14,7 @@ struct Rays {
 
 Rays rays_of(const SurfaceScene& s, const std::vector<int32_t>& pixels) {
   Rays rays;
-  reflection_rays(s.camera, std::span(pixels), s.depth, s.median_depth, s.normal, s.depth_ratio, rays.origins,
+  reflection_rays(s.camera, tensor_of(pixels), s.depth, s.median_depth, s.normal, s.depth_ratio, rays.origins,
                   rays.directions);
   return rays;
 }
@@ -35,10 +35,10 @@ template <class T>
 Gradients<T> gradients_of(const SurfaceScene& s, const std::vector<int32_t>& pixels,
                           const Tensor<double>& grad_origins, const Tensor<double>& grad_directions) {
   Gradients<T> g{Tensor<T>(s.depth.shape()), Tensor<T>(s.depth.shape()), Tensor<T>(s.normal.shape()), {}};
-  reflection_rays_backward(convert<T>(s.camera), std::span(pixels), convert<T>(s.depth),
+  reflection_rays_backward(convert<T>(s.camera), tensor_of(pixels), convert<T>(s.depth),
                            convert<T>(s.median_depth), convert<T>(s.normal), static_cast<T>(s.depth_ratio),
                            convert<T>(grad_origins), convert<T>(grad_directions), g.depth, g.median_depth,
-                           g.normal, g.camera);
+                           g.normal, &g.camera);
   return g;
 }
 
@@ -76,7 +76,7 @@ TEST(ReflectionRays, FloatAgreesWithDouble) {
   const auto pixels = some_pixels(s);
   const Rays plain = rays_of(s, pixels);
   Tensor<float> origins, directions;
-  reflection_rays(convert<float>(s.camera), std::span(pixels), convert<float>(s.depth),
+  reflection_rays(convert<float>(s.camera), tensor_of(pixels), convert<float>(s.depth),
                   convert<float>(s.median_depth), convert<float>(s.normal), static_cast<float>(s.depth_ratio),
                   origins, directions);
   expect_close(origins, plain.origins, 1e-5, "origins");

@@ -29,8 +29,8 @@ TEST(SelectPixels, RenderingTracesExactlyWhatMatters) {
   for (int32_t i = 0; i < 10000; ++i) {
     if (layers.tint[i] >= options.min_tint && i != 9000 && i != 9001) expected.push_back(i);
   }
-  EXPECT_EQ(traced.pixel, expected);
-  EXPECT_EQ(traced.weight, std::vector<float>(expected.size(), 1));
+  EXPECT_EQ(list_of(traced.pixel), expected);
+  EXPECT_EQ(list_of(traced.weight), std::vector<float>(expected.size(), 1));
 }
 
 // Oracle: the number of probes is binomial(5000, share); six standard deviations either way. Their weights
@@ -42,7 +42,7 @@ TEST(SelectPixels, ProbesAreTheirShareOfTheRest) {
     const Layers layers(options);
     const TracedPixels traced = select_pixels(layers.alpha, layers.tint, layers.normal, options, true, 7);
     double probes = 0;
-    for (size_t k = 0; k < traced.pixel.size(); ++k) {
+    for (int64_t k = 0; k < traced.pixel.size(); ++k) {
       const bool matters = layers.tint[traced.pixel[k]] >= options.min_tint;
       EXPECT_FLOAT_EQ(traced.weight[k], matters ? 1 : 1 / share);
       probes += matters ? 0 : 1;
@@ -55,7 +55,7 @@ TEST(SelectPixels, DrawsDependOnTheSeedAndOnThePixelAlone) {
   const SelectOptions options;
   Layers layers(options);
   const auto draw = [&](uint64_t seed) {
-    return select_pixels(layers.alpha, layers.tint, layers.normal, options, true, seed).pixel;
+    return list_of(select_pixels(layers.alpha, layers.tint, layers.normal, options, true, seed).pixel);
   };
   const auto first = draw(1);
   EXPECT_EQ(first, draw(1));
@@ -68,9 +68,9 @@ TEST(SelectPixels, ShareZeroDrawsNoneAndShareOneDrawsAll) {
   SelectOptions options;
   options.probe_share = 0;
   const Layers layers(options);
-  EXPECT_EQ(select_pixels(layers.alpha, layers.tint, layers.normal, options, true, 1).pixel.size(), 5000U);
+  EXPECT_EQ(select_pixels(layers.alpha, layers.tint, layers.normal, options, true, 1).pixel.size(), 5000);
   options.probe_share = 1;
-  EXPECT_EQ(select_pixels(layers.alpha, layers.tint, layers.normal, options, true, 1).pixel.size(), 10000U);
+  EXPECT_EQ(select_pixels(layers.alpha, layers.tint, layers.normal, options, true, 1).pixel.size(), 10000);
 }
 
 TEST(SelectPixels, HostilePixelsAreNotTraced) {
@@ -84,7 +84,7 @@ TEST(SelectPixels, HostilePixelsAreNotTraced) {
   layers.normal[3 * 3] = nan;
   layers.normal[3 * 4 + 2] = std::numeric_limits<float>::infinity();
   const TracedPixels traced = select_pixels(layers.alpha, layers.tint, layers.normal, options, true, 1);
-  EXPECT_EQ(traced.pixel.size(), 9996U);
+  EXPECT_EQ(traced.pixel.size(), 9996);
   EXPECT_EQ(traced.pixel[1], 5);
   EXPECT_TRUE(select_pixels({}, {}, {}, options, true, 1).pixel.empty());
   EXPECT_THROW(select_pixels(layers.alpha, Tensor<float>({3}), layers.normal, options, true, 1),

@@ -1,0 +1,53 @@
+#include "base/device_memory.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "base/error.h"
+
+namespace traceflow::memory {
+
+namespace {
+
+constexpr std::align_val_t alignment{64};
+
+}  // namespace
+
+OutOfMemory::OutOfMemory(size_t wanted, size_t available)
+    : text_("out of device memory: " + std::to_string(wanted >> 20) + " MiB wanted, " +
+            std::to_string(available >> 20) + " MiB free") {}
+
+void* allocate(Device device, size_t bytes) {
+  if (device == Device::cpu) return ::operator new(bytes, alignment);
+  require(cuda::allocate != nullptr, "tensors are put on the CUDA device by programs built with CUDA");
+  return cuda::allocate(bytes);
+}
+
+void release(Device device, void* memory) noexcept {
+  if (memory == nullptr) return;
+  if (device == Device::cpu) {
+    ::operator delete(memory, alignment);
+  } else {
+    cuda::release(memory);
+  }
+}
+
+void copy(Device to_device, void* to, Device from_device, const void* from, size_t bytes) {
+  if (bytes == 0) return;
+  if (to_device == Device::cpu && from_device == Device::cpu) {
+    std::memcpy(to, from, bytes);
+  } else {
+    cuda::copy(to_device, to, from_device, from, bytes);
+  }
+}
+
+void zero(Device device, void* memory, size_t bytes) {
+  if (bytes == 0) return;
+  if (device == Device::cpu) {
+    std::memset(memory, 0, bytes);
+  } else {
+    cuda::zero(memory, bytes);
+  }
+}
+
+}  // namespace traceflow::memory

@@ -1,0 +1,114 @@
+#include "emulation/device.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+#include <iterator>
+#include <map>
+
+#include "base/device_memory.h"
+#include "base/error.h"
+#include "emulation/grid.h"
+
+namespace traceflow::emulation {
+
+namespace {
+
+class Region {
+ public:
+  Region() {
+    void* const memory =
+        mmap(nullptr, region_bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    require(memory != MAP_FAILED, "the emulated device has memory");
+    begin_ = static_cast<std::byte*>(memory);
+  }
+
+  // First fit.
+  void* allocate(size_t bytes) {
+    const size_t size = (std::max<size_t>(bytes, 1) + page - 1) / page * page;
+    if (allocated_ + size > limit_) throw memory::OutOfMemory(bytes, limit_ - std::min(limit_, allocated_));
+    size_t place = 0;
+    for (const auto& [begin, length] : blocks_) {
+      if (begin - place >= size) break;
+      place = begin + length;
+    }
+    require(place + size <= region_bytes, "the emulated device's region holds what its limit allows");
+    blocks_[place] = size;
+    allocated_ += size;
+    const DeviceAccess access;
+    used_ = std::max(used_, place + size);
+    protect(PROT_READ | PROT_WRITE);
+    std::memset(begin_ + place, 0xff, size);
+    return begin_ + place;
+  }
+  void release(void* memory) {
+    const auto found = blocks_.find(static_cast<size_t>(static_cast<std::byte*>(memory) - begin_));
+    require(found != blocks_.end(), "memory is given back once");
+    allocated_ -= found->second;
+    blocks_.erase(found);
+  }
+  void open() {
+    if (++depth_ == 1) protect(PROT_READ | PROT_WRITE);
+  }
+  void close() {
+    if (--depth_ == 0) protect(PROT_NONE);
+  }
+  size_t allocated() const { return allocated_; }
+  void limit(size_t limit) { limit_ = limit; }
+
+ private:
+  static constexpr size_t region_bytes = size_t{4} << 30;
+  static constexpr size_t page = 4096;
+
+  void protect(int access) {
+    if (used_ > 0)
+      require(mprotect(begin_, used_, access) == 0, "the emulated device's memory opens and closes");
+  }
+
+  std::byte* begin_ = nullptr;
+  std::map<size_t, size_t> blocks_;  // place → size
+  size_t used_ = 0, allocated_ = 0, limit_ = region_bytes;
+  int depth_ = 0;
+};
+
+Region& region() {
+  static Region* const the_region = new Region;  // outlives every static tensor
+  return *the_region;
+}
+
+}  // namespace
+
+DeviceAccess::DeviceAccess() { region().open(); }
+DeviceAccess::~DeviceAccess() { region().close(); }
+
+size_t allocated_bytes() { return region().allocated(); }
+void limit_bytes(size_t limit) { region().limit(limit); }
+
+void launch(const char* kernel, unsigned blocks, unsigned threads, const std::function<void()>& thread) {
+  const DeviceAccess access;
+  run_grid(kernel, {blocks, 1, 1}, {threads, 1, 1}, thread);
+}
+
+}  // namespace traceflow::emulation
+
+namespace traceflow::cuda {
+
+bool answers(std::string&) { return true; }
+DeviceFacts facts() {
+  return {"emulation", 0, 0, size_t{4} << 30, (size_t{4} << 30) - emulation::allocated_bytes()};
+}
+void* allocate(size_t bytes) { return bytes == 0 ? nullptr : emulation::region().allocate(bytes); }
+void release(void* memory) noexcept { emulation::region().release(memory); }
+void copy(Device, void* to, Device, const void* from, size_t bytes) {
+  const emulation::DeviceAccess access;
+  std::memcpy(to, from, bytes);
+}
+void zero(void* memory, size_t bytes) {
+  const emulation::DeviceAccess access;
+  std::memset(memory, 0, bytes);
+}
+void synchronise() {}
+
+}  // namespace traceflow::cuda
