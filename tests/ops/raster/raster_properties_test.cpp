@@ -152,7 +152,7 @@ TEST_P(Orders, a_surfel_without_opacity_is_absent) {
   expect_same_bytes(a, b);
   Tensor<uint8_t> flags;
   visible(*a.saved, flags);
-  for (size_t i = 0; i < flags.size(); i += 2) EXPECT_EQ(flags[i], 0);
+  for (int64_t i = 0; i < flags.size(); i += 2) EXPECT_EQ(flags[i], 0);
 }
 
 TEST_P(Orders, alpha_stays_within_zero_and_one) {
@@ -177,8 +177,8 @@ TEST_P(Orders, visible_marks_the_surfels_that_have_a_gradient) {
   int64_t seen = 0;
   for (int64_t i = 0; i < result.gradient.surfels.count(); ++i) {
     const float g = std::abs(result.gradient.surfels.tint[i]);
-    EXPECT_EQ(g != 0, flags[static_cast<size_t>(i)] != 0) << i;
-    seen += flags[static_cast<size_t>(i)];
+    EXPECT_EQ(g != 0, flags[i] != 0) << i;
+    seen += flags[i];
   }
   EXPECT_GT(seen, 20);
   EXPECT_LT(seen, result.gradient.surfels.count());
