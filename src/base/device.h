@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string_view>
 
 // Marks a function that runs on the host and, when compiled by nvcc, on the device too.
@@ -20,6 +21,14 @@
 #define TRACEFLOW_ALWAYS_INLINE inline __attribute__((always_inline))
 
 namespace traceflow {
+
+// Fetches bytes into the host's cache; nothing on a device.
+TRACEFLOW_HD inline void prefetch([[maybe_unused]] const void* begin, [[maybe_unused]] int64_t bytes) {
+#if !defined(__CUDA_ARCH__)
+  constexpr int64_t line = 64;
+  for (int64_t at = 0; at < bytes; at += line) __builtin_prefetch(static_cast<const char*>(begin) + at);
+#endif
+}
 
 // Where a tensor lives and where the op that reads it runs.
 enum class Device { cpu, cuda };

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "base/parallel.h"
+#include "ops/raster/raster_cuda.h"
 #include "ops/raster/raster_kernels.h"
 
 namespace traceflow::raster {
@@ -60,8 +62,13 @@ void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Opt
   Saved local;
   Saved& kept = saved != nullptr ? *saved : local;
   prepare(surfels, camera, options, kept);
-  bin(options.sort, kept);
-  blend(options, output, kept);
+  if (surfels.position.device() == Device::cuda) {
+    cuda_stage::bin(options.sort, kept);
+    cuda_stage::blend(options, output, kept);
+  } else {
+    bin(options.sort, kept);
+    blend(options, output, kept);
+  }
 }
 
 void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
@@ -71,23 +78,26 @@ void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Op
   require(saved.count == surfels.count() && saved.width == camera.width && saved.height == camera.height,
           "backward follows forward of the same surfels and camera", std::to_string(surfels.count()));
   check_gradient(grad_output, int64_t{camera.width} * camera.height);
-  blend_backward(options, saved, grad_output);
+  if (surfels.position.device() == Device::cuda) {
+    cuda_stage::blend_backward(options, saved, grad_output);
+  } else {
+    blend_backward(options, saved, grad_output);
+  }
   chain(surfels, camera, saved, gradient);
 }
 
 void visible(const Saved& saved, Tensor<uint8_t>& flags) {
-  flags.resize({saved.count});
-  for (int64_t i = 0; i < saved.count; ++i) {
-    const auto begin = saved.touched.data() + saved.entry_begin[i];
-    const auto end = saved.touched.data() + saved.entry_begin[i + 1];
-    flags[i] = std::any_of(begin, end, [](uint16_t blocks) { return blocks != 0; }) ? 1 : 0;
-  }
+  const Device device = saved.splats.device();
+  flags.place(device).resize({saved.count});
+  parallel_for(device, "raster: visible", saved.count,
+               IsVisible{saved.entry_begin.data(), saved.touched.data(), flags.data()});
 }
 
 Work work(const Saved& saved) {
+  const Tensor<uint16_t> touched = saved.touched.on(Device::cpu);
   Work result;
-  for (const uint16_t touched : saved.touched.values())
-    result.evaluated += std::popcount(touched) * pixels_per_block;
+  for (int64_t entry = 0; entry < saved.entries.size(); ++entry)
+    result.evaluated += std::popcount(touched[entry]) * pixels_per_block;
   result.listed = saved.entries.size() * pixels_per_tile;
   return result;
 }

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <hwy/cache_control.h>
-
 #include <cstdint>
 
 #include "math/surfel_hit.h"
@@ -49,7 +47,7 @@ static_assert(sizeof(Splat) == 128);
 struct Bounds {
   int32_t tile_x0 = 0, tile_x1 = 0, tile_y0 = 0, tile_y1 = 0;
 
-  int64_t tiles() const { return int64_t{tile_x1 - tile_x0} * (tile_y1 - tile_y0); }
+  TRACEFLOW_HD int64_t tiles() const { return int64_t{tile_x1 - tile_x0} * (tile_y1 - tile_y0); }
 };
 
 // A surfel in a tile's list.
@@ -99,13 +97,27 @@ struct Saved {
   Tensor<uint32_t> tile_begin;   // by tile, and one more
   Tensor<TileEntry> entries;     // by tile; front to back for sort = centre, by index for sort = hit
   Tensor<uint16_t> touched;      // by entry: bit b where a pixel of block b blended the surfel
-  Tensor<SavedBlock> blocks;     // by tile, then block
+  Tensor<SavedBlock> blocks;     // by tile, then block; on the CPU
+
+  // What forward leaves at a pixel on the CUDA device, H×W each, as in SavedBlock.
+  struct Pixels {
+    Tensor<float> transmittance, alpha, depth, m, m2, inverse_z;
+    Tensor<int32_t> last;    // for sort = hit: how many hits were blended
+    Tensor<int32_t> median;  // for sort = hit: which of them
+  } pixels;
 
   // Memory of bin() and backward, kept for the next call.
   struct Scratch {
     Tensor<uint64_t> keys, keys_sorted;
     Tensor<uint32_t> tile_counts;
     Tensor<SplatGradient> gradients;  // by entry
+    // On the CUDA device.
+    Tensor<uint32_t> depth_keys, depth_keys_sorted, surfels, surfels_sorted;
+    Tensor<int32_t> counts, offsets;
+    Tensor<uint32_t> tile_keys, tile_keys_sorted, places, places_sorted;
+    Tensor<TileEntry> unsorted;
+    Tensor<CameraGradient<double>> camera;
+    Tensor<uint8_t> bytes;
   };
   mutable Scratch scratch;
 
@@ -119,31 +131,33 @@ struct TileMemory {
 
 // The limits of the kernels' loops, as they stand in Options.
 struct KernelOptions {
+  float alpha_min;
   float alpha_max;
   float transmittance_min;
   float m_scale;  // far·near/(far - near)
   Vec3<float> background;
 
   explicit KernelOptions(const Options& o)
-      : alpha_max(o.alpha_max),
+      : alpha_min(o.alpha_min),
+        alpha_max(o.alpha_max),
         transmittance_min(o.transmittance_min),
         m_scale(o.far_plane * o.near_plane / (o.far_plane - o.near_plane)),
         background(o.background) {}
 };
 
-// How many surfels ahead a loop over surfels fetches what it will read.
-inline constexpr int64_t surfel_prefetch_distance = 8;
-// Fetches row i of a tensor into the cache, if there is one.
-template <class T>
-void prefetch_row(const Tensor<T>& tensor, int64_t i) {
-  constexpr int64_t line = 64;
-  if (tensor.empty() || i >= tensor.dim(0)) return;
-  const auto* const begin = reinterpret_cast<const char*>(tensor.row(i));
-  for (int64_t at = 0; at < tensor.row_size() * int64_t{sizeof(T)}; at += line) hwy::Prefetch(begin + at);
-}
+// Whether any pixel blended a surfel.
+struct IsVisible {
+  const uint32_t* entry_begin;
+  const uint16_t* touched;
+  uint8_t* flags;
 
-// A surfel's frame in double precision.
-SurfelFrame<double> surfel_frame(const PosedSurfels& surfels, int64_t i);
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    uint16_t blocks = 0;
+    for (uint32_t entry = entry_begin[i]; entry < entry_begin[i + 1]; ++entry)
+      blocks = static_cast<uint16_t>(blocks | touched[entry]);
+    flags[i] = blocks != 0 ? 1 : 0;
+  }
+};
 
 // Fills splats and bounds.
 void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved);

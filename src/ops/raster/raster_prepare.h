@@ -1,33 +1,33 @@
+#pragma once
+
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cfloat>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "base/parallel.h"
 #include "math/rotation.h"
 #include "math/spherical_harmonics.h"
 #include "math/surfel_projection.h"
 #include "ops/raster/raster_kernels.h"
+#include "scene/surfel_views.h"
 
 // Surfels to splats (method §3.1), in double precision up to the last store. Bounds are conservative: what
 // blending would have kept lies inside.
 namespace traceflow::raster {
-namespace {
 
 // Added to every bound, in pixels, for what single precision moves.
-constexpr double bounds_slack = 0.02;
+inline constexpr double bounds_slack = 0.02;
 
 struct Rectangle {
   double x0, y0, x1, y1;
 
-  static Rectangle empty() {
+  TRACEFLOW_HD static Rectangle empty() {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     return {infinity, infinity, -infinity, -infinity};
   }
-  void include(double x, double y) {
+  TRACEFLOW_HD void include(double x, double y) {
     x0 = std::min(x0, x);
     y0 = std::min(y0, y);
     x1 = std::max(x1, x);
@@ -40,12 +40,14 @@ struct Rectangle {
 struct Disk {
   Vec3<double> centre, half_u, half_v;
 
-  double nearest_z() const { return centre.z - std::sqrt(half_u.z * half_u.z + half_v.z * half_v.z); }
+  TRACEFLOW_HD double nearest_z() const {
+    return centre.z - std::sqrt(half_u.z * half_u.z + half_v.z * half_v.z);
+  }
 };
 
 // The projection of a disk that lies well in front of the camera is an ellipse; its bounding box is exact.
-Rectangle ellipse_box(const Disk& disk, const Camera<double>& camera, const Vec2<double>& pixel,
-                      Vec2<double>& ellipse_centre) {
+TRACEFLOW_HD inline Rectangle ellipse_box(const Disk& disk, const Camera<double>& camera,
+                                          const Vec2<double>& pixel, Vec2<double>& ellipse_centre) {
   const Vec3<double>& c = disk.centre;
   // Screen offset from the projected centre = (a p_u + b p_v) / (c.z + a half_u.z + b half_v.z).
   const Vec2<double> offset(pixel.x - camera.centre_x, pixel.y - camera.centre_y);
@@ -61,7 +63,7 @@ Rectangle ellipse_box(const Disk& disk, const Camera<double>& camera, const Vec2
 }
 
 // The bounding box of the square around a disk, cut at the near plane. Empty when all of it lies behind.
-Rectangle clipped_box(const Disk& disk, const Camera<double>& camera, double near_plane) {
+TRACEFLOW_HD inline Rectangle clipped_box(const Disk& disk, const Camera<double>& camera, double near_plane) {
   const Vec3<double> corners[4] = {
       disk.centre + disk.half_u + disk.half_v, disk.centre - disk.half_u + disk.half_v,
       disk.centre - disk.half_u - disk.half_v, disk.centre + disk.half_u - disk.half_v};
@@ -82,7 +84,7 @@ Rectangle clipped_box(const Disk& disk, const Camera<double>& camera, double nea
 }
 
 // The tiles of the pixels whose centres lie in [low, high].
-void tile_range(double low, double high, int pixels, int32_t& begin, int32_t& end) {
+TRACEFLOW_HD inline void tile_range(double low, double high, int pixels, int32_t& begin, int32_t& end) {
   const double first = std::ceil(std::max(low - bounds_slack - 0.5, 0.0));
   const double last = std::floor(std::min(high + bounds_slack - 0.5, pixels - 1.0));
   if (!(first <= last)) {
@@ -93,7 +95,7 @@ void tile_range(double low, double high, int pixels, int32_t& begin, int32_t& en
   end = static_cast<int32_t>(last) / tile_edge + 1;
 }
 
-bool all_finite(const float* values, int64_t count) {
+TRACEFLOW_HD inline bool all_finite(const float* values, int64_t count) {
   uint32_t bad = 0;
   for (int64_t i = 0; i < count; ++i) {
     bad |= static_cast<uint32_t>((std::bit_cast<uint32_t>(values[i]) & 0x7f800000U) == 0x7f800000U);
@@ -101,31 +103,38 @@ bool all_finite(const float* values, int64_t count) {
   return bad == 0;
 }
 
-class Preparer {
+// One surfel to its splat and bounds; on either device.
+class Prepare {
  public:
-  Preparer(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved)
+  // splats, bounds: N each.
+  Prepare(const PosedSurfelsView& surfels, const Camera<float>& camera, const Options& options, Splat* splats,
+          Bounds* bounds)
       : surfels_(surfels),
         camera_(convert<double>(camera)),
-        options_(options),
-        saved_(saved),
-        sh_degree_(surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0),
+        near_plane_(options.near_plane),
+        alpha_min_(options.alpha_min),
         log_alpha_min_(std::log(double{options.alpha_min})),
-        sides_(image_sides()) {}
+        by_centre_(options.sort == SortOrder::centre),
+        low_pass_(options.low_pass),
+        splats_(splats),
+        bounds_(bounds) {
+    find_sides();
+  }
 
-  void run(int64_t i) {
+  TRACEFLOW_HD void operator()(int64_t i) const {
     Bounds bounds;
     if (usable(i)) place(i, bounds);
     if (bounds.tiles() == 0) bounds = {};
-    saved_.bounds[i] = bounds;
+    bounds_[i] = bounds;
   }
 
  private:
-  bool usable(int64_t i) const {
+  TRACEFLOW_HD bool usable(int64_t i) const {
     const auto& s = surfels_;
-    return s.opacity[i] >= options_.alpha_min && s.scale(i, 0) > 0 && s.scale(i, 1) > 0 &&
-           all_finite(s.position.row(i), 3) && all_finite(s.scale.row(i), 2) &&
-           all_finite(s.rotation.row(i), 4) && std::isfinite(s.opacity[i]) &&
-           (!s.has_tint() || std::isfinite(s.tint[i]));
+    return s.opacity[i] >= alpha_min_ && s.scale[2 * i] > 0 && s.scale[2 * i + 1] > 0 &&
+           all_finite(s.position + 3 * i, 3) && all_finite(s.scale + 2 * i, 2) &&
+           all_finite(s.rotation + 4 * i, 4) && std::isfinite(s.opacity[i]) &&
+           (s.tint == nullptr || std::isfinite(s.tint[i]));
   }
 
   // Where a surfel stands and how far it reaches.
@@ -139,18 +148,18 @@ class Preparer {
     Vec2<double> pixel;      // the projected centre, where in front
   };
 
-  void place(int64_t i, Bounds& bounds) {
+  TRACEFLOW_HD void place(int64_t i, Bounds& bounds) const {
     Placement p{};
-    p.from_camera = load3<double>(surfels_.position.row(i)) - camera_.position;
+    p.from_camera = load3<double>(surfels_.position + 3 * i) - camera_.position;
     p.centre = camera_.camera_from_world * p.from_camera;
-    p.in_front = p.centre.z >= options_.near_plane;
-    if (!p.in_front && options_.sort == SortOrder::centre) return;
-    p.has_low_pass = options_.low_pass && p.in_front;
+    p.in_front = p.centre.z >= near_plane_;
+    if (!p.in_front && by_centre_) return;
+    p.has_low_pass = low_pass_ && p.in_front;
     p.log_opacity = std::log(double{surfels_.opacity[i]});
     p.rho_max = std::max(2 * (p.log_opacity - log_alpha_min_), 0.0);
     p.radius = std::sqrt(p.rho_max);
-    if (is_outside(p, std::max(surfels_.scale(i, 0), surfels_.scale(i, 1)))) return;
-    prefetch_row(surfels_.sh, i);
+    if (is_outside(p, std::max(surfels_.scale[2 * i], surfels_.scale[2 * i + 1]))) return;
+    prefetch(surfels_.sh + surfels_.sh_row * i, surfels_.sh_row * int64_t{sizeof(float)});
     if (p.in_front) p.pixel = camera_.project(p.centre);
 
     const SurfelFrame<double> frame = surfel_frame(surfels_, i);
@@ -159,7 +168,7 @@ class Preparer {
     const bool is_ellipse = p.in_front && disk.nearest_z() > 0.1 * p.centre.z;
     Vec2<double> ellipse_centre(std::numeric_limits<double>::quiet_NaN());
     Rectangle box = is_ellipse ? ellipse_box(disk, camera_, p.pixel, ellipse_centre)
-                               : clipped_box(disk, camera_, options_.near_plane);
+                               : clipped_box(disk, camera_, near_plane_);
     if (p.has_low_pass) {
       const double reach = p.radius / std::sqrt(2.0);
       box.include(p.pixel.x - reach, p.pixel.y - reach);
@@ -173,7 +182,7 @@ class Preparer {
 
   // Whether the ball around a surfel and its low-pass disk lie beyond one side of the image. Quick, and
   // misses some.
-  bool is_outside(const Placement& p, double scale) const {
+  TRACEFLOW_HD bool is_outside(const Placement& p, double scale) const {
     const double ball = p.radius * scale;
     const double disk = p.in_front ? (p.radius + 1) * p.centre.z : 0;
     for (const Side& side : sides_) {
@@ -183,9 +192,9 @@ class Preparer {
   }
 
   // False for a surfel that single precision cannot hold.
-  bool store(int64_t i, const Placement& p, const SurfelFrame<double>& frame,
-             const Vec2<double>& ellipse_centre) {
-    Splat& splat = saved_.splats[i];
+  TRACEFLOW_HD bool store(int64_t i, const Placement& p, const SurfelFrame<double>& frame,
+                          const Vec2<double>& ellipse_centre) const {
+    Splat& splat = splats_[i];
     const Vec2<double> anchor =
         anchor_near(p.in_front ? p.pixel : Vec2<double>(camera_.width / 2.0, camera_.height / 2.0));
     store_forms(surfel_forms(frame, camera_), anchor, splat);
@@ -204,12 +213,13 @@ class Preparer {
   }
 
   // A whole pixel near the point, not far outside the image.
-  Vec2<double> anchor_near(const Vec2<double>& pixel) const {
+  TRACEFLOW_HD Vec2<double> anchor_near(const Vec2<double>& pixel) const {
     return {std::floor(std::clamp(pixel.x, -64.0, camera_.width + 64.0)),
             std::floor(std::clamp(pixel.y, -64.0, camera_.height + 64.0))};
   }
 
-  void store_forms(const SurfelForms<double>& forms, const Vec2<double>& anchor, Splat& splat) const {
+  TRACEFLOW_HD void store_forms(const SurfelForms<double>& forms, const Vec2<double>& anchor,
+                                Splat& splat) const {
     const Vec3<double> ray = camera_.ray_in_camera(anchor.x, anchor.y);
     const auto store = [&](const Vec3<double>& form, float& x, float& y, float& one) {
       x = static_cast<float>(form.x / camera_.focal_x);
@@ -224,20 +234,20 @@ class Preparer {
     splat.z_plane = static_cast<float>(forms.z_plane);
     splat.inverse_z_plane =
         static_cast<float>(forms.z_plane > 0 ? std::min(1 / forms.z_plane, double{FLT_MAX}) : 0);
-    splat.w_max = static_cast<float>(std::min(forms.z_plane / options_.near_plane, double{FLT_MAX}));
+    splat.w_max = static_cast<float>(std::min(forms.z_plane / near_plane_, double{FLT_MAX}));
   }
 
-  void store_values(int64_t i, const Vec3<double>& from_camera, const Vec3<double>& normal,
-                    Splat& splat) const {
+  TRACEFLOW_HD void store_values(int64_t i, const Vec3<double>& from_camera, const Vec3<double>& normal,
+                                 Splat& splat) const {
     const Vec3<float> direction(from_camera * (1 / length(from_camera)));
-    const bool finite = all_finite(surfels_.sh.row(i), surfels_.sh.row_size());
-    const auto colour = sh_colour<float>(sh_degree_, surfels_.sh.row(i), direction);
+    const bool finite = all_finite(surfels_.sh + surfels_.sh_row * i, surfels_.sh_row);
+    const auto colour = sh_colour<float>(surfels_.sh_degree, surfels_.sh + surfels_.sh_row * i, direction);
     store3(splat.colour, finite ? colour : Vec3<float>(std::numeric_limits<float>::quiet_NaN()));
     store3(splat.normal, normal * (dot(normal, from_camera) > 0 ? -1.0 : 1.0));
-    splat.tint = surfels_.has_tint() ? surfels_.tint[i] : 0;
+    splat.tint = surfels_.tint != nullptr ? surfels_.tint[i] : 0;
   }
 
-  static void store_ellipse(const Vec2<double>& centre, Splat& s) {
+  TRACEFLOW_HD static void store_ellipse(const Vec2<double>& centre, Splat& s) {
     const double rho = s.rho_max;
     const double xx = double{s.u_x} * s.u_x + double{s.v_x} * s.v_x - rho * s.w_x * s.w_x;
     const double xy = double{s.u_x} * s.u_y + double{s.v_x} * s.v_y - rho * s.w_x * s.w_y;
@@ -255,43 +265,26 @@ class Preparer {
     Vec3<double> plane;
     double norm;
   };
-  std::array<Side, 4> image_sides() const {
+  void find_sides() {
     const auto side = [](double x, double y, double z) {
       return Side{{x, y, z}, std::sqrt(x * x + y * y + z * z)};
     };
     const Camera<double>& c = camera_;
-    return {side(c.focal_x, 0, c.centre_x), side(-c.focal_x, 0, c.width - c.centre_x),
-            side(0, c.focal_y, c.centre_y), side(0, -c.focal_y, c.height - c.centre_y)};
+    sides_[0] = side(c.focal_x, 0, c.centre_x);
+    sides_[1] = side(-c.focal_x, 0, c.width - c.centre_x);
+    sides_[2] = side(0, c.focal_y, c.centre_y);
+    sides_[3] = side(0, -c.focal_y, c.height - c.centre_y);
   }
 
-  const PosedSurfels& surfels_;
-  const Camera<double> camera_;
-  const Options& options_;
-  Saved& saved_;
-  const int sh_degree_;
-  const double log_alpha_min_;
-  const std::array<Side, 4> sides_;
+  PosedSurfelsView surfels_;
+  Camera<double> camera_;
+  double near_plane_;
+  float alpha_min_;
+  double log_alpha_min_;
+  bool by_centre_, low_pass_;
+  Splat* splats_;
+  Bounds* bounds_;
+  Side sides_[4];
 };
-
-}  // namespace
-
-SurfelFrame<double> surfel_frame(const PosedSurfels& surfels, int64_t i) {
-  return {load3<double>(surfels.position.row(i)),
-          rotation_from_quaternion(load4<double>(surfels.rotation.row(i))),
-          {surfels.scale(i, 0), surfels.scale(i, 1)}};
-}
-
-void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved) {
-  saved.count = surfels.count();
-  saved.width = camera.width;
-  saved.height = camera.height;
-  saved.tile_columns = (camera.width + tile_edge - 1) / tile_edge;
-  saved.tile_rows = (camera.height + tile_edge - 1) / tile_edge;
-  saved.splats.resize({saved.count});
-  saved.bounds.resize({saved.count});
-  Preparer preparer(surfels, camera, options, saved);
-  parallel_for(
-      "raster: prepare", saved.count, [&](int64_t i) { preparer.run(i); }, 256);
-}
 
 }  // namespace traceflow::raster

@@ -1,0 +1,178 @@
+#include <bit>
+
+#include "base/kernel.h"
+#include "base/sort.h"
+#include "ops/raster/raster_chain.h"
+#include "ops/raster/raster_cuda.h"
+#include "ops/raster/raster_footprint.h"
+#include "ops/raster/raster_prepare.h"
+
+// The list of surfels of every tile. Surfels are put in order of depth once; their entries are written in
+// that order; a stable sort by tile then leaves each tile's list front to back.
+namespace traceflow {
+
+template void cuda::for_each_index(const char*, int64_t, const raster::Prepare&);
+template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep&);
+template void cuda::for_each_index(const char*, int64_t, const raster::IsVisible&);
+
+namespace raster::cuda_stage {
+namespace {
+
+struct TileGrid {
+  int columns;
+  int width, height;
+
+  // f(tile) for every tile that the splat may reach.
+  template <class F>
+  __device__ void for_each_reached(const Splat& splat, const Bounds& bounds, F&& f) const {
+    for (int row = bounds.tile_y0; row < bounds.tile_y1; ++row) {
+      for (int column = bounds.tile_x0; column < bounds.tile_x1; ++column) {
+        const float x = static_cast<float>(column * tile_edge) + 0.5F;
+        const float y = static_cast<float>(row * tile_edge) + 0.5F;
+        if (reaches(splat, x, y, x + (tile_edge - 1), y + (tile_edge - 1))) f(row * columns + column);
+      }
+    }
+  }
+};
+
+// How many tiles each surfel reaches, and the key that it is sorted by.
+struct CountTiles {
+  TileGrid grid;
+  bool by_depth;
+  const Splat* splats;
+  const Bounds* bounds;
+  int32_t* counts;  // N + 1
+  uint32_t *keys, *surfels;
+  int64_t count;
+
+  __device__ void operator()(int64_t i) const {
+    int32_t tiles = 0;
+    if (i < count && bounds[i].tiles() > 0) {
+      grid.for_each_reached(splats[i], bounds[i], [&](int) { ++tiles; });
+    }
+    counts[i] = tiles;
+    if (i == count) return;
+    // Depths are positive, so that their bits sort as they do.
+    keys[i] = tiles > 0 && by_depth ? std::bit_cast<uint32_t>(splats[i].z_centre) : 0;
+    surfels[i] = static_cast<uint32_t>(i);
+  }
+};
+
+// The counts in the order of depth.
+struct GatherCounts {
+  const uint32_t* order;
+  const int32_t* counts;
+  int32_t* ordered;  // N + 1
+  int64_t count;
+
+  __device__ void operator()(int64_t k) const { ordered[k] = k < count ? counts[order[k]] : 0; }
+};
+
+// The entries of the k-th nearest surfel: its tiles, in the places that the sums of counts give it.
+struct WriteEntries {
+  TileGrid grid;
+  const Splat* splats;
+  const Bounds* bounds;
+  const uint32_t* order;
+  const int32_t* place;  // by order
+  const int32_t* entry;  // by surfel
+  uint32_t *tiles, *places;
+  TileEntry* entries;
+
+  __device__ void operator()(int64_t k) const {
+    const uint32_t surfel = order[k];
+    if (bounds[surfel].tiles() == 0) return;
+    int32_t at = place[k];
+    auto own = static_cast<uint32_t>(entry[surfel]);
+    grid.for_each_reached(splats[surfel], bounds[surfel], [&](int tile) {
+      tiles[at] = static_cast<uint32_t>(tile);
+      places[at] = static_cast<uint32_t>(at);
+      entries[at] = {surfel, own++};
+      ++at;
+    });
+  }
+};
+
+struct SortEntries {
+  const uint32_t* places;
+  const TileEntry* unsorted;
+  TileEntry* sorted;
+
+  __device__ void operator()(int64_t k) const { sorted[k] = unsorted[places[k]]; }
+};
+
+// Where each tile's list begins: the first entry of a tile marks it and the empty ones before it.
+struct FindTiles {
+  const uint32_t* tiles;  // sorted
+  int64_t entries;
+  int64_t tile_count;
+  uint32_t* begin;  // tiles + 1
+
+  __device__ void operator()(int64_t k) const {
+    const int64_t from = k == 0 ? 0 : int64_t{tiles[k - 1]} + 1;
+    const int64_t to = k == entries ? tile_count : int64_t{tiles[k]};
+    for (int64_t tile = from; tile <= to; ++tile) begin[tile] = static_cast<uint32_t>(k);
+  }
+};
+
+template <class T>
+T* resized(Tensor<T>& tensor, int64_t size) {
+  tensor.place(Device::cuda).resize({size});
+  return tensor.data();
+}
+
+// A tensor's last number.
+int32_t read_back(const Tensor<int32_t>& tensor) {
+  int32_t value = 0;
+  memory::copy(Device::cpu, &value, Device::cuda, tensor.data() + tensor.size() - 1, sizeof(value));
+  return value;
+}
+
+}  // namespace
+
+void bin(SortOrder order, Saved& saved) {
+  Saved::Scratch& s = saved.scratch;
+  const int64_t n = saved.count;
+  const TileGrid grid{saved.tile_columns, saved.width, saved.height};
+  int32_t* const counts = resized(s.counts, n + 1);
+  uint32_t* const keys = resized(s.depth_keys, n);
+  uint32_t* const surfels = resized(s.surfels, n);
+  cuda::for_each_index("raster: count tiles", n + 1,
+                       CountTiles{grid, order == SortOrder::centre, saved.splats.data(), saved.bounds.data(),
+                                  counts, keys, surfels, n});
+  uint32_t* ordered = surfels;
+  if (order == SortOrder::centre && n > 0) {
+    ordered = resized(s.surfels_sorted, n);
+    cuda::sort_pairs(n, 32, keys, resized(s.depth_keys_sorted, n), surfels, ordered, s.bytes);
+  }
+  // By surfel: where its entries begin when they are counted surfel by surfel.
+  static_assert(sizeof(uint32_t) == sizeof(int32_t));
+  auto* const entry = reinterpret_cast<int32_t*>(resized(saved.entry_begin, n + 1));
+  cuda::exclusive_sum(counts, entry, n + 1, s.bytes);
+  // By order of depth: where they are written.
+  int32_t* const place = resized(s.offsets, n + 1);
+  cuda::for_each_index("raster: gather counts", n + 1, GatherCounts{ordered, counts, place, n});
+  cuda::exclusive_sum(place, place, n + 1, s.bytes);
+  const int64_t entries = read_back(s.offsets);
+
+  uint32_t* const tiles = resized(s.tile_keys, entries);
+  uint32_t* const tiles_sorted = resized(s.tile_keys_sorted, entries);
+  uint32_t* const places = resized(s.places, entries);
+  uint32_t* const places_sorted = resized(s.places_sorted, entries);
+  TileEntry* const unsorted = resized(s.unsorted, entries);
+  cuda::for_each_index("raster: write entries", n,
+                       WriteEntries{grid, saved.splats.data(), saved.bounds.data(), ordered, place, entry,
+                                    tiles, places, unsorted});
+  TileEntry* const sorted = resized(saved.entries, entries);
+  if (entries > 0) {
+    const int bits = std::bit_width(static_cast<uint64_t>(saved.tiles()));
+    cuda::sort_pairs(entries, bits, tiles, tiles_sorted, places, places_sorted, s.bytes);
+    cuda::for_each_index("raster: sort entries", entries, SortEntries{places_sorted, unsorted, sorted});
+  }
+  uint32_t* const begin = resized(saved.tile_begin, saved.tiles() + 1);
+  cuda::for_each_index("raster: find tiles", entries + 1,
+                       FindTiles{tiles_sorted, entries, saved.tiles(), begin});
+}
+
+}  // namespace raster::cuda_stage
+}  // namespace traceflow

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "ops/raster/raster_kernels.h"
+
+// The stages of the fast path on the CUDA device, where they are not the CPU's own (prepare() and chain()
+// are). A block of threads is a tile, a thread a pixel; a warp holds 8×4 pixels, so that it can pass over the
+// splats that reach none of them.
+namespace traceflow::raster::cuda_stage {
+
+// Fills entry_begin, tile_begin and entries. The host waits once, for the number of entries.
+TRACEFLOW_WITH_CUDA void bin(SortOrder order, Saved& saved);
+TRACEFLOW_WITH_CUDA void blend(const Options& options, Output& output, Saved& saved);
+// The same bytes every time for sort = centre; for sort = hit only where cuda::deterministic() is set,
+// slowly.
+TRACEFLOW_WITH_CUDA void blend_backward(const Options& options, const Saved& saved,
+                                        const OutputGradient& grad_output);
+
+}  // namespace traceflow::raster::cuda_stage

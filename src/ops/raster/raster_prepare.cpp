@@ -1,0 +1,20 @@
+#include "ops/raster/raster_prepare.h"
+
+#include "base/parallel.h"
+
+namespace traceflow::raster {
+
+void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved) {
+  saved.count = surfels.count();
+  saved.width = camera.width;
+  saved.height = camera.height;
+  saved.tile_columns = (camera.width + tile_edge - 1) / tile_edge;
+  saved.tile_rows = (camera.height + tile_edge - 1) / tile_edge;
+  const Device device = surfels.position.device();
+  saved.splats.place(device).resize({saved.count});
+  saved.bounds.place(device).resize({saved.count});
+  parallel_for(device, "raster: prepare", saved.count,
+               Prepare(view_of(surfels), camera, options, saved.splats.data(), saved.bounds.data()), 256);
+}
+
+}  // namespace traceflow::raster
