@@ -65,15 +65,15 @@ struct BasicPosedSurfels {
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint.empty(); }
 
-  // Zeros in the shapes of another set: how a gradient starts.
+  // Zeros in the shapes of another set and on its device: how a gradient starts.
   template <class U>
   void reset_like(const BasicPosedSurfels<U>& other) {
-    position.reset(other.position.shape());
-    scale.reset(other.scale.shape());
-    rotation.reset(other.rotation.shape());
-    opacity.reset(other.opacity.shape());
-    sh.reset(other.sh.shape());
-    tint.reset(other.tint.shape());
+    position.place(other.position.device()).reset(other.position.shape());
+    scale.place(other.scale.device()).reset(other.scale.shape());
+    rotation.place(other.rotation.device()).reset(other.rotation.shape());
+    opacity.place(other.opacity.device()).reset(other.opacity.shape());
+    sh.place(other.sh.device()).reset(other.sh.shape());
+    tint.place(other.tint.device()).reset(other.tint.shape());
   }
 };
 using PosedSurfels = BasicPosedSurfels<float>;

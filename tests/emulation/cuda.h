@@ -139,6 +139,11 @@ template <class T>
 T __ldg(const T* address) {
   return *address;
 }
+// Past the first cache, of which the emulation has none.
+template <class T>
+T __ldcg(const T* address) {
+  return *address;
+}
 inline int __popc(unsigned x) { return std::popcount(x); }
 inline int __clz(int x) { return std::countl_zero(static_cast<unsigned>(x)); }
 inline int __clzll(long long x) { return std::countl_zero(static_cast<unsigned long long>(x)); }
