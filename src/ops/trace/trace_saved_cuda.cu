@@ -23,6 +23,8 @@ T* room(Tensor<T>& tensor, const Shape& shape) {
   return tensor.data();
 }
 
+const float* data_or_null(const Tensor<float>& tensor) { return tensor.empty() ? nullptr : tensor.data(); }
+
 // How many the limit allows.
 int64_t allowed_records(const Saved& saved) {
   constexpr size_t in_order = sizeof(HitParts) + 2 * (sizeof(uint64_t) + sizeof(uint32_t));
@@ -102,9 +104,9 @@ class Backward {
     task_.last_head = hits.last_head.data();
     task_.sums = hits.sums.data();
     task_.frames = hits.frames.data();
-    task_.grad_colour = grad.colour.data();
-    task_.grad_alpha = grad.alpha.data();
-    task_.grad_distance = grad.distance.data();
+    task_.grad_colour = data_or_null(grad.colour);
+    task_.grad_alpha = data_or_null(grad.alpha);
+    task_.grad_distance = data_or_null(grad.distance);
     task_.grad_origins = gradient.origins.data();
     task_.grad_directions = gradient.directions.data();
     task_.surfel_sums = hits.surfel_sums.data();

@@ -95,6 +95,7 @@ __global__ void __launch_bounds__(threads) add_runs(Rows rows, int64_t count, To
       surfel = next;
       sum[0] = sum[1] = 0;
     }
+    if (surfel >= totals.surfels) continue;
     sum[0] += rows.value(i, lane);
     sum[1] += rows.value(i, lane + warp_lanes);
   }

@@ -103,6 +103,7 @@ struct BoxRay {
   __device__ explicit BoxRay(const UnitRay& ray) {
     const Vec3<float> o = glm::abs(ray.origin);
     const float radius = 2e-6F * std::fmax(o.x, std::fmax(o.y, o.z));
+#pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
       const float d = ray.direction[axis];
       const float sign = std::copysign(1.0F, d);
@@ -113,8 +114,10 @@ struct BoxRay {
   }
   // Where the ray enters the box of a node's child, at or after `near`; infinite where it leaves it before
   // that, or enters it behind `far`.
-  __device__ float enter(const Node& node, int side, float near, float far) const {
+  template <int side>
+  __device__ float enter(const Node& node, float near, float far) const {
     float leave = far;
+#pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
       const float lower = node.box[axis][2 * side], upper = node.box[axis][2 * side + 1];
       const bool forwards = reciprocal[axis] > 0;
@@ -175,11 +178,13 @@ __device__ inline void walk(const RayInput& input, const UnitRay& ray, float nea
     // Down to a disk. no_child has the disk's bit too.
     while ((at & disk_bit) == 0) {
       const Node node = input.nodes[at];
-      const float left = box_ray.enter(node, 0, near, hits.far());
-      const float right = box_ray.enter(node, 1, near, hits.far());
-      const int first = right < left ? 1 : 0;
-      if (std::fmax(left, right) < INFINITY) stack.push(std::fmax(left, right), node.child[1 - first]);
-      at = std::fmin(left, right) < INFINITY ? node.child[first] : stack.pop(hits.far());
+      const float left = box_ray.enter<0>(node, near, hits.far());
+      const float right = box_ray.enter<1>(node, near, hits.far());
+      const bool swapped = right < left;
+      const uint32_t first = swapped ? node.child[1] : node.child[0];
+      const uint32_t second = swapped ? node.child[0] : node.child[1];
+      if (std::fmax(left, right) < INFINITY) stack.push(std::fmax(left, right), second);
+      at = std::fmin(left, right) < INFINITY ? first : stack.pop(hits.far());
     }
     if (at == no_child) return;
     meet_disk(input.disks[at & ~disk_bit], ray, input.rules, hits);

@@ -1,99 +1,10 @@
-#include "base/device_memory.h"
-#include "ops/trace/trace_run.h"
-#include "support/device.h"
+#include "ops/trace/trace_device_run.h"
+#include "ops/trace/trace_usable.h"
 
 namespace traceflow::trace {
 namespace {
 
 using namespace traceflow::testing;
-
-PosedSurfels on(const PosedSurfels& s, Device device) {
-  return {s.position.on(device), s.scale.on(device), s.rotation.on(device),
-          s.opacity.on(device),  s.sh.on(device),    s.tint.on(device)};
-}
-Output on(const Output& o, Device device) {
-  return {o.colour.on(device), o.alpha.on(device), o.distance.on(device)};
-}
-InputGradient on(const InputGradient& g, Device device) {
-  return {on(g.surfels, device), g.origins.on(device), g.directions.on(device),
-          g.position_gradient.on(device)};
-}
-OutputGradient on(const OutputGradient& g, Device device) {
-  return {g.colour.on(device), g.alpha.on(device), g.distance.on(device)};
-}
-
-// Both passes on the device, seen from the host.
-Traced trace_on_device(const TestScene& scene, const Options& options, int64_t limit = int64_t{1} << 30) {
-  constexpr Device device = Device::cuda;
-  const PosedSurfels surfels = on(scene.surfels, device);
-  const Tensor<float> origins = scene.origins.on(device), directions = scene.directions.on(device);
-  const BvhPtr bvh = make_bvh();
-  const SavedPtr saved = make_saved();
-  limit_device_bytes(*saved, limit);
-  Output output;
-  InputGradient gradient;
-  build(surfels, options, *bvh);
-  forward(surfels, *bvh, origins, directions, options, output, saved.get());
-  backward(surfels, origins, directions, options, *saved,
-           on(to_float(random_output_gradient(5, origins.empty() ? 0 : origins.dim(0))), device), gradient);
-  return {on(output, Device::cpu), on(gradient, Device::cpu), blended_hits(*saved)};
-}
-
-// How many numbers are farther than `tolerance` of the root mean square from what is expected.
-int64_t count_far(const Tensor<float>& found, const Tensor<float>& expected, double tolerance) {
-  EXPECT_EQ(found.shape(), expected.shape());
-  double squares = 0;
-  for (const float v : expected.values()) squares += static_cast<double>(v) * v;
-  const double limit =
-      tolerance * std::sqrt(squares / static_cast<double>(std::max<int64_t>(1, found.size())));
-  int64_t far = 0;
-  for (int64_t i = 0; i < found.size(); ++i) far += !(std::abs(found[i] - expected[i]) <= limit);
-  return far;
-}
-
-// The two differ in how e^x and the sums of colours are rounded, and on a device in which products are fused;
-// that is some 1e-6 of a number, more where gradients of both signs are added up.
-void expect_same(const Traced& found, const Traced& expected, double value = 2e-5, double slope = 5e-4) {
-  EXPECT_EQ(found.hits, expected.hits);
-  EXPECT_EQ(count_far(found.output.colour, expected.output.colour, value), 0);
-  EXPECT_EQ(count_far(found.output.alpha, expected.output.alpha, value), 0);
-  EXPECT_EQ(count_far(found.output.distance, expected.output.distance, value), 0);
-  const InputGradient &f = found.gradient, &e = expected.gradient;
-  EXPECT_EQ(count_far(f.surfels.position, e.surfels.position, slope), 0);
-  EXPECT_EQ(count_far(f.surfels.scale, e.surfels.scale, slope), 0);
-  EXPECT_EQ(count_far(f.surfels.rotation, e.surfels.rotation, slope), 0);
-  EXPECT_EQ(count_far(f.surfels.opacity, e.surfels.opacity, slope), 0);
-  EXPECT_EQ(count_far(f.surfels.sh, e.surfels.sh, slope), 0);
-  EXPECT_EQ(count_far(f.origins, e.origins, slope), 0);
-  EXPECT_EQ(count_far(f.directions, e.directions, slope), 0);
-  EXPECT_EQ(count_far(f.position_gradient, e.position_gradient, slope), 0);
-}
-
-// Sums in a fixed order, for as long as it stands.
-class InOrder {
- public:
-  explicit InOrder(bool on) { traceflow::cuda::set_deterministic(on); }
-  ~InOrder() { traceflow::cuda::set_deterministic(false); }
-  InOrder(const InOrder&) = delete;
-  InOrder& operator=(const InOrder&) = delete;
-};
-
-// Faint surfels and a far cut-off: nothing falls to either side of a threshold.
-TestScene smooth_scene(uint64_t seed, int degree, int64_t surfels, int64_t rays) {
-  SceneOptions o;
-  o.surfels = surfels;
-  o.rays = rays;
-  o.sh_degree = degree;
-  o.opacity_max = 0.5;
-  return random_scene(seed, o);
-}
-Options smooth_options() {
-  Options options;
-  options.alpha_min = 1e-9F;
-  options.transmittance_min = 0;
-  options.background = {0.4F, 0.1F, 0.2F};
-  return options;
-}
 
 using TraceOnDevice = OnDevice;
 
@@ -109,6 +20,202 @@ TEST_F(TraceOnDevice, AgreesWithTheCpuAtEveryDegree) {
       expect_same(trace_on_device(scene, smooth_options()), expected);
     }
   }
+}
+
+// Whether single precision may take this ray either way: a hit near the cut-off, a ray near its end, or two
+// hits at almost one distance.
+bool is_at_boundary(const TestScene& scene, const Options& options, int64_t ray) {
+  struct Hit {
+    double distance, alpha;
+  };
+  std::vector<Hit> hits;
+  const Vec3<double> origin = load3<double>(scene.origins.row(ray));
+  const Vec3<double> direction = glm::normalize(load3<double>(scene.directions.row(ray)));
+  const auto surfels = convert<double>(scene.surfels);
+  constexpr double near = 1e-4;
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    const auto hit = intersect(SurfelView<double>(surfels).frame(i), origin, direction);
+    const double alpha = surfels.opacity[i] * std::exp(-0.5 * (hit.u * hit.u + hit.v * hit.v));
+    if (!hit.valid || hit.t < (1 - near) * options.t_min || alpha < (1 - near) * options.alpha_min) continue;
+    if (alpha < (1 + near) * options.alpha_min || hit.t < (1 + near) * options.t_min) return true;
+    hits.push_back({hit.t, std::min(alpha, static_cast<double>(options.alpha_max))});
+  }
+  std::sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.distance < b.distance; });
+  double transmittance = 1;
+  for (size_t i = 0; i < hits.size(); ++i) {
+    transmittance *= 1 - hits[i].alpha;
+    if (i > 0 && hits[i].distance - hits[i - 1].distance < 1e-5 * hits[i].distance) return true;
+    if (std::abs(transmittance - options.transmittance_min) < near * options.transmittance_min) return true;
+    if (transmittance < options.transmittance_min) return false;
+  }
+  return false;
+}
+
+// Rays that differ are few, and each is at a boundary.
+void expect_same_but_at_boundaries(const TestScene& scene, const Options& options) {
+  const Traced expected = trace(scene, options), found = trace_on_device(scene, options);
+  const int64_t rays = scene.origins.dim(0);
+  int64_t different = 0;
+  for (int64_t r = 0; r < rays; ++r) {
+    bool same = std::abs(found.output.alpha[r] - expected.output.alpha[r]) < 1e-5F &&
+                std::abs(found.output.distance[r] - expected.output.distance[r]) < 1e-4F;
+    for (int c = 0; c < 3; ++c) {
+      same = same && std::abs(found.output.colour(r, c) - expected.output.colour(r, c)) < 1e-5F;
+    }
+    if (same) continue;
+    ++different;
+    EXPECT_TRUE(is_at_boundary(scene, options, r)) << r;
+  }
+  EXPECT_LE(different, rays / 50);
+  EXPECT_TRUE(all_finite(found));
+}
+
+TEST_F(TraceOnDevice, AgreesWithTheCpuWithinThresholds) {
+  SceneOptions o;
+  o.surfels = 1500;
+  o.rays = 300;
+  o.scale_min = 0.02;
+  o.scale_max = 0.2;
+  o.opacity_min = 0;
+  expect_same_but_at_boundaries(random_scene(1, o), {});
+  o.ray_distance = 0.3;
+  Options from_inside;
+  from_inside.t_min = 0.1F;
+  expect_same_but_at_boundaries(random_scene(2, o), from_inside);
+}
+
+// Where each ray ends among the first of the hits that are held.
+TEST_F(TraceOnDevice, AgreesWithTheCpuWhereEveryRayEndsEarly) {
+  SceneOptions o;
+  o.surfels = 2000;
+  o.rays = 300;
+  o.sh_degree = 1;
+  o.opacity_min = 0.9;
+  o.opacity_max = 1.0;
+  Options options;
+  options.background = {0.1F, 0.2F, 0.3F};
+  expect_same_but_at_boundaries(random_scene(3, o), options);
+}
+
+// Many times more hits on a ray than are held, from either side, and as many at one distance: those blend in
+// the order of their index.
+TEST_F(TraceOnDevice, AnyNumberOfHits) {
+  constexpr int64_t count = 2000;
+  TestScene scene{make_surfels(count, 0), Tensor<float>({40, 3}), Tensor<float>({40, 3})};
+  Random random(7);
+  for (int64_t i = 0; i < count; ++i) {
+    set_facing(scene.surfels, i, i < 100 ? 5 : 1 + 0.005F * static_cast<float>(i), 1, 0.004F);
+    for (int c = 0; c < 3; ++c) scene.surfels.sh.row(i)[c] = static_cast<float>(random.normal());
+  }
+  for (int64_t r = 0; r < 40; ++r) {
+    scene.origins(r, 2) = r % 2 == 0 ? 0.0F : 20.0F;
+    scene.directions(r, 2) = r % 2 == 0 ? 1.0F : -1.0F;
+    scene.directions(r, 0) = 0.001F * static_cast<float>(r);
+  }
+  Options options;
+  options.alpha_min = 1e-4F;
+  options.transmittance_min = 1e-9F;
+  const Traced expected = trace(scene, options);
+  EXPECT_EQ(expected.hits, count * 40);
+  for (const bool in_order : {false, true}) {
+    const InOrder order(in_order);
+    // 2,000 roundings of the transmittance.
+    expect_same(trace_on_device(scene, options), expected, 5e-4, 2e-3);
+  }
+}
+
+TEST_F(TraceOnDevice, HitsAtOneDistanceBlendInOrderOfIndex) {
+  constexpr int64_t count = 70;
+  TestScene scene{make_surfels(count, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  for (int64_t i = 0; i < count; ++i) {
+    set_facing(scene.surfels, i, 1, 1, 0.5F);
+    for (int c = 0; c < 3; ++c) {
+      scene.surfels.sh.row(i)[c] = static_cast<float>((i == 0 ? 0.5 : -0.5) / sh_c0);
+    }
+  }
+  scene.directions(0, 2) = 1;
+  EXPECT_NEAR(trace_on_device(scene, {}).output.colour(0, 0), 0.5, 1e-6);
+}
+
+// What does not fit is traced again in parts, in either kind of sum.
+TEST_F(TraceOnDevice, AgreesWithTheCpuWithoutRoomForItsHits) {
+  const TestScene scene = smooth_scene(4, 2, 120, 150);
+  const Traced expected = trace(scene, smooth_options());
+  for (const bool in_order : {false, true}) {
+    const InOrder order(in_order);
+    for (const int64_t bytes : {0, 20000}) {
+      SCOPED_TRACE(bytes);
+      expect_same(trace_on_device(scene, smooth_options(), bytes), expected);
+    }
+  }
+}
+
+bool same_bytes(const Traced& a, const Traced& b) {
+  return same_bytes(a.output, b.output) && same_bytes(a.gradient, b.gradient);
+}
+
+TEST_F(TraceOnDevice, SameBytesEveryRun) {
+  const TestScene scene = smooth_scene(5, 3, 200, 200);
+  const InOrder order(true);
+  for (const int64_t bytes : {int64_t{1} << 30, int64_t{100000}}) {
+    const Traced one = trace_on_device(scene, smooth_options(), bytes);
+    for (int run = 0; run < 2; ++run) {
+      EXPECT_TRUE(same_bytes(one, trace_on_device(scene, smooth_options(), bytes))) << bytes;
+    }
+  }
+}
+
+// The same objects take set after set, and from the second time on memory is there.
+TEST_F(TraceOnDevice, KeepsItsMemory) {
+  const BvhPtr bvh = make_bvh();
+  const SavedPtr saved = make_saved();
+  const Options options = smooth_options();
+  const TestScene large = smooth_scene(6, 1, 150, 150), small = smooth_scene(7, 1, 60, 50);
+  size_t free_bytes = 0;
+  Output output;
+  InputGradient gradient;
+  const PosedSurfels surfels[] = {on(large.surfels, Device::cuda), on(small.surfels, Device::cuda)};
+  const Tensor<float> origins[] = {large.origins.on(Device::cuda), small.origins.on(Device::cuda)};
+  const Tensor<float> directions[] = {large.directions.on(Device::cuda), small.directions.on(Device::cuda)};
+  const OutputGradient grads[] = {on(to_float(random_output_gradient(5, 150)), Device::cuda),
+                                  on(to_float(random_output_gradient(5, 50)), Device::cuda)};
+  const InOrder order(true);
+  for (size_t i = 0; i < 6; ++i) {
+    const size_t k = i % 2;
+    build(surfels[k], options, *bvh);
+    forward(surfels[k], *bvh, origins[k], directions[k], options, output, saved.get());
+    backward(surfels[k], origins[k], directions[k], options, *saved, grads[k], gradient);
+    if (i == 2) free_bytes = traceflow::cuda::facts().free_bytes;
+    if (i > 2) {
+      EXPECT_EQ(traceflow::cuda::facts().free_bytes, free_bytes);
+    }
+    expect_same({on(output, Device::cpu), on(gradient, Device::cpu), blended_hits(*saved)},
+                trace(k == 0 ? large : small, options));
+  }
+}
+
+TEST_F(TraceOnDevice, GradientsOfSomeOutputsOnly) {
+  const TestScene scene = smooth_scene(8, 1, 50, 60);
+  const Options options = smooth_options();
+  OutputGradient grad = to_float(random_output_gradient(5, 60));
+  grad.colour = {};
+  grad.distance = {};
+  const BvhPtr bvh = make_bvh();
+  const SavedPtr saved = make_saved();
+  Traced found, expected;
+  for (const Device device : {Device::cpu, Device::cuda}) {
+    const PosedSurfels surfels = on(scene.surfels, device);
+    const Tensor<float> origins = scene.origins.on(device), directions = scene.directions.on(device);
+    Traced& to = device == Device::cpu ? expected : found;
+    build(surfels, options, *bvh);
+    forward(surfels, *bvh, origins, directions, options, to.output, saved.get());
+    Output alone;
+    forward(surfels, *bvh, origins, directions, options, alone, nullptr);
+    EXPECT_TRUE(same_bytes(on(alone, Device::cpu), on(to.output, Device::cpu)));
+    backward(surfels, origins, directions, options, *saved, on(grad, device), to.gradient);
+    to = {on(to.output, Device::cpu), on(to.gradient, Device::cpu), blended_hits(*saved)};
+  }
+  expect_same(found, expected);
 }
 
 }  // namespace
