@@ -25,6 +25,10 @@
 #define blockDim (::traceflow::emulation::current().block_size)
 #define gridDim (::traceflow::emulation::current().grid_size)
 
+struct alignas(16) float4 {
+  float x, y, z, w;
+};
+
 inline void __syncthreads() { traceflow::emulation::block_barrier(); }
 inline int __syncthreads_or(int predicate) { return traceflow::emulation::block_any(predicate != 0) ? 1 : 0; }
 inline int __syncthreads_and(int predicate) {

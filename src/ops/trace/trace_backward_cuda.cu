@@ -29,7 +29,7 @@ class RecordWalk {
     if (left_ == 0) {
       if (next_head_ == no_record) return false;
       head_ = next_head_;
-      const Record record = records_[head_];
+      const Record record = load_quads(records_[head_]);
       next_head_ = record.name;
       left_ = __float_as_uint(record.distance);
     }
@@ -81,7 +81,7 @@ struct RayBackward {
     const float grad = blend_alpha_gradient(hit.transmittance, hit.alpha, own, behind);
     behind += weight * own;
     const float grad_exponent = hit.alpha >= task.rays.rules.blend.alpha_max ? 0 : grad * hit.alpha;
-    place_backward(task.frames[hit.name], ray,
+    place_backward(load_quads(task.frames[hit.name]), ray,
                    {hit.distance, grad_exponent, weight * grad_distance / sums.alpha}, parts, origin,
                    direction);
   }
@@ -129,7 +129,7 @@ __device__ void keep_row(const Rows& rows, int64_t i, const RecordWalk& walk, co
   for (size_t k = 0; k < part::count; ++k) parts.part[k] = rows.part[threadIdx.x][k];
   for (int c = 0; c < 3; ++c) parts.passed[c] = rows.passed[threadIdx.x][c];
   parts.ray = static_cast<uint32_t>(i);
-  task.parts[place] = parts;
+  store_quads(parts, task.parts[place]);
   task.keys[place] = uint64_t{rows.surfel[threadIdx.x]} << task.ray_bits | static_cast<uint64_t>(i);
   task.places[place] = place;
   if (!walk.is_first_of_pass()) return;
@@ -157,7 +157,7 @@ __global__ void __launch_bounds__(threads) backward_kernel(BackwardTask task) {
   bool mine = walk.next();
   while (__any_sync(full_warp, mine)) {
     if (mine) {
-      const Record hit = task.records[walk.place()];
+      const Record hit = load_quads(task.records[walk.place()]);
       rows.surfel[threadIdx.x] = hit.name;
       ray.pass(task, hit, basis, rows.passed[threadIdx.x], rows.part[threadIdx.x]);
     }

@@ -156,13 +156,8 @@ __global__ void __launch_bounds__(threads) make_nodes(Keys keys, TreeView tree) 
 
 __device__ Disk make_disk(const BuildInput& input, uint32_t surfel) {
   const SurfelFrame<float> f = input.surfels.frame(surfel);
-  return {f.position,
-          f.rotation[0] / f.scale.x,
-          f.rotation[1] / f.scale.y,
-          f.rotation[2],
-          std::log(input.surfels.opacity[surfel]),
-          surfel,
-          {}};
+  return {{f.position, std::log(input.surfels.opacity[surfel]), f.rotation[2], surfel},
+          {f.rotation[0] / f.scale.x, f.rotation[1] / f.scale.y, {}}};
 }
 
 // Joins the box with that of the other half of the node. Read past the first cache, which does not see what
@@ -188,7 +183,7 @@ __global__ void __launch_bounds__(threads)
     disks[i] = make_disk(input, surfel);
     box = box_of(input, surfel);
   } else {
-    disks[i] = {Vec3<float>(0), Vec3<float>(0), Vec3<float>(0), Vec3<float>(0), -INFINITY, surfel, {}};
+    disks[i] = {{Vec3<float>(0), -INFINITY, Vec3<float>(0), surfel}, {Vec3<float>(0), Vec3<float>(0), {}}};
   }
   for (uint32_t at = tree.disk_parent[i]; at != no_parent;) {
     const uint32_t node = at / 2, side = at % 2;

@@ -57,9 +57,9 @@ __device__ void keep_hits(const RecordStore& store, HeldHits& hits, int count, f
   const unsigned long long place = take_records(store.used, wanted);
   if (wanted == 0 || place + wanted > store.capacity) return;
   Record* record = store.records + place;
-  *record = {last_head, __uint_as_float(static_cast<uint32_t>(count)), 0, 0};
+  store_quads(Record{last_head, __uint_as_float(static_cast<uint32_t>(count)), 0, 0}, *record);
   for (int i = 0; i < count; ++i) {
-    *++record = {hits.surfel(i), hits.distance(i), hits.alpha(i), transmittance};
+    store_quads(Record{hits.surfel(i), hits.distance(i), hits.alpha(i), transmittance}, *++record);
     transmittance *= 1 - hits.alpha(i);
   }
   last_head = static_cast<uint32_t>(place);

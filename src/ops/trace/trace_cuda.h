@@ -18,12 +18,20 @@ struct alignas(64) Node {
   uint32_t unused[2];
 };
 
-// A surfel as a ray meets it.
-struct alignas(64) Disk {
-  Vec3<float> position, u, v, normal;  // u = t_u / scale, v = t_v / scale
-  float log_opacity;                   // -inf for a surfel that is left out
+// A surfel as a ray meets it: first its plane, then where in it.
+struct DiskPlane {
+  Vec3<float> position;
+  float log_opacity;  // -inf for a surfel that is left out
+  Vec3<float> normal;
   uint32_t surfel;
+};
+struct DiskAxes {
+  Vec3<float> u, v;  // t_u / scale, t_v / scale
   float unused[2];
+};
+struct alignas(64) Disk {
+  DiskPlane plane;
+  DiskAxes axes;
 };
 
 // A binary tree with a surfel in each leaf, in the order of a space-filling curve through their centres.

@@ -1,11 +1,33 @@
 #pragma once
 
+#include <cstring>
+
 #include "base/kernel.h"
 #include "math/blend.h"
 #include "ops/trace/trace_cuda.h"
 
 // Steps of the tracer on the device that its .cu files share.
 namespace traceflow::trace::cuda {
+
+// What lies at an address that no one writes to meanwhile, 16 bytes at a time.
+template <class T>
+__device__ T load_quads(const T& at) {
+  constexpr size_t count = sizeof(T) / sizeof(float4);
+  static_assert(count * sizeof(float4) == sizeof(T));
+  float4 quads[count];
+  for (size_t i = 0; i < count; ++i) quads[i] = __ldg(reinterpret_cast<const float4*>(&at) + i);
+  T value;
+  std::memcpy(&value, quads, sizeof(T));
+  return value;
+}
+template <class T>
+__device__ void store_quads(const T& value, T& at) {
+  constexpr size_t count = sizeof(T) / sizeof(float4);
+  static_assert(count * sizeof(float4) == sizeof(T));
+  float4 quads[count];
+  std::memcpy(quads, &value, sizeof(T));
+  for (size_t i = 0; i < count; ++i) reinterpret_cast<float4*>(&at)[i] = quads[i];
+}
 
 struct WalkRules {
   BlendRules<float> blend;

@@ -10,13 +10,13 @@ namespace traceflow::trace::cuda {
 template <int degree, class F>
 __device__ void for_each_coefficient(const float* row, F&& f) {
   constexpr int numbers = 3 * sh_coefficients(degree);
-  struct alignas(16) Quad {
+  struct Quad {
     float number[4];
   };
   if constexpr (numbers % 4 == 0) {
 #pragma unroll
     for (int q = 0; q < numbers / 4; ++q) {
-      const Quad quad = reinterpret_cast<const Quad*>(row)[q];
+      const Quad quad = load_quads(reinterpret_cast<const Quad*>(row)[q]);
 #pragma unroll
       for (int j = 0; j < 4; ++j) f((4 * q + j) / 3, (4 * q + j) % 3, quad.number[j]);
     }

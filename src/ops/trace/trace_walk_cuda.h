@@ -135,16 +135,18 @@ __device__ inline float dot_fused(const Vec3<float>& a, const Vec3<float>& b) {
 
 __device__ inline void meet_disk(const Disk& disk, const UnitRay& ray, const WalkRules& rules,
                                  HeldHits& hits) {
-  const Vec3<float> q = ray.origin - disk.position;
+  const DiskPlane plane = load_quads(disk.plane);
+  const Vec3<float> q = ray.origin - plane.position;
   // The sum turns -0 into 0, which is a distance.
-  const float t = -(dot_fused(disk.normal, q) / dot_fused(disk.normal, ray.direction)) + 0.0F;
-  if (!(t >= rules.t_min) || !hits.takes(t, disk.surfel)) return;
+  const float t = -(dot_fused(plane.normal, q) / dot_fused(plane.normal, ray.direction)) + 0.0F;
+  if (!(t >= rules.t_min) || !hits.takes(t, plane.surfel)) return;
+  const DiskAxes axes = load_quads(disk.axes);
   const Vec3<float> x(std::fma(t, ray.direction.x, q.x), std::fma(t, ray.direction.y, q.y),
                       std::fma(t, ray.direction.z, q.z));
-  const float u = dot_fused(disk.u, x), v = dot_fused(disk.v, x);
-  const float exponent = std::fma(-std::fma(u, u, v * v), 0.5F, disk.log_opacity);
+  const float u = dot_fused(axes.u, x), v = dot_fused(axes.v, x);
+  const float exponent = std::fma(-std::fma(u, u, v * v), 0.5F, plane.log_opacity);
   if (!(exponent >= rules.log_alpha_min)) return;
-  hits.insert(t, disk.surfel, std::fmin(std::exp(exponent), rules.blend.alpha_max));
+  hits.insert(t, plane.surfel, std::fmin(std::exp(exponent), rules.blend.alpha_max));
 }
 
 // Entries of boxes that wait, nearest on top.
@@ -177,7 +179,7 @@ __device__ inline void walk(const RayInput& input, const UnitRay& ray, float nea
   for (uint32_t at = 0; at != no_child; at = stack.pop(hits.far())) {
     // Down to a disk. no_child has the disk's bit too.
     while ((at & disk_bit) == 0) {
-      const Node node = input.nodes[at];
+      const Node node = load_quads(input.nodes[at]);
       const float left = box_ray.enter<0>(node, near, hits.far());
       const float right = box_ray.enter<1>(node, near, hits.far());
       const bool swapped = right < left;
