@@ -21,7 +21,7 @@ void limit_device_bytes(Saved& saved, int64_t bytes) { saved.device_bytes = byte
 
 void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
   bvh.surfels = surfels.count();
-  if (surfels.position.device() == Device::cpu) {
+  if (surfels.device() == Device::cpu) {
     cpu::build(surfels, options, bvh);
   } else {
     cuda::build(surfels, options, bvh);
@@ -31,7 +31,7 @@ void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
 void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
              const Tensor<float>& directions, const Options& options, Output& output, Saved* saved) {
   require(bvh.surfels == surfels.count(), "the BVH was built from these surfels");
-  require(surfels.count() == 0 || surfels.position.device() == origins.device() || origins.empty(),
+  require(surfels.count() == 0 || surfels.device() == origins.device() || origins.empty(),
           "rays and surfels are on one device");
   if (saved) saved->device = origins.device();
   if (origins.device() == Device::cpu) {

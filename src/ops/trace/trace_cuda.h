@@ -34,6 +34,14 @@ struct alignas(64) Disk {
   DiskAxes axes;
 };
 
+// Rays in an order in which the lanes of a warp go the same way.
+struct SortedRays {
+  Tensor<uint32_t> order;  // the caller's index of each ray
+  Tensor<uint32_t> keys, sorted_keys, indices;
+  Tensor<float> frame;  // a typical origin, and how far from it the surfels typically are
+  Tensor<uint8_t> sort_scratch;
+};
+
 // A binary tree with a surfel in each leaf, in the order of a space-filling curve through their centres.
 // Surfels that are left out stand at the end, in boxes that no ray meets. Node 0 is the root.
 struct Tree {
@@ -49,6 +57,7 @@ struct Tree {
   Tensor<uint32_t> arrived;                   // children of a node whose boxes are known
   Tensor<uint32_t> bounds;                    // of the centres
   Tensor<uint8_t> sort_scratch;
+  SortedRays rays;  // where no hits are kept
 };
 
 // One number of a list of hits: a hit as it was blended, or, in front of every pass of a ray, a head: `name`
@@ -79,6 +88,8 @@ struct SavedHits {
   static constexpr int64_t unknown = -1;
 
   int64_t rays = 0;
+  SortedRays sorted;
+  bool is_sorted = false;
   std::shared_ptr<Tree> tree;
   int64_t builds = 0;                    // of the tree when it was walked
   Tensor<Record> records;                // as many as have room

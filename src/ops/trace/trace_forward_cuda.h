@@ -75,6 +75,9 @@ struct RecordStore {
   unsigned long long* hit_count;
 };
 
+// The order of all rays, of which there is one and a surfel. Equal ones stay in the caller's order.
+const uint32_t* sort_rays(const RayInput& input, int64_t surfels, SortedRays& rays);
+
 void trace_rays(int degree, const RayInput& rays, const RayOutput& output, const RecordStore& store);
 
 // What backward has beside the rays. Hits are those in `records`.

@@ -13,6 +13,8 @@ using namespace traceflow::cuda;
 
 namespace {
 
+// Whether rays are sorted before they are traced. Changes speed, and the order of sums.
+constexpr bool sorts_rays = true;
 constexpr int64_t expected_records = 64;  // of a ray, until it is known better
 constexpr int64_t most_records = no_record - 1;
 
@@ -182,16 +184,22 @@ void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& o
   const int64_t rays = origins.empty() ? 0 : origins.dim(0);
   const RayOutput to{room(output.colour, {rays, 3}), room(output.alpha, {rays}),
                      room(output.distance, {rays})};
+  RayInput input = input_of(surfels, bvh.on_device.get(), origins, directions, options);
+  const bool sorts = sorts_rays && rays > 0 && input.nodes != nullptr;
   RecordStore store{};
   if (saved) {
     if (!saved->on_device) saved->on_device = std::make_shared<SavedHits>();
-    make_room(*saved, rays, *saved->on_device);
-    saved->on_device->tree = bvh.on_device;
-    saved->on_device->builds = bvh.on_device ? bvh.on_device->builds : 0;
-    store = store_of(*saved->on_device);
+    SavedHits& hits = *saved->on_device;
+    make_room(*saved, rays, hits);
+    hits.tree = bvh.on_device;
+    hits.builds = bvh.on_device ? bvh.on_device->builds : 0;
+    hits.is_sorted = sorts;
+    store = store_of(hits);
   }
-  trace_rays(degree_of(surfels), input_of(surfels, bvh.on_device.get(), origins, directions, options), to,
-             store);
+  if (sorts) {
+    input.order = sort_rays(input, surfels.count(), saved ? saved->on_device->sorted : bvh.on_device->rays);
+  }
+  trace_rays(degree_of(surfels), input, to, store);
 }
 
 void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
@@ -210,7 +218,8 @@ void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const T
   room(hits.surfel_sums, {count});
   hits.surfel_sums.zero();
   const int64_t allowed = allowed_records(saved), wanted = look_at_records(hits);
-  const RayInput input = input_of(surfels, hits.tree.get(), origins, directions, options);
+  RayInput input = input_of(surfels, hits.tree.get(), origins, directions, options);
+  if (hits.is_sorted) input.order = hits.sorted.order.data();
   Backward pass(surfels, input, grad_output, hits, gradient);
   if (!hits.overwritten && wanted <= std::min(hits.records.size(), allowed)) {
     pass.run(0, rays, wanted);

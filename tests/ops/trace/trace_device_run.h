@@ -7,15 +7,11 @@
 // Both passes of the tracer on the device, and how what it finds is held against what the CPU finds.
 namespace traceflow::trace {
 
-inline PosedSurfels on(const PosedSurfels& s, Device device) {
-  return {s.position.on(device), s.scale.on(device), s.rotation.on(device),
-          s.opacity.on(device),  s.sh.on(device),    s.tint.on(device)};
-}
 inline Output on(const Output& o, Device device) {
   return {o.colour.on(device), o.alpha.on(device), o.distance.on(device)};
 }
 inline InputGradient on(const InputGradient& g, Device device) {
-  return {on(g.surfels, device), g.origins.on(device), g.directions.on(device),
+  return {g.surfels.on(device), g.origins.on(device), g.directions.on(device),
           g.position_gradient.on(device)};
 }
 inline OutputGradient on(const OutputGradient& g, Device device) {
@@ -26,7 +22,7 @@ inline OutputGradient on(const OutputGradient& g, Device device) {
 inline Traced trace_on_device(const TestScene& scene, const Options& options,
                               int64_t limit = int64_t{1} << 30) {
   constexpr Device device = Device::cuda;
-  const PosedSurfels surfels = on(scene.surfels, device);
+  const PosedSurfels surfels = scene.surfels.on(device);
   const Tensor<float> origins = scene.origins.on(device), directions = scene.directions.on(device);
   const BvhPtr bvh = make_bvh();
   const SavedPtr saved = make_saved();

@@ -139,7 +139,7 @@ TEST_F(TraceOnDevice, HitsAtOneDistanceBlendInOrderOfIndex) {
 
 // What does not fit is traced again in parts, in either kind of sum.
 TEST_F(TraceOnDevice, AgreesWithTheCpuWithoutRoomForItsHits) {
-  const TestScene scene = smooth_scene(4, 2, 120, 150);
+  const TestScene scene = smooth_scene(4, 2, 80, 60);
   const Traced expected = trace(scene, smooth_options());
   for (const bool in_order : {false, true}) {
     const InOrder order(in_order);
@@ -155,7 +155,7 @@ bool same_bytes(const Traced& a, const Traced& b) {
 }
 
 TEST_F(TraceOnDevice, SameBytesEveryRun) {
-  const TestScene scene = smooth_scene(5, 3, 200, 200);
+  const TestScene scene = smooth_scene(5, 3, 150, 100);
   const InOrder order(true);
   for (const int64_t bytes : {int64_t{1} << 30, int64_t{100000}}) {
     const Traced one = trace_on_device(scene, smooth_options(), bytes);
@@ -174,7 +174,7 @@ TEST_F(TraceOnDevice, KeepsItsMemory) {
   size_t free_bytes = 0;
   Output output;
   InputGradient gradient;
-  const PosedSurfels surfels[] = {on(large.surfels, Device::cuda), on(small.surfels, Device::cuda)};
+  const PosedSurfels surfels[] = {large.surfels.on(Device::cuda), small.surfels.on(Device::cuda)};
   const Tensor<float> origins[] = {large.origins.on(Device::cuda), small.origins.on(Device::cuda)};
   const Tensor<float> directions[] = {large.directions.on(Device::cuda), small.directions.on(Device::cuda)};
   const OutputGradient grads[] = {on(to_float(random_output_gradient(5, 150)), Device::cuda),
@@ -204,7 +204,7 @@ TEST_F(TraceOnDevice, GradientsOfSomeOutputsOnly) {
   const SavedPtr saved = make_saved();
   Traced found, expected;
   for (const Device device : {Device::cpu, Device::cuda}) {
-    const PosedSurfels surfels = on(scene.surfels, device);
+    const PosedSurfels surfels = scene.surfels.on(device);
     const Tensor<float> origins = scene.origins.on(device), directions = scene.directions.on(device);
     Traced& to = device == Device::cpu ? expected : found;
     build(surfels, options, *bvh);
