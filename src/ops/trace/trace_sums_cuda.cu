@@ -104,9 +104,11 @@ __global__ void __launch_bounds__(threads) add_runs(Rows rows, int64_t count, To
     return;
   }
   // A run that fills the span has a second row of zeros, so that equal surfels stay side by side.
-  constexpr float nothing[2] = {};
-  if (first_run) ends.write(2 * span, surfel, sum);
-  ends.write(2 * span + 1, surfel, first_run ? nothing : sum);
+  if (first_run) {
+    ends.write(2 * span, surfel, sum);
+    sum[0] = sum[1] = 0;
+  }
+  ends.write(2 * span + 1, surfel, sum);
 }
 
 }  // namespace
