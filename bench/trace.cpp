@@ -4,11 +4,15 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
+#include "math/spherical_harmonics.h"
 #include "ops/trace/trace.h"
+#if defined(TRACEFLOW_EMBREE)
 #include "trace_embree.h"
+#endif
 
 // The tracer on 100,000 surfels in a shell around a mirror ball, seen by the rays that the ball reflects into
-// a camera. One thread, CPU time. Embree runs in the same program on the same surfels and rays.
+// a camera. On the CPU: one thread, CPU time, and where Embree is, it runs in the same program on the same
+// surfels and rays. On the CUDA device, where one answers: the time until all work is done.
 namespace traceflow {
 namespace {
 
@@ -71,6 +75,7 @@ Rays reflect_off_ball(int size, double unevenness) {
   return rays;
 }
 
+#if defined(TRACEFLOW_EMBREE)
 double cpu_seconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -132,6 +137,8 @@ BENCHMARK_CAPTURE(against_embree, faint_flat, faint_flat, 0.0)->Unit(benchmark::
 BENCHMARK_CAPTURE(against_embree, faint_uneven, faint, 0.2)->Unit(benchmark::kMillisecond)->Iterations(3);
 BENCHMARK_CAPTURE(against_embree, opaque, opaque, 0.0)->Unit(benchmark::kMillisecond)->Iterations(3);
 
+#endif
+
 void forward(benchmark::State& state, const Setting& setting, double unevenness) {
   set_threads(1);
   const PosedSurfels surfels = make_shell(setting);
@@ -188,6 +195,86 @@ void build(benchmark::State& state) {
   for (auto _ : state) trace::build(surfels, {}, *bvh);
 }
 BENCHMARK(build)->Unit(benchmark::kMillisecond)->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime();
+
+// The same on the CUDA device; the argument is the picture's width, 1024 being 740,000 rays.
+class OnDevice {
+ public:
+  OnDevice(const Setting& setting, double unevenness, int size) {
+    const PosedSurfels surfels = make_shell(setting);
+    const Rays rays = reflect_off_ball(size, unevenness);
+    surfels_ = surfels.on(Device::cuda);
+    origins_ = rays.origins.on(Device::cuda);
+    directions_ = rays.directions.on(Device::cuda);
+    build();
+    forward(saved_.get());
+    grad_ = {output_.colour, output_.alpha, output_.distance};
+    backward();
+  }
+  void build() { trace::build(surfels_, {}, *bvh_); }
+  void forward(trace::Saved* saved) {
+    trace::forward(surfels_, *bvh_, origins_, directions_, {}, output_, saved);
+  }
+  void backward() { trace::backward(surfels_, origins_, directions_, {}, *saved_, grad_, gradient_); }
+  int64_t rays() const { return origins_.dim(0); }
+  double hits_per_ray() const {
+    return static_cast<double>(trace::blended_hits(*saved_)) / static_cast<double>(rays());
+  }
+  trace::Saved* saved() { return saved_.get(); }
+
+ private:
+  PosedSurfels surfels_;
+  Tensor<float> origins_, directions_;
+  trace::BvhPtr bvh_ = trace::make_bvh();
+  trace::SavedPtr saved_ = trace::make_saved();
+  trace::Output output_;
+  trace::OutputGradient grad_;
+  trace::InputGradient gradient_;
+};
+
+template <class Step>
+void on_device(benchmark::State& state, const Setting& setting, double unevenness, Step&& step) {
+  OnDevice tracer(setting, unevenness, static_cast<int>(state.range(0)));
+  for (auto _ : state) {
+    step(tracer);
+    cuda::synchronise();
+  }
+  state.SetItemsProcessed(state.iterations() * tracer.rays());
+  state.counters["hits_per_ray"] = tracer.hits_per_ray();
+}
+
+template <class Step>
+void register_on_device(const std::string& name, const Step& step) {
+  const struct {
+    const char* name;
+    const Setting& setting;
+    double unevenness;
+  } scenes[] = {{"faint", faint, 0}, {"faint_uneven", faint, 0.2}, {"opaque", opaque, 0}};
+  for (const auto& scene : scenes) {
+    benchmark::RegisterBenchmark(
+        (name + "_on_device/" + scene.name).c_str(),
+        [scene, step](benchmark::State& state) { on_device(state, scene.setting, scene.unevenness, step); })
+        ->Unit(benchmark::kMillisecond)
+        ->Arg(256)
+        ->Arg(1024)
+        ->UseRealTime();
+  }
+}
+
+// Before main() looks for what is registered.
+[[maybe_unused]] const bool device_registered = [] {
+  std::string why_not;
+  if (cuda::answers == nullptr || !cuda::answers(why_not)) return false;
+  register_on_device("build", [](OnDevice& t) { t.build(); });
+  register_on_device("forward", [](OnDevice& t) { t.forward(nullptr); });
+  register_on_device("forward_saved", [](OnDevice& t) { t.forward(t.saved()); });
+  register_on_device("backward", [](OnDevice& t) { t.backward(); });
+  register_on_device("backward_in_order", [](OnDevice& t) {
+    cuda::set_deterministic(true);
+    t.backward();
+    cuda::set_deterministic(false);
+  });
+  return true;
+}();
 
 }  // namespace
 }  // namespace traceflow

@@ -1,6 +1,7 @@
 #include "base/device_memory.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cstring>
 
 #include "base/error.h"
@@ -51,3 +52,16 @@ void zero(Device device, void* memory, size_t bytes) {
 }
 
 }  // namespace traceflow::memory
+
+namespace traceflow::cuda {
+
+namespace {
+
+std::atomic<bool> always_the_same = false;
+
+}  // namespace
+
+bool deterministic() { return always_the_same; }
+void set_deterministic(bool on) { always_the_same = on; }
+
+}  // namespace traceflow::cuda

@@ -30,6 +30,15 @@ void zero(Device device, void* memory, size_t bytes);
 
 }  // namespace traceflow::memory
 
+namespace traceflow::cuda {
+
+// Whether steps on the CUDA device add up in an order that is the same every run, where that costs time. Off
+// until it is set.
+bool deterministic();
+void set_deterministic(bool on);
+
+}  // namespace traceflow::cuda
+
 // The CUDA side of the same, defined where the program is built with CUDA (device_cuda.cu), or with the
 // tests' emulation of it; null elsewhere.
 namespace traceflow::cuda {

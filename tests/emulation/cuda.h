@@ -25,6 +25,10 @@
 #define blockDim (::traceflow::emulation::current().block_size)
 #define gridDim (::traceflow::emulation::current().grid_size)
 
+struct alignas(16) float4 {
+  float x, y, z, w;
+};
+
 inline void __syncthreads() { traceflow::emulation::block_barrier(); }
 inline int __syncthreads_or(int predicate) { return traceflow::emulation::block_any(predicate != 0) ? 1 : 0; }
 inline int __syncthreads_and(int predicate) {
@@ -137,6 +141,11 @@ T atomicCAS(T* address, std::type_identity_t<T> expected, std::type_identity_t<T
 
 template <class T>
 T __ldg(const T* address) {
+  return *address;
+}
+// Past the first cache, of which the emulation has none.
+template <class T>
+T __ldcg(const T* address) {
   return *address;
 }
 inline int __popc(unsigned x) { return std::popcount(x); }

@@ -7,8 +7,9 @@
 #include "math/types.h"
 #include "scene/surfels.h"
 
-// Traces rays through surfels and blends all hits in exact order of distance (method §5).
-// Differentiable: every posed value but tint, ray origins, ray directions.
+// Traces rays through surfels and blends all hits in exact order of distance (method §5). Runs where the rays
+// are, which is where the surfels are. Differentiable: every posed value but tint, ray origins, ray
+// directions.
 namespace traceflow::trace {
 
 struct Options {
@@ -16,7 +17,8 @@ struct Options {
   float alpha_min = 1.0F / 255;
   float alpha_max = 0.99F;
   float transmittance_min = 1e-4F;
-  // k: hits gathered between two looks at whether the ray has ended. Changes speed, never the image.
+  // k: hits gathered between two looks at whether the ray has ended. Changes speed, never the image. On the
+  // CUDA device k is fixed (trace_walk_cuda.h).
   int hits_per_pass = 64;
   Vec3<float> background{0};
 
@@ -78,8 +80,11 @@ struct SavedDeleter {
 };
 using SavedPtr = std::unique_ptr<Saved, SavedDeleter>;
 SavedPtr make_saved();
-// How many hits were blended, over all rays.
+// How many hits were blended, over all rays. Waits for the device.
 int64_t blended_hits(const Saved& saved);
+// How much of the CUDA device's memory the lists, and what backward makes of them, may take; 1 GiB until it
+// is set. Rays whose hits do not fit are traced again by backward, in parts.
+void limit_device_bytes(Saved& saved, int64_t bytes);
 
 // origins, directions: R×3, world; directions need not have unit length (SH uses the unit one). Rays that are
 // not finite or have a zero direction see the background. `bvh` was built from these surfels. saved may be
@@ -87,7 +92,9 @@ int64_t blended_hits(const Saved& saved);
 void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
              const Tensor<float>& directions, const Options& options, Output& output, Saved* saved);
 
-// Sets (does not add to) `gradient`. Sums in a fixed order: the same bytes at any thread count.
+// Sets (does not add to) `gradient`. On the CPU sums are in a fixed order: the same bytes at any thread
+// count. On the CUDA device they are where cuda::deterministic() is set. The BVH of the forward pass has not
+// been built anew since.
 void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
               const Options& options, const Saved& saved, const OutputGradient& grad_output,
               InputGradient& gradient);

@@ -4,7 +4,6 @@
 #include <bit>
 
 #include "base/parallel.h"
-#include "math/rotation.h"
 
 namespace traceflow::trace {
 
@@ -50,38 +49,14 @@ std::vector<Group> make_groups(const Saved& saved, int64_t surfels) {
 
 std::vector<BackwardFrame> make_backward_frames(const PosedSurfels& surfels) {
   std::vector<BackwardFrame> frames(static_cast<size_t>(surfels.count()));
-  parallel_for("trace frames", surfels.count(), [&](int64_t i) {
-    const Mat3<float> rotation = rotation_from_quaternion(load4<float>(surfels.rotation.row(i)));
-    frames[static_cast<size_t>(i)] = {load3<float>(surfels.position.row(i)),
-                                      rotation[0],
-                                      rotation[1],
-                                      rotation[2],
-                                      {1 / surfels.scale(i, 0), 1 / surfels.scale(i, 1)},
-                                      1 / surfels.opacity[i],
-                                      0};
-  });
+  parallel_for("trace frames", surfels.count(), MakeFrame{surfels, frames.data()});
   return frames;
 }
 
 void finish_surfels(const PosedSurfels& surfels, const std::vector<BackwardFrame>& frames,
                     const std::vector<SurfelSums>& sums, InputGradient& gradient) {
-  parallel_for("trace surfel gradients", surfels.count(), [&](int64_t i) {
-    const BackwardFrame& f = frames[static_cast<size_t>(i)];
-    const SurfelSums& sum = sums[static_cast<size_t>(i)];
-    const float* p = sum.value + part::position;
-    const float* turned = sum.value + part::turn;
-    if (p[0] != 0 || p[1] != 0 || p[2] != 0) {
-      store3(gradient.surfels.position.row(i), p[0] * f.t_u + p[1] * f.t_v + p[2] * f.normal);
-      // A rotation's gradient that has these turns: its other components do not matter to a unit quaternion.
-      const Mat3<float> turn(turned[2] * f.t_v - turned[1] * f.normal, turned[0] * f.normal, Vec3<float>(0));
-      const Vec4<float> q = rotation_from_quaternion_backward(load4<float>(surfels.rotation.row(i)), turn);
-      for (int k = 0; k < 4; ++k) gradient.surfels.rotation(i, k) = q[k];
-    }
-    for (int k = 0; k < 2; ++k)
-      gradient.surfels.scale(i, k) = sum.value[part::scale + static_cast<size_t>(k)];
-    gradient.surfels.opacity[i] = sum.value[part::opacity];
-    gradient.position_gradient[i] = sum.value[part::signal];
-  });
+  parallel_for("trace surfel gradients", surfels.count(),
+               FinishSurfel{surfels, frames.data(), sums.data(), gradient});
 }
 
 }  // namespace traceflow::trace

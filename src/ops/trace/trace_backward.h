@@ -22,6 +22,23 @@ struct alignas(64) BackwardFrame {
   float unused;
 };
 
+// Surfel i of a set.
+struct MakeFrame {
+  SurfelView<float> surfels;
+  BackwardFrame* frames;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const SurfelFrame<float> f = surfels.frame(i);
+    frames[i] = {f.position,
+                 f.rotation[0],
+                 f.rotation[1],
+                 f.rotation[2],
+                 {1 / f.scale.x, 1 / f.scale.y},
+                 1 / surfels.opacity[i],
+                 0};
+  }
+};
+
 // What hits do to their surfel, geometry in the surfel's own frame: the sums of these turn into the surfel's
 // gradients once, at the end.
 namespace part {
@@ -37,6 +54,48 @@ inline constexpr size_t padded = 16;
 struct alignas(64) SurfelSums {
   float value[part::padded];
 };
+
+// Turns the sums of all hits of surfel i into gradients.
+struct FinishSurfel {
+  SurfelView<float> surfels;
+  const BackwardFrame* frames;
+  const SurfelSums* sums;
+  float *position, *scale, *rotation, *opacity, *signal;
+
+  FinishSurfel(const PosedSurfels& s, const BackwardFrame* f, const SurfelSums* sums_of, InputGradient& g)
+      : surfels(s),
+        frames(f),
+        sums(sums_of),
+        position(g.surfels.position.data()),
+        scale(g.surfels.scale.data()),
+        rotation(g.surfels.rotation.data()),
+        opacity(g.surfels.opacity.data()),
+        signal(g.position_gradient.data()) {}
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const BackwardFrame& f = frames[i];
+    const float* sum = sums[i].value;
+    const float* p = sum + part::position;
+    const float* turned = sum + part::turn;
+    if (p[0] != 0 || p[1] != 0 || p[2] != 0) {
+      store3(position + 3 * i, p[0] * f.t_u + p[1] * f.t_v + p[2] * f.normal);
+      // A rotation's gradient that has these turns: its other components do not matter to a unit quaternion.
+      const Mat3<float> turn(turned[2] * f.t_v - turned[1] * f.normal, turned[0] * f.normal, Vec3<float>(0));
+      const Vec4<float> q = rotation_from_quaternion_backward(load4<float>(surfels.rotation + 4 * i), turn);
+      for (int k = 0; k < 4; ++k) rotation[4 * i + k] = q[k];
+    }
+    for (int k = 0; k < 2; ++k) scale[2 * i + k] = sum[part::scale + static_cast<size_t>(k)];
+    opacity[i] = sum[part::opacity];
+    signal[i] = sum[part::signal];
+  }
+};
+
+// dL/d(caller's direction) = from the unit direction, and from the distance, which is in units of its length.
+TRACEFLOW_HD inline Vec3<float> direction_backward(const UnitRay& ray, const Vec3<float>& grad_unit,
+                                                   float grad_distance, float distance) {
+  const Vec3<float> tangential = grad_unit - dot(grad_unit, ray.direction) * ray.direction;
+  return (tangential - grad_distance * distance * ray.direction) / ray.length;
+}
 
 // In a group a surfel's row of sums: the parts, then dL/dsh in vectors, each of whole coefficients.
 inline constexpr size_t row_floats(int64_t coefficients) {

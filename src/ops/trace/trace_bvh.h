@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "ops/trace/trace.h"
@@ -40,6 +41,10 @@ inline constexpr int bvh_max_free_depth = 40;
 inline constexpr int bvh_max_depth = bvh_max_free_depth + 28;
 inline constexpr int bvh_stack = bvh_max_depth * (bvh_width - 1) + 1;
 
+namespace cuda {
+struct Tree;
+}  // namespace cuda
+
 class Bvh {
  public:
   // Empty where no surfel can be hit; node 0 is the root.
@@ -47,6 +52,8 @@ class Bvh {
   std::vector<BvhLeaf> leaves;
   int64_t surfels = 0;  // of the set that it was built from
   float leaf_size = 0;  // of a typical leaf: half its box's diagonal; scene units
+  // In the place of all that where it was built on the CUDA device. Shared with what backward traces again.
+  std::shared_ptr<cuda::Tree> on_device;
 };
 
 }  // namespace traceflow::trace

@@ -5,6 +5,8 @@
 #include "math/blend.h"
 #include "math/rotation.h"
 #include "ops/trace/trace_bvh.h"
+#include "ops/trace/trace_cpu.h"
+#include "ops/trace/trace_disk.h"
 #include "ops/trace/trace_tree.h"
 #include "ops/trace/trace_usable.h"
 
@@ -12,44 +14,26 @@ namespace traceflow::trace {
 
 namespace {
 
-// The box of a disk: of an ellipse with half axes a t_u and b t_v. Wider by what rounding may move a hit.
-Box disk_box(const PosedSurfels& surfels, int64_t i, float radius) {
-  const Mat3<float> rotation = rotation_from_quaternion(load4<float>(surfels.rotation.row(i)));
-  const Vec3<float> a = radius * surfels.scale(i, 0) * rotation[0];
-  const Vec3<float> b = radius * surfels.scale(i, 1) * rotation[1];
+Box widen_to_vectors(const DiskBox& disk) {
   Box box;
-  box.lower = box.upper = Float4{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const float centre = surfels.position(i, axis);
-    const float half = std::sqrt(a[axis] * a[axis] + b[axis] * b[axis]);
-    const float margin = 2e-6F * (std::abs(centre) + std::max(glm::length(a), glm::length(b)));
-    box.lower[axis] = centre - half - margin;
-    box.upper[axis] = centre + half + margin;
-  }
+  box.lower = Float4{disk.lower.x, disk.lower.y, disk.lower.z, 0};
+  box.upper = Float4{disk.upper.x, disk.upper.y, disk.upper.z, 0};
   return box;
-}
-
-// Larger boxes would overflow where areas and centres are computed.
-bool is_bounded(const Box& box) {
-  constexpr float limit = 1e15F;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!(box.lower[axis] > -limit && box.upper[axis] < limit)) return false;
-  }
-  return true;
 }
 
 // Boxes of the surfels that can be hit, in the order of the surfels.
 std::vector<BoxItem> make_items(const PosedSurfels& surfels, const BlendRules<float>& rules) {
   constexpr int64_t grain = 4096;
   const int64_t count = surfels.count();
+  const SurfelView<float> view(surfels);
   std::vector<std::vector<BoxItem>> parts(static_cast<size_t>((count + grain - 1) / grain));
   parallel_blocks("trace boxes", count, grain, [&](int64_t begin, int64_t end) {
     std::vector<BoxItem>& part = parts[static_cast<size_t>(begin / grain)];
     part.reserve(static_cast<size_t>(end - begin));
     for (int64_t i = begin; i < end; ++i) {
-      if (!is_usable(surfels, i, rules.alpha_min)) continue;
-      const Box box = disk_box(surfels, i, std::sqrt(cutoff_radius2(rules, surfels.opacity[i])));
-      if (is_bounded(box)) part.push_back({box, static_cast<uint32_t>(i)});
+      if (!view.is_usable(i, rules.alpha_min)) continue;
+      const DiskBox box = disk_box(view.frame(i), std::sqrt(cutoff_radius2(rules, surfels.opacity[i])));
+      if (box.is_bounded()) part.push_back({widen_to_vectors(box), static_cast<uint32_t>(i)});
     }
   });
   std::vector<BoxItem> items;
@@ -102,10 +86,7 @@ float typical_leaf_size(const std::vector<BinaryNode>& binary, const std::vector
 
 }  // namespace
 
-void BvhDeleter::operator()(Bvh* bvh) const { delete bvh; }
-BvhPtr make_bvh() { return BvhPtr(new Bvh); }
-
-void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
+void cpu::build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
   const BlendRules<float> rules{options.alpha_min, options.alpha_max, options.transmittance_min};
   std::vector<BoxItem> items = make_items(surfels, rules);
   const std::vector<BinaryNode> binary = build_binary_tree(items);

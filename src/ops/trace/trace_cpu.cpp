@@ -5,6 +5,7 @@
 #include <hwy/highway.h>
 
 #include "base/parallel.h"
+#include "ops/trace/trace_cpu.h"
 #include "ops/trace/trace_packet-inl.h"
 #include "ops/trace/trace_ray-inl.h"
 #include "ops/trace/trace_sh-inl.h"
@@ -200,22 +201,18 @@ namespace traceflow::trace {
 
 HWY_EXPORT(trace_rays);
 
-void SavedDeleter::operator()(Saved* saved) const { delete saved; }
-SavedPtr make_saved() { return SavedPtr(new Saved); }
-
-int64_t blended_hits(const Saved& saved) {
+int64_t cpu::blended_hits(const Saved& saved) {
   int64_t sum = 0;
   for (const SavedBlock& block : saved.blocks) sum += static_cast<int64_t>(block.surfel.size());
   return sum;
 }
 
-void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
-             const Tensor<float>& directions, const Options& options, Output& output, Saved* saved) {
-  require(bvh.surfels == surfels.count(), "the BVH was built from these surfels");
+void cpu::forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
+                  const Tensor<float>& directions, const Options& options, Output& output, Saved* saved) {
   const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  output.colour.resize({rays, 3});
-  output.alpha.resize({rays});
-  output.distance.resize({rays});
+  output.colour.place(Device::cpu).resize({rays, 3});
+  output.alpha.place(Device::cpu).resize({rays});
+  output.distance.place(Device::cpu).resize({rays});
   RayOrder unsaved;
   RayOrder& order = saved ? saved->order : unsaved;
   order_rays(bvh, origins, directions, order);

@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "math/blend.h"
 #include "ops/trace/trace_backward.h"
+#include "ops/trace/trace_cpu.h"
 #include "ops/trace/trace_geometry-inl.h"
 #include "ops/trace/trace_sh-inl.h"
 
@@ -108,13 +109,6 @@ HWY_INLINE void blend_backward(const RayHits& hits, const RaySums& sums, const R
     scratch.grad_exponent[i] = alpha >= options.alpha_max ? 0 : grad_alpha * alpha;
     scratch.grad_distance[i] = weight * grad_distance;
   }
-}
-
-// dL/d(caller's direction) = from the unit direction, and from the distance, which is in units of its length.
-HWY_INLINE Vec3<float> direction_backward(const UnitRay& ray, const Vec3<float>& grad_unit,
-                                          float grad_distance, float distance) {
-  const Vec3<float> tangential = grad_unit - dot(grad_unit, ray.direction) * ray.direction;
-  return (tangential - grad_distance * distance * ray.direction) / ray.length;
 }
 
 template <int degree>
@@ -261,15 +255,15 @@ void chunk_backward(const BackwardInput& input, std::span<const Group> groups, T
 
 }  // namespace
 
-void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
-              const Options& options, const Saved& saved, const OutputGradient& grad_output,
-              InputGradient& gradient) {
+void cpu::backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
+                   const Options& options, const Saved& saved, const OutputGradient& grad_output,
+                   InputGradient& gradient) {
   const int64_t rays = origins.empty() ? 0 : origins.dim(0);
   require(static_cast<int64_t>(saved.order.ray.size()) == rays, "the hits were saved for these rays");
   gradient.surfels.reset_like(surfels);
-  gradient.origins.reset({rays, 3});
-  gradient.directions.reset({rays, 3});
-  gradient.position_gradient.reset({surfels.count()});
+  gradient.origins.place(Device::cpu).reset({rays, 3});
+  gradient.directions.place(Device::cpu).reset({rays, 3});
+  gradient.position_gradient.place(Device::cpu).reset({surfels.count()});
   const std::vector<BackwardFrame> frames = make_backward_frames(surfels);
   std::vector<SurfelSums> sums(frames.size(), SurfelSums{});
   const BackwardInput input{surfels, origins, directions, options, grad_output, frames, saved};

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "math/spherical_harmonics.h"
@@ -40,9 +41,16 @@ struct SavedBlock {
   }
 };
 
+namespace cuda {
+struct SavedHits;
+}  // namespace cuda
+
 struct Saved {
+  Device device = Device::cpu;  // of the forward pass
   RayOrder order;
   std::vector<SavedBlock> blocks;
+  std::shared_ptr<cuda::SavedHits> on_device;
+  int64_t device_bytes = int64_t{1} << 30;  // that the lists on the device may take
 };
 
 // One block of rays of a forward pass.
@@ -66,10 +74,10 @@ struct UnitRay {
 };
 
 // False for a ray that sees the background only. Scales first, so that no square over- or underflows.
-inline bool make_unit_ray(const float* origin, const float* direction, UnitRay& ray) {
+TRACEFLOW_HD inline bool make_unit_ray(const float* origin, const float* direction, UnitRay& ray) {
   if (!is_traceable(origin, direction)) return false;
   const Vec3<float> d = load3<float>(direction);
-  const float largest = std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)});
+  const float largest = std::fmax(std::abs(d.x), std::fmax(std::abs(d.y), std::abs(d.z)));
   const Vec3<float> scaled = d / largest;
   const float scaled_length = std::sqrt(dot(scaled, scaled));
   ray = {load3<float>(origin), scaled / scaled_length, largest * scaled_length};

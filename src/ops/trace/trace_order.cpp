@@ -6,26 +6,11 @@
 
 #include "base/parallel.h"
 #include "ops/trace/trace_kernels.h"
+#include "ops/trace/trace_ray_key.h"
 
 namespace traceflow::trace {
 
 namespace {
-
-constexpr uint32_t untraceable_key = 1U << 30;  // behind all 30-bit keys
-
-// Moves the lower 10 bits apart: to bits 0, 3, 6, …
-uint32_t spread_bits(uint32_t x) {
-  x = (x | x << 16) & 0x030000FFU;
-  x = (x | x << 8) & 0x0300F00FU;
-  x = (x | x << 4) & 0x030C30C3U;
-  return (x | x << 2) & 0x09249249U;
-}
-
-uint32_t morton_key(const Vec3<float>& unit_cube) {
-  const Vec3<float> cell = glm::clamp(unit_cube, Vec3<float>(0), Vec3<float>(1)) * 1023.0F;
-  return spread_bits(static_cast<uint32_t>(cell.x)) | spread_bits(static_cast<uint32_t>(cell.y)) << 1 |
-         spread_bits(static_cast<uint32_t>(cell.z)) << 2;
-}
 
 Vec3<float> median(std::vector<Vec3<float>> points) {
   if (points.empty()) return Vec3<float>(0);
@@ -146,15 +131,10 @@ void order_rays(const Bvh& bvh, const Tensor<float>& origins, const Tensor<float
   if (rays == 0) return;
   const Vec3<float> centre = typical_origin(origins, directions);
   order.reach = typical_distance(bvh, centre);
-  const float scale = 0.25F / order.reach;
   std::vector<Keyed> items(static_cast<size_t>(rays));
   parallel_for("trace order", rays, [&](int64_t r) {
-    UnitRay ray;
-    uint32_t key = untraceable_key;
-    if (make_unit_ray(origins.row(r), directions.row(r), ray)) {
-      key = morton_key(scale * (ray.origin + order.reach * ray.direction - centre) + Vec3<float>(0.5F));
-    }
-    items[static_cast<size_t>(r)] = {key, static_cast<uint32_t>(r)};
+    items[static_cast<size_t>(r)] = {ray_key(origins.row(r), directions.row(r), centre, order.reach),
+                                     static_cast<uint32_t>(r)};
   });
   radix_sort(items);
   std::transform(items.begin(), items.end(), order.ray.begin(), [](const Keyed& item) { return item.ray; });

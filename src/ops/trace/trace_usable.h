@@ -3,31 +3,56 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/rotation.h"
+#include "math/surfel_hit.h"
 #include "scene/surfels.h"
 
 namespace traceflow::trace {
 
 // Whether all of n numbers are finite, without branches: 0 · x is 0 for finite x only.
 template <class T>
-bool all_finite(const T* values, int64_t n) {
+TRACEFLOW_HD bool all_finite(const T* values, int64_t n) {
   T sum(0);
   for (int64_t i = 0; i < n; ++i) sum += T(0) * values[i];
   return sum == T(0);
 }
 
-// Whether surfel i can be hit at all: finite, of positive area, of an opacity that reaches alpha_min.
+// Addresses of a set of posed surfels, on any device.
+template <class T>
+struct SurfelView {
+  const T *position, *scale, *rotation, *opacity, *sh;
+  int64_t sh_numbers;  // of one surfel
+
+  SurfelView(const BasicPosedSurfels<T>& s)
+      : position(s.position.data()),
+        scale(s.scale.data()),
+        rotation(s.rotation.data()),
+        opacity(s.opacity.data()),
+        sh(s.sh.data()),
+        sh_numbers(s.sh.row_size()) {}
+
+  // Whether surfel i can be hit at all: finite, of positive area, of an opacity that reaches alpha_min.
+  TRACEFLOW_HD bool is_usable(int64_t i, T alpha_min) const {
+    return all_finite(position + 3 * i, 3) && all_finite(scale + 2 * i, 2) &&
+           all_finite(rotation + 4 * i, 4) && all_finite(sh + sh_numbers * i, sh_numbers) &&
+           scale[2 * i] > T(0) && scale[2 * i + 1] > T(0) && std::isfinite(opacity[i]) &&
+           opacity[i] >= alpha_min;
+  }
+  TRACEFLOW_HD SurfelFrame<T> frame(int64_t i) const {
+    return {load3<T>(position + 3 * i),
+            rotation_from_quaternion(load4<T>(rotation + 4 * i)),
+            {scale[2 * i], scale[2 * i + 1]}};
+  }
+};
+
 template <class T>
 bool is_usable(const BasicPosedSurfels<T>& surfels, int64_t i, T alpha_min) {
-  const T* scale = surfels.scale.row(i);
-  return all_finite(surfels.position.row(i), 3) && all_finite(scale, 2) &&
-         all_finite(surfels.rotation.row(i), 4) && all_finite(surfels.sh.row(i), surfels.sh.row_size()) &&
-         scale[0] > T(0) && scale[1] > T(0) && std::isfinite(surfels.opacity[i]) &&
-         surfels.opacity[i] >= alpha_min;
+  return SurfelView<T>(surfels).is_usable(i, alpha_min);
 }
 
 // Whether a ray can be traced: finite, with a direction.
 template <class T>
-bool is_traceable(const T* origin, const T* direction) {
+TRACEFLOW_HD bool is_traceable(const T* origin, const T* direction) {
   return all_finite(origin, 3) && all_finite(direction, 3) &&
          (direction[0] != T(0) || direction[1] != T(0) || direction[2] != T(0));
 }

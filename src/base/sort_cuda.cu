@@ -1,0 +1,36 @@
+#include <cub/device/device_radix_sort.cuh>
+
+#include "base/kernel.h"
+#include "base/sort.h"
+
+namespace traceflow::cuda {
+
+namespace {
+
+template <class Key>
+void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t* values,
+          uint32_t* sorted_values, Tensor<uint8_t>& scratch) {
+  if (n == 0) return;
+  size_t bytes = 0;
+  check(cub::DeviceRadixSort::SortPairs(nullptr, bytes, keys, sorted_keys, values, sorted_values, n, 0, bits,
+                                        stream()),
+        "a sort's scratch memory");
+  scratch.place(Device::cuda).resize({static_cast<int64_t>(bytes)});
+  check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, sorted_keys, values, sorted_values, n, 0,
+                                        bits, stream()),
+        "a sort");
+}
+
+}  // namespace
+
+void sort_pairs(int64_t n, int bits, const uint64_t* keys, uint64_t* sorted_keys, const uint32_t* values,
+                uint32_t* sorted_values, Tensor<uint8_t>& scratch) {
+  sort(n, bits, keys, sorted_keys, values, sorted_values, scratch);
+}
+
+void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys, const uint32_t* values,
+                uint32_t* sorted_values, Tensor<uint8_t>& scratch) {
+  sort(n, bits, keys, sorted_keys, values, sorted_values, scratch);
+}
+
+}  // namespace traceflow::cuda

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "ops/trace/trace_kernels.h"
+
+// Where a ray stands in the order in which rays are traced.
+namespace traceflow::trace {
+
+inline constexpr int ray_key_bits = 31;
+inline constexpr uint32_t untraceable_key = 1U << 30;  // behind all 30-bit keys
+
+// Moves the lower 10 bits apart: to bits 0, 3, 6, …
+TRACEFLOW_HD inline uint32_t spread_bits(uint32_t x) {
+  x = (x | x << 16) & 0x030000FFU;
+  x = (x | x << 8) & 0x0300F00FU;
+  x = (x | x << 4) & 0x030C30C3U;
+  return (x | x << 2) & 0x09249249U;
+}
+
+TRACEFLOW_HD inline uint32_t morton_key(const Vec3<float>& unit_cube) {
+  const Vec3<float> cell = glm::clamp(unit_cube, Vec3<float>(0), Vec3<float>(1)) * 1023.0F;
+  return spread_bits(static_cast<uint32_t>(cell.x)) | spread_bits(static_cast<uint32_t>(cell.y)) << 1 |
+         spread_bits(static_cast<uint32_t>(cell.z)) << 2;
+}
+
+// Along a space-filling curve by the point at the distance `reach`, seen from `centre`.
+TRACEFLOW_HD inline uint32_t ray_key(const float* origin, const float* direction, const Vec3<float>& centre,
+                                     float reach) {
+  UnitRay ray;
+  if (!make_unit_ray(origin, direction, ray)) return untraceable_key;
+  const float scale = 0.25F / reach;
+  return morton_key(scale * (ray.origin + reach * ray.direction - centre) + Vec3<float>(0.5F));
+}
+
+}  // namespace traceflow::trace

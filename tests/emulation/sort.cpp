@@ -1,0 +1,42 @@
+#include "base/sort.h"
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "base/error.h"
+#include "emulation/device.h"
+
+namespace traceflow::cuda {
+
+namespace {
+
+template <class Key>
+void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t* values,
+          uint32_t* sorted_values) {
+  require(n == 0 || (keys != sorted_keys && values != sorted_values), "a sort has room for its results");
+  const emulation::DeviceAccess access;
+  const Key mask = bits >= static_cast<int>(8 * sizeof(Key)) ? ~Key{0} : (Key{1} << bits) - 1;
+  std::vector<int64_t> order(static_cast<size_t>(n));
+  std::iota(order.begin(), order.end(), int64_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int64_t a, int64_t b) { return (keys[a] & mask) < (keys[b] & mask); });
+  for (const int64_t from : order) {
+    *sorted_keys++ = keys[from];
+    *sorted_values++ = values[from];
+  }
+}
+
+}  // namespace
+
+void sort_pairs(int64_t n, int bits, const uint64_t* keys, uint64_t* sorted_keys, const uint32_t* values,
+                uint32_t* sorted_values, Tensor<uint8_t>&) {
+  sort(n, bits, keys, sorted_keys, values, sorted_values);
+}
+
+void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys, const uint32_t* values,
+                uint32_t* sorted_values, Tensor<uint8_t>&) {
+  sort(n, bits, keys, sorted_keys, values, sorted_values);
+}
+
+}  // namespace traceflow::cuda
