@@ -18,14 +18,22 @@ struct BasicSurfels {
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint_logit.empty(); }
 
-  // Zeros in the shapes of another set, in the memory that is there.
+  Device device() const { return position.device(); }
+  // The same set on a device.
+  BasicSurfels on(Device device) const {
+    return {position.on(device),      log_scale.on(device), rotation.on(device),
+            opacity_logit.on(device), sh.on(device),        tint_logit.on(device)};
+  }
+
+  // Zeros in the shapes of another set and on its device, in the memory that is there.
   void reset_like(const BasicSurfels& other) {
-    position.reset(other.position.shape());
-    log_scale.reset(other.log_scale.shape());
-    rotation.reset(other.rotation.shape());
-    opacity_logit.reset(other.opacity_logit.shape());
-    sh.reset(other.sh.shape());
-    tint_logit.reset(other.tint_logit.shape());
+    const Device device = other.device();
+    position.place(device).reset(other.position.shape());
+    log_scale.place(device).reset(other.log_scale.shape());
+    rotation.place(device).reset(other.rotation.shape());
+    opacity_logit.place(device).reset(other.opacity_logit.shape());
+    sh.place(device).reset(other.sh.shape());
+    tint_logit.place(device).reset(other.tint_logit.shape());
   }
 
   // f(name, tensor) for every group, in the order above. An environment has no tint group.
@@ -65,25 +73,34 @@ struct BasicPosedSurfels {
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint.empty(); }
 
-  // Zeros in the shapes of another set: how a gradient starts.
+  Device device() const { return position.device(); }
+  // The same set on a device.
+  BasicPosedSurfels on(Device device) const {
+    return {position.on(device), scale.on(device), rotation.on(device),
+            opacity.on(device),  sh.on(device),    tint.on(device)};
+  }
+
+  // Zeros in the shapes of another set and on its device: how a gradient starts.
   template <class U>
   void reset_like(const BasicPosedSurfels<U>& other) {
-    position.reset(other.position.shape());
-    scale.reset(other.scale.shape());
-    rotation.reset(other.rotation.shape());
-    opacity.reset(other.opacity.shape());
-    sh.reset(other.sh.shape());
-    tint.reset(other.tint.shape());
+    const Device device = other.device();
+    position.place(device).reset(other.position.shape());
+    scale.place(device).reset(other.scale.shape());
+    rotation.place(device).reset(other.rotation.shape());
+    opacity.place(device).reset(other.opacity.shape());
+    sh.place(device).reset(other.sh.shape());
+    tint.place(device).reset(other.tint.shape());
   }
 };
 using PosedSurfels = BasicPosedSurfels<float>;
 
-// Zeros in the shapes of another set.
+// Zeros in the shapes of another set, on its device.
 template <class To, class From>
 BasicSurfels<To> zeros_like(const BasicSurfels<From>& s) {
-  return {Tensor<To>(s.position.shape()), Tensor<To>(s.log_scale.shape()),
-          Tensor<To>(s.rotation.shape()), Tensor<To>(s.opacity_logit.shape()),
-          Tensor<To>(s.sh.shape()),       Tensor<To>(s.tint_logit.shape())};
+  const Device device = s.device();
+  return {Tensor<To>(s.position.shape(), device), Tensor<To>(s.log_scale.shape(), device),
+          Tensor<To>(s.rotation.shape(), device), Tensor<To>(s.opacity_logit.shape(), device),
+          Tensor<To>(s.sh.shape(), device),       Tensor<To>(s.tint_logit.shape(), device)};
 }
 template <class To, class From>
 BasicSurfels<To> convert(const BasicSurfels<From>& s) {
