@@ -3,6 +3,7 @@
 
 #include "../field_scene.h"
 #include "ops/field/field.h"
+#include "ops/field/field_cuda.h"
 #include "ops/field/network_device.h"
 #include "support/device.h"
 
@@ -92,7 +93,7 @@ TEST_P(FieldCasesOnDevice, Bf16AgreesWithinItsPrecision) {
 }
 
 // Main and environment outputs and those of a moving map; with a skip and without; a count that is a multiple
-// of everything, one that is of nothing, a single point; one that is dealt to several slots.
+// of everything, one that is of nothing, a single point; some that are dealt to several slots, one to all.
 INSTANTIATE_TEST_SUITE_P(
     Shapes, FieldCasesOnDevice,
     ::testing::Values(
@@ -103,6 +104,8 @@ INSTANTIATE_TEST_SUITE_P(
         Case{{.depth = 3, .width = 48, .skip = 1, .time_frequencies = 10}, 3, 130},
         Case{{.depth = 1, .width = 16, .skip = 0}, 1, 65},
         Case{{.depth = 2, .width = 16, .skip = 1, .position_frequencies = 0, .time_frequencies = 0}, 17, 64},
+        Case{{.depth = 2, .width = 16, .skip = 1, .position_frequencies = 1}, 3, 16500},
+        Case{{.depth = 3, .width = 528, .skip = 1}, 11, 70},
         Case{{.depth = 2, .width = 32, .skip = 1, .position_frequencies = 16}, 11, 1}));
 
 // The outputs are the values of one layer, which the encoding and the bias make alone: rounded once, to
@@ -123,6 +126,30 @@ TEST_F(FieldOnDevice, Bf16KeepsTheEncodingsPartNearlyFp32) {
   EXPECT_GT(largest, 5);
   for (int64_t i = 0; i < found.size(); ++i) {
     ASSERT_NEAR(found[i], expected[i], std::ldexp(expected[i], -8) + std::ldexp(largest, -15)) << i;
+  }
+}
+
+// Widths at both ends and one that leaves threads without work; rows that the slots do not divide.
+TEST_F(FieldOnDevice, ColumnsAreSummedInSlots) {
+  Random random(5);
+  for (const int columns : {16, 48, 1024}) {
+    const Tensor<float> values = random_tensor<float>({301, columns}, random, -1, 1);
+    Tensor<Bf16> rounded(values.shape());
+    Tensor<double> expected({4, columns}), expected_rounded({4, columns});
+    for (int64_t i = 0; i < 301; ++i) {
+      const int64_t slot = ((i + 1) * 4 - 1) / 301;
+      for (int64_t k = 0; k < columns; ++k) {
+        store(values(i, k), rounded(i, k));
+        expected(slot, k) += values(i, k);
+        expected_rounded(slot, k) += to_float(rounded(i, k));
+      }
+    }
+    Tensor<float> sums({4, columns}, Device::cuda), rounded_sums({4, columns}, Device::cuda);
+    field::cuda::add_column_sums(values.on(Device::cuda).data(), 301, columns, 4, sums.data(), columns);
+    field::cuda::add_column_sums(rounded.on(Device::cuda).data(), 301, columns, 4, rounded_sums.data(),
+                                 columns);
+    expect_close_on_host(sums, expected, 1e-5, "fp32");
+    expect_close_on_host(rounded_sums, expected_rounded, 1e-5, "bf16");
   }
 }
 
