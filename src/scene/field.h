@@ -49,6 +49,18 @@ struct BasicField {
 
   int outputs() const { return head_bias.empty() ? 0 : static_cast<int>(head_bias.dim(0)); }
 
+  Device device() const { return head_weight.device(); }
+  // The same parameters on a device.
+  BasicField on(Device device) const {
+    BasicField result;
+    result.shape = shape;
+    for (const auto& w : weight) result.weight.push_back(w.on(device));
+    for (const auto& b : bias) result.bias.push_back(b.on(device));
+    result.head_weight = head_weight.on(device);
+    result.head_bias = head_bias.on(device);
+    return result;
+  }
+
   // f(name, tensor) for every parameter tensor: "weight0", "bias0", …, "head_weight", "head_bias".
   template <class F>
   void for_each(F&& f) {
@@ -75,14 +87,16 @@ using Field = BasicField<float>;
 // Hidden layers uniform in ±1/√inputs, heads zero, so that F ≡ 0 at the start (method §1.2).
 Field make_field(const NetworkOptions& shape, int outputs, Random& random);
 
+// Zeros in the shapes of another field, on its device.
 template <class To, class From>
 BasicField<To> zeros_like(const BasicField<From>& field) {
+  const Device device = field.device();
   BasicField<To> result;
   result.shape = field.shape;
-  for (const auto& w : field.weight) result.weight.emplace_back(w.shape());
-  for (const auto& b : field.bias) result.bias.emplace_back(b.shape());
-  result.head_weight = Tensor<To>(field.head_weight.shape());
-  result.head_bias = Tensor<To>(field.head_bias.shape());
+  for (const auto& w : field.weight) result.weight.emplace_back(w.shape(), device);
+  for (const auto& b : field.bias) result.bias.emplace_back(b.shape(), device);
+  result.head_weight = Tensor<To>(field.head_weight.shape(), device);
+  result.head_bias = Tensor<To>(field.head_bias.shape(), device);
   return result;
 }
 template <class To, class From>

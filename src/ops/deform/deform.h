@@ -7,7 +7,8 @@
 // activations.
 //   position p + Δp · rotation q + Δr (not normalised here) · scale exp(log s + Δs) · opacity σ(o + Δo) ·
 //   tint σ(τ + Δτ)
-// Differentiable: every stored value and the field's parameters. The position enters the field detached.
+// Differentiable: every stored value and the field's parameters. The position enters the field detached. Runs
+// where the stored surfels are; the field is there too.
 namespace traceflow::deform {
 
 struct Saved {

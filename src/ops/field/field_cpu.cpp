@@ -4,6 +4,7 @@
 #include "ops/field/field.h"
 #include "ops/field/field_kernels.h"
 #include "ops/field/network.h"
+#include "ops/field/network_device.h"
 
 namespace traceflow::field {
 
@@ -59,6 +60,7 @@ void forward_block(const Layout& layout, const ForwardWeights& weights, const fl
 
 void forward(const Field& field, const Tensor<float>& points, float time, Precision precision,
              Tensor<float>& output, Saved* saved) {
+  if (field.device() == Device::cuda) return device::forward(field, points, time, precision, output, saved);
   thread_local ForwardWeights weights;
   const Precision used = bf16_is_fast() ? precision : Precision::fp32;
   const Layout layout(field, used);

@@ -5,6 +5,7 @@
 #include "ops/field/field.h"
 #include "ops/field/field_kernels.h"
 #include "ops/field/network.h"
+#include "ops/field/network_device.h"
 
 namespace traceflow::field {
 
@@ -183,6 +184,9 @@ void add_groups(const Pass& pass, const Tensor<float>& sums, float time, Field& 
 
 void backward(const Field& field, const Tensor<float>& points, float time, const Saved& saved,
               const Tensor<float>& grad_output, Field& grad_field) {
+  if (field.device() == Device::cuda) {
+    return device::backward(field, points, time, saved, grad_output, grad_field);
+  }
   thread_local ForwardWeights forward_weights;
   thread_local BackwardWeights backward_weights;
   thread_local Tensor<float> group_sums;

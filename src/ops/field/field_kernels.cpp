@@ -1,10 +1,7 @@
 #include "ops/field/field_kernels.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
-
-#include "ops/field/field.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "ops/field/field_kernels.cpp"
@@ -202,10 +199,6 @@ EncodingTable make_table(int octaves) {
 }
 
 }  // namespace
-
-bool evaluated(const float* point) {
-  return std::all_of(point, point + 3, [](float x) { return std::abs(x) <= coordinate_limit; });
-}
 
 void encode_points(const float* points, int64_t count, int64_t rows, int octaves, int64_t columns,
                    float* encoding) {

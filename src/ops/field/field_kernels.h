@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
+#include "base/device.h"
+#include "ops/field/field.h"
 #include "ops/field/products.h"
 
 // The element-wise steps between the network's matrix products, with SIMD. Matrices are dense and row-major,
@@ -9,7 +12,12 @@
 namespace traceflow::field {
 
 // Whether the network is evaluated at a point: every coordinate finite and within coordinate_limit.
-bool evaluated(const float* point);
+TRACEFLOW_HD inline bool evaluated(const float* point) {
+  for (int c = 0; c < 3; ++c) {
+    if (!(std::abs(point[c]) <= coordinate_limit)) return false;
+  }
+  return true;
+}
 
 // γ(point) of `count` points into rows of `columns` numbers, zero-padded on the right; rows up to `rows` are
 // filled as if with points that are not evaluated, which enter as the origin.

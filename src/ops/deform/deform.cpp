@@ -1,0 +1,125 @@
+#include "ops/deform/deform.h"
+
+#include <limits>
+
+#include "base/parallel.h"
+#include "math/spherical_harmonics.h"
+#include "ops/deform/deform_kernels.h"
+
+namespace traceflow::deform {
+
+namespace {
+
+int64_t posed_count(const Surfels& stored, const Tensor<int32_t>& subset) {
+  // A subset on a device is made there by the program's own code and is taken as it is.
+  require(subset.empty() || subset.device() != Device::cpu ||
+              (subset[0] >= 0 && subset[subset.size() - 1] < stored.count()),
+          "a subset lists stored surfels in ascending order", std::to_string(stored.count()));
+  return subset.empty() ? stored.count() : subset.size();
+}
+
+Rows rows_of(const Tensor<int32_t>& subset) { return {subset.empty() ? nullptr : subset.data()}; }
+
+Residuals<const float> rows_of(const Tensor<float>& residuals) {
+  return {residuals.empty() ? nullptr : residuals.data(), static_cast<int>(residuals.row_size())};
+}
+
+void resize(const Surfels& stored, int64_t count, int sh_degree, PosedSurfels& posed) {
+  require(stored.count() == 0 || stored.sh.dim(1) >= sh_coefficients(sh_degree),
+          "stored surfels have the degrees in use", stored.sh.shape().to_string());
+  const Device device = stored.device();
+  posed.position.place(device).resize({count, 3});
+  posed.scale.place(device).resize({count, 2});
+  posed.rotation.place(device).resize({count, 4});
+  posed.opacity.place(device).resize({count});
+  posed.sh.place(device).resize({count, sh_coefficients(sh_degree), 3});
+  posed.tint.place(device).resize(stored.has_tint() ? Shape{count} : Shape{});
+  require(posed.sh.size() <= std::numeric_limits<uint32_t>::max(), "posed numbers are counted in 32 bits",
+          posed.sh.shape().to_string());
+}
+
+void pose(const Surfels& stored, const Tensor<int32_t>& subset, const Tensor<float>& residuals,
+          PosedSurfels& posed) {
+  thread_local Tensor<uint8_t> broken;
+  const int64_t count = posed.count();
+  const bool on_cpu = stored.device() == Device::cpu;
+  if (!on_cpu) broken.place(stored.device()).reset({count});
+  const StoredAddresses<const float> from(stored);
+  const PosedAddresses<float> to(posed);
+  const PoseSh sh{rows_of(subset), from, to, on_cpu ? nullptr : broken.data()};
+  const Pose values{rows_of(subset), from, rows_of(residuals), to, sh.broken};
+  if (on_cpu) {
+    parallel_for("deform pose", count, [&](int64_t i) {
+      const bool usable = sh.row(i);
+      if (!values.values(i) || !usable) values.hide(i);
+    });
+  } else {
+    parallel_for(stored.device(), "deform pose: spherical harmonics", posed.sh.size(), sh);
+    parallel_for(stored.device(), "deform pose", count, values);
+  }
+}
+
+void pose_backward(const Tensor<int32_t>& subset, const PosedSurfels& posed, const PosedSurfels& grad_posed,
+                   Surfels& grad_stored, const Residuals<float>& grad_residuals) {
+  const PosedAddresses<const float> at(posed), grad_at(grad_posed);
+  const StoredAddresses<float> to(grad_stored);
+  const PoseShBackward sh{rows_of(subset), at, grad_at, to};
+  const PoseBackward values{rows_of(subset), at, grad_at, {to}, grad_residuals};
+  if (posed.device() == Device::cpu) {
+    parallel_for("deform backward", posed.count(), [&](int64_t i) {
+      if (unseen(at, i)) return;
+      sh.row(i);
+      values(i);
+    });
+  } else {
+    parallel_for(posed.device(), "deform backward: spherical harmonics", posed.sh.size(), sh);
+    parallel_for(posed.device(), "deform backward", posed.count(), values);
+  }
+}
+
+}  // namespace
+
+void forward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
+             int sh_degree, field::Precision precision, PosedSurfels& posed, Saved* saved) {
+  thread_local Saved unsaved;
+  Saved& kept = saved == nullptr ? unsaved : *saved;
+  const int64_t count = posed_count(stored, subset);
+  resize(stored, count, sh_degree, posed);
+  if (field == nullptr) {
+    kept.points.resize({0, 3});
+    kept.residuals.resize({});
+  } else {
+    kept.points.place(stored.device()).resize({count, 3});
+    parallel_for(stored.device(), "deform gather", count,
+                 Gather{rows_of(subset), stored.position.data(), kept.points.data()});
+    field::forward(*field, kept.points, time, precision, kept.residuals,
+                   saved == nullptr ? nullptr : &kept.field);
+  }
+  pose(stored, subset, kept.residuals, posed);
+}
+
+Surfels displaced(const Surfels& stored, const Field& field, float time, field::Precision precision) {
+  Tensor<float> residuals;
+  field::forward(field, stored.position, time, precision, residuals, nullptr);
+  Surfels result = stored;
+  parallel_for(stored.device(), "deform displace", stored.count(),
+               Displace{rows_of(residuals), {StoredAddresses<float>(result)}});
+  return result;
+}
+
+void backward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
+              const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
+              Surfels& grad_stored, Field* grad_field) {
+  thread_local Tensor<float> scratch;
+  require(posed.count() == posed_count(stored, subset), "posed are the surfels of the subset",
+          std::to_string(posed.count()));
+  const bool reaches_field = field != nullptr && grad_field != nullptr && !saved.residuals.empty();
+  Tensor<float>& grad_residuals = scratch;
+  grad_residuals.place(stored.device()).reset(reaches_field ? saved.residuals.shape() : Shape{});
+  pose_backward(
+      subset, posed, grad_posed, grad_stored,
+      {reaches_field ? grad_residuals.data() : nullptr, static_cast<int>(grad_residuals.row_size())});
+  if (reaches_field) field::backward(*field, saved.points, time, saved.field, grad_residuals, *grad_field);
+}
+
+}  // namespace traceflow::deform

@@ -1,0 +1,248 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "math/activation.h"
+#include "scene/field.h"
+#include "scene/surfels.h"
+
+// The steps of posing, one surfel or one spherical-harmonics number each. The latter are nine tenths of a
+// surfel and only copied: on the CUDA device they have threads of their own, so that neighbours read
+// neighbours.
+namespace traceflow::deform {
+
+// What the steps read and write of stored surfels, of posed ones, and of their gradients. T may be const.
+template <class T>
+struct StoredAddresses {
+  template <class Surfels>
+  explicit StoredAddresses(Surfels& s)
+      : position(s.position.data()),
+        log_scale(s.log_scale.data()),
+        rotation(s.rotation.data()),
+        opacity_logit(s.opacity_logit.data()),
+        sh(s.sh.data()),
+        tint_logit(s.has_tint() ? s.tint_logit.data() : nullptr),
+        sh_row(s.sh.row_size()) {}
+
+  T *position, *log_scale, *rotation, *opacity_logit, *sh;
+  T* tint_logit;  // null: the environment
+  int64_t sh_row;
+};
+template <class T>
+struct PosedAddresses {
+  template <class Posed>
+  explicit PosedAddresses(Posed& p)
+      : position(p.position.data()),
+        scale(p.scale.data()),
+        rotation(p.rotation.data()),
+        opacity(p.opacity.data()),
+        sh(p.sh.data()),
+        tint(p.has_tint() ? p.tint.data() : nullptr),
+        sh_row(p.sh.row_size()) {}
+
+  T *position, *scale, *rotation, *opacity, *sh;
+  T* tint;  // null: the environment
+  int64_t sh_row;
+};
+
+// The subset as a list of stored rows: `at(i)` is posed surfel i's.
+struct Rows {
+  const int32_t* subset;  // null: all
+
+  TRACEFLOW_HD int64_t at(int64_t i) const { return subset == nullptr ? i : subset[i]; }
+};
+
+// A row of the field's output, zero where the field has none (method §1.2).
+struct ResidualRow {
+  float value[residual::main_outputs];
+
+  TRACEFLOW_HD float operator[](int k) const { return value[k]; }
+  TRACEFLOW_HD float& operator[](int k) { return value[k]; }
+};
+// A field's outputs, or their gradient. T may be const.
+template <class T>
+struct Residuals {
+  T* rows;  // null: no field
+  int columns;
+
+  TRACEFLOW_HD ResidualRow load(int64_t i) const {
+    ResidualRow row;
+    for (int k = 0; k < residual::main_outputs; ++k) {
+      row[k] = rows != nullptr && k < columns ? rows[i * columns + k] : 0.0F;
+    }
+    return row;
+  }
+  TRACEFLOW_HD void store(int64_t i, const ResidualRow& row) const {
+    for (int k = 0; k < residual::main_outputs; ++k) {
+      if (rows != nullptr && k < columns) rows[i * columns + k] = row[k];
+    }
+  }
+};
+
+// True while every number seen was finite: any other makes the sum of v·0 a NaN.
+class AllFinite {
+ public:
+  TRACEFLOW_HD float see(float v) {
+    sum_ += v * 0.0F;
+    return v;
+  }
+  TRACEFLOW_HD bool holds() const { return sum_ == 0.0F; }
+
+ private:
+  float sum_ = 0;
+};
+
+// Where the field is evaluated. i: a posed surfel.
+struct Gather {
+  Rows rows;
+  const float* position;
+  float* points;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    for (int k = 0; k < 3; ++k) points[3 * i + k] = position[3 * rows.at(i) + k];
+  }
+};
+
+// Copies the degrees in use. i: (posed surfel, number).
+struct PoseSh {
+  Rows rows;
+  StoredAddresses<const float> stored;
+  PosedAddresses<float> posed;
+  uint8_t* broken;  // a surfel; set where a number is not finite
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const auto index = static_cast<uint32_t>(i);
+    const auto width = static_cast<uint32_t>(posed.sh_row);
+    const int64_t to = index / width;
+    AllFinite finite;
+    posed.sh[i] = finite.see(stored.sh[rows.at(to) * stored.sh_row + index % width]);
+    if (!finite.holds()) broken[to] = 1;
+  }
+  // All numbers of a surfel; whether they can be used.
+  bool row(int64_t to) const {
+    const float* from = stored.sh + rows.at(to) * stored.sh_row;
+    float* copy = posed.sh + to * posed.sh_row;
+    AllFinite finite;
+    for (int64_t k = 0; k < posed.sh_row; ++k) copy[k] = finite.see(from[k]);
+    return finite.holds();
+  }
+};
+
+// Poses one surfel, all but its spherical harmonics, or hides it.
+struct Pose {
+  Rows rows;
+  StoredAddresses<const float> stored;
+  Residuals<const float> residuals;
+  PosedAddresses<float> posed;
+  const uint8_t* broken;  // of the spherical harmonics
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (!values(i) || broken[i] != 0) hide(i);
+  }
+  // Whether everything posed here can be used.
+  TRACEFLOW_HD bool values(int64_t i) const {
+    const int64_t from = rows.at(i);
+    const ResidualRow r = residuals.load(i);
+    AllFinite finite;
+    bool extended = true;
+    for (int k = 0; k < 3; ++k) {
+      posed.position[3 * i + k] = finite.see(stored.position[3 * from + k] + r[residual::position + k]);
+    }
+    for (int k = 0; k < 4; ++k) {
+      posed.rotation[4 * i + k] = finite.see(stored.rotation[4 * from + k] + r[residual::rotation + k]);
+    }
+    for (int k = 0; k < 2; ++k) {
+      const float scale = std::exp(finite.see(stored.log_scale[2 * from + k] + r[residual::log_scale + k]));
+      posed.scale[2 * i + k] = finite.see(scale);
+      extended = extended && scale > 0;
+    }
+    posed.opacity[i] = sigmoid(finite.see(stored.opacity_logit[from] + r[residual::opacity]));
+    if (posed.tint != nullptr) {
+      posed.tint[i] = sigmoid(finite.see(stored.tint_logit[from] + r[residual::tint]));
+    }
+    return finite.holds() && extended;
+  }
+  // What stands in the place of a surfel that cannot be used: finite everywhere and invisible.
+  TRACEFLOW_HD void hide(int64_t i) const {
+    for (int k = 0; k < 3; ++k) posed.position[3 * i + k] = 0;
+    for (int k = 0; k < 2; ++k) posed.scale[2 * i + k] = 1;
+    for (int k = 0; k < 4; ++k) posed.rotation[4 * i + k] = k == 0 ? 1.0F : 0.0F;
+    posed.opacity[i] = 0;
+    for (int64_t k = 0; k < posed.sh_row; ++k) posed.sh[i * posed.sh_row + k] = 0;
+    if (posed.tint != nullptr) posed.tint[i] = 0;
+  }
+};
+
+// Adds a row of residuals, or of their gradient, to the stored values that they belong to.
+struct AddToStored {
+  StoredAddresses<float> stored;
+
+  TRACEFLOW_HD void operator()(const ResidualRow& row, int64_t to) const {
+    for (int k = 0; k < 3; ++k) stored.position[3 * to + k] += row[residual::position + k];
+    for (int k = 0; k < 4; ++k) stored.rotation[4 * to + k] += row[residual::rotation + k];
+    for (int k = 0; k < 2; ++k) stored.log_scale[2 * to + k] += row[residual::log_scale + k];
+    stored.opacity_logit[to] += row[residual::opacity];
+    if (stored.tint_logit != nullptr) stored.tint_logit[to] += row[residual::tint];
+  }
+};
+
+// Adds the residuals of one surfel.
+struct Displace {
+  Residuals<const float> residuals;
+  AddToStored add;
+
+  TRACEFLOW_HD void operator()(int64_t i) const { add(residuals.load(i), i); }
+};
+
+// A surfel that is hidden, or so faint that nothing saw it, has no gradient.
+TRACEFLOW_HD inline bool unseen(const PosedAddresses<const float>& posed, int64_t i) {
+  return posed.opacity[i] == 0;
+}
+
+// i: (posed surfel, number).
+struct PoseShBackward {
+  Rows rows;
+  PosedAddresses<const float> posed, grad_posed;
+  StoredAddresses<float> grad_stored;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const auto index = static_cast<uint32_t>(i);
+    const auto width = static_cast<uint32_t>(grad_posed.sh_row);
+    const int64_t from = index / width;
+    if (unseen(posed, from)) return;
+    grad_stored.sh[rows.at(from) * grad_stored.sh_row + index % width] += grad_posed.sh[i];
+  }
+  // All numbers of a surfel.
+  void row(int64_t from) const {
+    float* to = grad_stored.sh + rows.at(from) * grad_stored.sh_row;
+    const float* more = grad_posed.sh + from * grad_posed.sh_row;
+    for (int64_t k = 0; k < grad_posed.sh_row; ++k) to[k] += more[k];
+  }
+};
+
+// dL/dresiduals of one surfel, which is also that of the stored values that the residuals add to.
+struct PoseBackward {
+  Rows rows;
+  PosedAddresses<const float> posed, grad_posed;
+  AddToStored add_to_grad_stored;
+  Residuals<float> grad_residuals;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (unseen(posed, i)) return;
+    ResidualRow grad{};
+    for (int k = 0; k < 3; ++k) grad[residual::position + k] = grad_posed.position[3 * i + k];
+    for (int k = 0; k < 4; ++k) grad[residual::rotation + k] = grad_posed.rotation[4 * i + k];
+    for (int k = 0; k < 2; ++k) {
+      grad[residual::log_scale + k] = grad_posed.scale[2 * i + k] * posed.scale[2 * i + k];
+    }
+    grad[residual::opacity] = grad_posed.opacity[i] * sigmoid_derivative(posed.opacity[i]);
+    if (posed.tint != nullptr) {
+      grad[residual::tint] = grad_posed.tint[i] * sigmoid_derivative(posed.tint[i]);
+    }
+    add_to_grad_stored(grad, rows.at(i));
+    grad_residuals.store(i, grad);
+  }
+};
+
+}  // namespace traceflow::deform

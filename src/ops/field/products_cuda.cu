@@ -1,0 +1,186 @@
+#include "ops/field/products_cuda.h"
+
+#include <cublasLt.h>
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "base/kernel.h"
+#include "base/tensor.h"
+
+namespace traceflow::field::cuda {
+
+namespace {
+
+constexpr size_t workspace_bytes = size_t{32} << 20;
+// What every address and row is a multiple of, and so what algorithms may count on.
+constexpr uint32_t alignment = 16;
+
+void check(cublasStatus_t result, const char* what) {
+  require(result == CUBLAS_STATUS_SUCCESS, what,
+          result == CUBLAS_STATUS_SUCCESS ? "" : cublasLtGetStatusString(result));
+}
+
+cudaDataType_t type_of(Number number) { return number == Number::bf16 ? CUDA_R_16BF : CUDA_R_32F; }
+
+cublasLtEpilogue_t epilogue_of(const ProductDescription& p) {
+  if (p.mask == Mask::read) return CUBLASLT_EPILOGUE_DRELU;
+  if (p.mask == Mask::written) {
+    return p.bias ? CUBLASLT_EPILOGUE_RELU_AUX_BIAS : CUBLASLT_EPILOGUE_RELU_AUX;
+  }
+  if (p.relu) return p.bias ? CUBLASLT_EPILOGUE_RELU_BIAS : CUBLASLT_EPILOGUE_RELU;
+  return p.bias ? CUBLASLT_EPILOGUE_BIAS : CUBLASLT_EPILOGUE_DEFAULT;
+}
+
+// A product as the library wants it, which knows only columns: a row-major matrix is its transpose there, and
+// C = A·B becomes Cᵀ = Bᵀ·Aᵀ. So the library's first operand is B.
+class Plan {
+ public:
+  explicit Plan(const ProductDescription& p, cublasLtHandle_t handle);
+  Plan(const Plan&) = delete;
+  Plan& operator=(const Plan&) = delete;
+
+  bool found() const { return found_; }
+  void run(const ProductDescription& p, const ProductAddresses& at, cublasLtHandle_t handle,
+           void* workspace) const;
+
+ private:
+  template <class T>
+  void set(cublasLtMatmulDescAttributes_t attribute, const T& value) const {
+    check(cublasLtMatmulDescSetAttribute(operation_, attribute, &value, sizeof(value)),
+          "a product is described");
+  }
+  void point(const ProductDescription& p, const void* bias, const void* mask) const {
+    if (p.bias) set(CUBLASLT_MATMUL_DESC_BIAS_POINTER, bias);
+    if (p.mask != Mask::none) set(CUBLASLT_MATMUL_DESC_EPILOGUE_AUX_POINTER, mask);
+  }
+  void choose(cublasLtHandle_t handle);
+
+  // Kept until the program ends.
+  cublasLtMatmulDesc_t operation_ = nullptr;
+  cublasLtMatrixLayout_t b_ = nullptr, a_ = nullptr, c_ = nullptr;
+  cublasLtMatmulAlgo_t algorithm_{};
+  bool found_ = false;
+};
+
+cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored_columns, int64_t stride,
+                              int64_t batches, int64_t batch_stride) {
+  cublasLtMatrixLayout_t made = nullptr;
+  check(cublasLtMatrixLayoutCreate(&made, type_of(number), static_cast<uint64_t>(stored_columns),
+                                   static_cast<uint64_t>(stored_rows), stride),
+        "a product's matrix is described");
+  if (batches > 1) {
+    const auto count = static_cast<int32_t>(batches);
+    check(cublasLtMatrixLayoutSetAttribute(made, CUBLASLT_MATRIX_LAYOUT_BATCH_COUNT, &count, sizeof(count)),
+          "a product's batches are described");
+    check(cublasLtMatrixLayoutSetAttribute(made, CUBLASLT_MATRIX_LAYOUT_STRIDED_BATCH_OFFSET, &batch_stride,
+                                           sizeof(batch_stride)),
+          "a product's batches are described");
+  }
+  return made;
+}
+
+Plan::Plan(const ProductDescription& p, cublasLtHandle_t handle) {
+  check(cublasLtMatmulDescCreate(&operation_, CUBLAS_COMPUTE_32F, CUDA_R_32F), "a product is described");
+  set(CUBLASLT_MATMUL_DESC_TRANSA, p.transposed_b ? CUBLAS_OP_T : CUBLAS_OP_N);
+  set(CUBLASLT_MATMUL_DESC_TRANSB, p.transposed_a ? CUBLAS_OP_T : CUBLAS_OP_N);
+  set(CUBLASLT_MATMUL_DESC_EPILOGUE, epilogue_of(p));
+  if (p.mask != Mask::none) set(CUBLASLT_MATMUL_DESC_EPILOGUE_AUX_LD, p.mask_stride);
+  // Algorithms are chosen by the alignment of addresses, here the least that run() brings.
+  const auto* const least_aligned = reinterpret_cast<const void*>(uintptr_t{alignment});
+  point(p, least_aligned, least_aligned);
+  b_ = layout(p.operands, p.transposed_b ? p.n : p.k, p.transposed_b ? p.k : p.n, p.stride_b, p.batches,
+              p.batch_b);
+  a_ = layout(p.operands, p.transposed_a ? p.k : p.m, p.transposed_a ? p.m : p.k, p.stride_a, p.batches,
+              p.batch_a);
+  c_ = layout(p.result, p.m, p.n, p.stride_c, p.batches, p.batch_c);
+  choose(handle);
+}
+
+void Plan::choose(cublasLtHandle_t handle) {
+  cublasLtMatmulPreference_t preference = nullptr;
+  check(cublasLtMatmulPreferenceCreate(&preference), "a product's preferences");
+  const auto prefer = [&](cublasLtMatmulPreferenceAttributes_t attribute, const auto& value) {
+    check(cublasLtMatmulPreferenceSetAttribute(preference, attribute, &value, sizeof(value)),
+          "a product's preferences");
+  };
+  prefer(CUBLASLT_MATMUL_PREF_MAX_WORKSPACE_BYTES, uint64_t{workspace_bytes});
+  // Parts of a sum meet in the workspace and are added in their order, never where they fall.
+  prefer(CUBLASLT_MATMUL_PREF_REDUCTION_SCHEME_MASK,
+         uint32_t{CUBLASLT_REDUCTION_SCHEME_NONE | CUBLASLT_REDUCTION_SCHEME_COMPUTE_TYPE});
+  for (const auto attribute :
+       {CUBLASLT_MATMUL_PREF_MIN_ALIGNMENT_A_BYTES, CUBLASLT_MATMUL_PREF_MIN_ALIGNMENT_B_BYTES,
+        CUBLASLT_MATMUL_PREF_MIN_ALIGNMENT_C_BYTES, CUBLASLT_MATMUL_PREF_MIN_ALIGNMENT_D_BYTES}) {
+    prefer(attribute, alignment);
+  }
+  cublasLtMatmulHeuristicResult_t result{};
+  int count = 0;
+  const cublasStatus_t status =
+      cublasLtMatmulAlgoGetHeuristic(handle, operation_, b_, a_, c_, c_, preference, 1, &result, &count);
+  cublasLtMatmulPreferenceDestroy(preference);
+  found_ = status == CUBLAS_STATUS_SUCCESS && count == 1 && result.state == CUBLAS_STATUS_SUCCESS;
+  if (found_) algorithm_ = result.algo;
+}
+
+void Plan::run(const ProductDescription& p, const ProductAddresses& at, cublasLtHandle_t handle,
+               void* workspace) const {
+  point(p, at.bias, at.mask);
+  const float one = 1, before = p.accumulate ? 1.0F : 0.0F;
+  check(cublasLtMatmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
+                       workspace, workspace_bytes, traceflow::cuda::stream()),
+        "a matrix product on the CUDA device");
+}
+
+// The library's handle, its workspace and all plans made so far. Stands until the program ends, since the
+// device may be gone before what is destroyed last.
+class Library {
+ public:
+  static Library& instance() {
+    static Library* const library = new Library;
+    return *library;
+  }
+  bool supported(const ProductDescription& product) {
+    if (product.has_epilogue() && !allows_epilogues) return false;
+    return plan(product).found();
+  }
+  void multiply(const ProductDescription& product, const ProductAddresses& at) {
+    const std::lock_guard lock(mutex_);
+    const Plan& chosen = plan_locked(product);
+    require(chosen.found(), "cuBLASLt has the product",
+            std::to_string(product.m) + "×" + std::to_string(product.k) + "×" + std::to_string(product.n));
+    chosen.run(product, at, handle_, workspace_.data());
+  }
+
+  bool allows_epilogues = true;
+
+ private:
+  Library() : workspace_({static_cast<int64_t>(workspace_bytes)}, Device::cuda) {
+    check(cublasLtCreate(&handle_), "cuBLASLt answers");
+  }
+  const Plan& plan(const ProductDescription& product) {
+    const std::lock_guard lock(mutex_);
+    return plan_locked(product);
+  }
+  const Plan& plan_locked(const ProductDescription& product) {
+    std::unique_ptr<const Plan>& made = plans_[product];
+    if (!made) made = std::make_unique<const Plan>(product, handle_);
+    return *made;
+  }
+
+  std::mutex mutex_;
+  cublasLtHandle_t handle_ = nullptr;
+  Tensor<std::byte> workspace_;
+  std::map<ProductDescription, std::unique_ptr<const Plan>> plans_;
+};
+
+}  // namespace
+
+bool supported(const ProductDescription& product) { return Library::instance().supported(product); }
+void multiply(const ProductDescription& product, const ProductAddresses& at) {
+  Library::instance().multiply(product, at);
+}
+void allow_epilogues(bool allowed) { Library::instance().allows_epilogues = allowed; }
+
+}  // namespace traceflow::field::cuda

@@ -1,0 +1,92 @@
+#include <algorithm>
+#include <vector>
+
+#include "base/error.h"
+#include "emulation/device.h"
+#include "math/bf16.h"
+#include "ops/field/products_cuda.h"
+
+// Stands in for cuBLASLt: the same products in plain loops.
+namespace traceflow::field::cuda {
+
+namespace {
+
+bool epilogues_allowed = true;
+
+float load(Number number, const void* values, int64_t at) {
+  return number == Number::fp32 ? static_cast<const float*>(values)[at]
+                                : to_float(static_cast<const Bf16*>(values)[at]);
+}
+
+void save(Number number, float value, void* values, int64_t at) {
+  if (number == Number::fp32) {
+    static_cast<float*>(values)[at] = value;
+  } else {
+    store(value, static_cast<Bf16*>(values)[at]);
+  }
+}
+
+// A stored matrix, or its transpose, dense and in fp32.
+std::vector<float> dense(Number number, const void* from, int64_t first, int64_t rows, int64_t columns,
+                         int64_t stride, bool transposed) {
+  std::vector<float> to(static_cast<size_t>(rows * columns));
+  for (int64_t i = 0; i < rows; ++i) {
+    for (int64_t j = 0; j < columns; ++j) {
+      const int64_t at = first + (transposed ? j * stride + i : i * stride + j);
+      to[static_cast<size_t>(i * columns + j)] = load(number, from, at);
+    }
+  }
+  return to;
+}
+
+void finish_row(const ProductDescription& p, const ProductAddresses& at, int64_t batch, int64_t i,
+                std::vector<float>& row) {
+  const int64_t first = batch * p.batch_c + i * p.stride_c;
+  auto* const bits = static_cast<uint8_t*>(at.mask) + (at.mask == nullptr ? 0 : i * p.mask_stride / 8);
+  for (int64_t j = 0; j < p.n; ++j) {
+    float value = row[static_cast<size_t>(j)];
+    const auto bit = static_cast<uint8_t>(1U << j % 8);
+    if (p.accumulate) value += load(p.result, at.c, first + j);
+    if (p.bias) value += load(p.result, at.bias, j);
+    if (p.mask == Mask::written) {
+      bits[j / 8] = static_cast<uint8_t>(value > 0 ? bits[j / 8] | bit : bits[j / 8] & ~bit);
+    }
+    if (p.relu) value = value > 0 ? value : 0;
+    if (p.mask == Mask::read && (bits[j / 8] & bit) == 0) value = 0;
+    save(p.result, value, at.c, first + j);
+  }
+}
+
+}  // namespace
+
+bool supported(const ProductDescription& product) { return epilogues_allowed || !product.has_epilogue(); }
+void allow_epilogues(bool allowed) { epilogues_allowed = allowed; }
+
+void multiply(const ProductDescription& p, const ProductAddresses& at) {
+  require(supported(p), "the product is supported");
+  require(p.stride_a >= (p.transposed_a ? p.m : p.k) && p.stride_b >= (p.transposed_b ? p.k : p.n) &&
+              p.stride_c >= p.n &&
+              (p.mask == Mask::none || (p.mask_stride % 128 == 0 && p.mask_stride >= p.n)),
+          "rows do not overlap");
+  for (const void* address :
+       {at.a, at.b, static_cast<const void*>(at.c), at.bias, static_cast<const void*>(at.mask)}) {
+    require(reinterpret_cast<uintptr_t>(address) % 16 == 0, "addresses are aligned");
+  }
+  const traceflow::emulation::DeviceAccess access;
+  std::vector<float> row(static_cast<size_t>(p.n));
+  for (int64_t batch = 0; batch < p.batches; ++batch) {
+    const auto a = dense(p.operands, at.a, batch * p.batch_a, p.m, p.k, p.stride_a, p.transposed_a);
+    const auto b = dense(p.operands, at.b, batch * p.batch_b, p.k, p.n, p.stride_b, p.transposed_b);
+    for (int64_t i = 0; i < p.m; ++i) {
+      std::fill(row.begin(), row.end(), 0.0F);
+      for (int64_t l = 0; l < p.k; ++l) {
+        const float factor = a[static_cast<size_t>(i * p.k + l)];
+        const float* const from = b.data() + l * p.n;
+        for (int64_t j = 0; j < p.n; ++j) row[static_cast<size_t>(j)] += factor * from[j];
+      }
+      finish_row(p, at, batch, i, row);
+    }
+  }
+}
+
+}  // namespace traceflow::field::cuda
