@@ -30,13 +30,15 @@ void measure(benchmark::State& state, F&& term) {
 
 void l1(benchmark::State& state) {
   measure(state, [](const auto& image, const auto& target, auto& gradient) {
-    return loss::l1(image, target, 0.8, gradient);
+    return loss::value_of(Device::cpu,
+                          [&](const auto& slot) { loss::l1(image, target, 0.8, gradient, slot); });
   });
 }
 
 void ssim_loss(benchmark::State& state) {
   measure(state, [](const auto& image, const auto& target, auto& gradient) {
-    return loss::ssim_loss(image, target, 0.2, gradient);
+    return loss::value_of(Device::cpu,
+                          [&](const auto& slot) { loss::ssim_loss(image, target, 0.2, gradient, slot); });
   });
 }
 

@@ -4,17 +4,21 @@
 
 #include "base/tensor.h"
 
-// Sorting on the CUDA device.
+// Orders and running sums of lists on the CUDA device. `scratch` is memory that a call may use; kept by the
+// caller, so that calls of the same size do not allocate.
 namespace traceflow::cuda {
 
 // Puts n values in ascending order of the lowest `bits` bits of their keys; equal keys keep their order. All
-// addresses are on the device, and those of the results differ from those of the input. `scratch` keeps its
-// memory for the next call.
+// addresses are on the device, and those of the results differ from those of the input.
 TRACEFLOW_WITH_CUDA void sort_pairs(int64_t n, int bits, const uint64_t* keys, uint64_t* sorted_keys,
                                     const uint32_t* values, uint32_t* sorted_values,
                                     Tensor<uint8_t>& scratch);
 TRACEFLOW_WITH_CUDA void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys,
                                     const uint32_t* values, uint32_t* sorted_values,
                                     Tensor<uint8_t>& scratch);
+
+// out[i] = in[0] + … + in[i − 1], so that with one entry more than there is to count the last is the total.
+// Both have n entries on the device; they may be the same list.
+TRACEFLOW_WITH_CUDA void exclusive_sum(const int32_t* in, int32_t* out, int64_t n, Tensor<uint8_t>& scratch);
 
 }  // namespace traceflow::cuda

@@ -1,4 +1,5 @@
 #include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
 
 #include "base/kernel.h"
 #include "base/sort.h"
@@ -31,6 +32,14 @@ void sort_pairs(int64_t n, int bits, const uint64_t* keys, uint64_t* sorted_keys
 void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys, const uint32_t* values,
                 uint32_t* sorted_values, Tensor<uint8_t>& scratch) {
   sort(n, bits, keys, sorted_keys, values, sorted_values, scratch);
+}
+
+void exclusive_sum(const int32_t* in, int32_t* out, int64_t n, Tensor<uint8_t>& scratch) {
+  if (n == 0) return;
+  size_t bytes = 0;
+  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, n, stream()), "the memory of a running sum");
+  scratch.place(Device::cuda).resize({static_cast<int64_t>(bytes)});
+  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, n, stream()), "a running sum");
 }
 
 }  // namespace traceflow::cuda

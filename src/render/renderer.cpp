@@ -105,8 +105,8 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
-  frame_.traced = surface::select_pixels(frame_.raster.alpha, frame_.raster.tint, frame_.raster.normal,
-                                         options_.select, request.probes, request.probe_seed);
+  surface::select_pixels(frame_.raster.alpha, frame_.raster.tint, frame_.raster.normal, options_.select,
+                         request.probes, request.probe_seed, frame_.traced);
   surface::reflection_rays(request.camera, frame_.traced.pixel, frame_.raster.depth,
                            frame_.raster.median_depth, frame_.raster.normal, options_.depth_ratio, origins_,
                            directions_);

@@ -4,62 +4,79 @@
 #include <cmath>
 #include <string>
 
-#include "base/parallel.h"
 #include "ops/loss/loss.h"
 
 namespace traceflow {
 
 namespace {
 
-double psnr(const Tensor<float>& image, const Tensor<float>& target) {
-  const double sum = ordered_sum<double>("objective: psnr", image.size(), [&](int64_t i) {
-    const double difference = static_cast<double>(image[i]) - static_cast<double>(target[i]);
-    return difference * difference;
-  });
-  return -10.0 * std::log10(std::max(sum / static_cast<double>(image.size()), 1e-10));
-}
+double psnr(double squared_error) { return -10.0 * std::log10(std::max(squared_error, 1e-10)); }
 
 }  // namespace
 
-LossTerms evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
-                             bool normal_losses, FrameGradient& gradient, const lpips::Network* perceptual) {
-  LossTerms terms;
-  gradient.colour.reset(frame.colour.shape());
-  const bool consistency = normal_losses && options.normal > 0;
-  const bool prior = normal_losses && options.normal_prior > 0 && !target.normal_prior.empty();
-  const Shape none{0};
-  gradient.normal.reset(consistency || prior ? frame.raster.normal.shape() : none);
-  gradient.pseudo_normal.reset(consistency ? frame.raster.normal.shape() : none);
-  gradient.distortion.resize(none);
+void LossMeans::begin(Device device) {
+  means_.place(device).resize({term_count});
+  weight_ = {};
+}
 
-  terms.psnr = psnr(frame.colour, target.colour);
-  terms.l1 = loss::l1(frame.colour, target.colour, 1 - options.ssim, gradient.colour);
-  terms.total += (1 - options.ssim) * terms.l1;
-  if (options.ssim > 0) {
-    terms.ssim = loss::ssim_loss(frame.colour, target.colour, options.ssim, gradient.colour);
-    terms.total += options.ssim * terms.ssim;
-  }
-  if (consistency) {
-    terms.normal = loss::normal_consistency(frame.raster.normal, frame.pseudo_normal, options.normal,
-                                            gradient.normal, gradient.pseudo_normal);
-    terms.total += options.normal * terms.normal;
-  }
-  if (prior) {
-    terms.normal_prior =
-        loss::normal_prior(frame.raster.normal, target.normal_prior, options.normal_prior, gradient.normal);
-    terms.total += options.normal_prior * terms.normal_prior;
-  }
-  if (options.distortion > 0) {
-    gradient.distortion.reset(frame.raster.distortion.shape());
-    terms.distortion = loss::distortion(frame.raster.distortion, options.distortion, gradient.distortion);
-    terms.total += options.distortion * terms.distortion;
-  }
-  if (perceptual != nullptr) {
-    terms.lpips = lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined,
-                                  options.lpips, gradient.colour);
-    terms.total += options.lpips * terms.lpips;
+loss::MeanSlot LossMeans::add(Term term, double weight) {
+  weight_[term] = weight;
+  return {means_, term};
+}
+
+LossTerms LossMeans::read() const {
+  LossTerms terms;
+  const Tensor<loss::Mean> means = means_.on(Device::cpu);
+  const std::array<double*, term_count> values{&terms.l1,           &terms.ssim,       &terms.normal,
+                                               &terms.normal_prior, &terms.distortion, &terms.lpips,
+                                               &terms.rigidity,     &terms.psnr};
+  for (size_t term = 0; term < term_count; ++term) {
+    if (!weight_[term]) continue;
+    const double value = means[static_cast<int64_t>(term)].value;
+    *values[term] = term == squared_error ? psnr(value) : value;
+    if (term != squared_error) terms.total += *weight_[term] * value;
   }
   return terms;
+}
+
+void evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
+                        bool normal_losses, FrameGradient& gradient, LossMeans& means,
+                        const lpips::Network* perceptual) {
+  const Device device = frame.colour.device();
+  const bool consistency = normal_losses && options.normal > 0;
+  const bool prior = normal_losses && options.normal_prior > 0 && !target.normal_prior.empty();
+  const Shape none{0}, colours = frame.colour.shape(), normals = frame.raster.normal.shape();
+  means.begin(device);
+  gradient.colour.place(device).reset(colours);
+  gradient.normal.place(device).reset(consistency || prior ? normals : none);
+  gradient.pseudo_normal.place(device).reset(consistency ? normals : none);
+  gradient.distortion.place(device).reset(options.distortion > 0 ? frame.raster.distortion.shape() : none);
+
+  const auto slot = [&](LossMeans::Term term, double weight) { return means.add(term, weight); };
+  loss::squared_error(frame.colour, target.colour, slot(LossMeans::squared_error, 0));
+  loss::l1(frame.colour, target.colour, 1 - options.ssim, gradient.colour,
+           slot(LossMeans::l1, 1 - options.ssim));
+  if (options.ssim > 0) {
+    loss::ssim_loss(frame.colour, target.colour, options.ssim, gradient.colour,
+                    slot(LossMeans::ssim, options.ssim));
+  }
+  if (consistency) {
+    loss::normal_consistency(frame.raster.normal, frame.pseudo_normal, options.normal, gradient.normal,
+                             gradient.pseudo_normal, slot(LossMeans::normal, options.normal));
+  }
+  if (prior) {
+    loss::normal_prior(frame.raster.normal, target.normal_prior, options.normal_prior, gradient.normal,
+                       slot(LossMeans::normal_prior, options.normal_prior));
+  }
+  if (options.distortion > 0) {
+    loss::distortion(frame.raster.distortion, options.distortion, gradient.distortion,
+                     slot(LossMeans::distortion, options.distortion));
+  }
+  if (perceptual != nullptr) {
+    const double distance = lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined,
+                                            options.lpips, gradient.colour);
+    loss::put({distance, 1}, slot(LossMeans::lpips, options.lpips));
+  }
 }
 
 std::optional<lpips::Network> perceptual_network(const LossOptions& options, const Capture& capture) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "capture/capture.h"
+#include "ops/loss/mean.h"
 #include "ops/lpips/lpips.h"
 #include "render/frame.h"
 #include "train/options.h"
@@ -22,11 +24,30 @@ struct LossTerms {
   double psnr = 0;  // dB, of the image as it is, not rounded
 };
 
+// The terms of one frame's loss as they were computed, on the frame's device: nobody waits for them until
+// they are read.
+class LossMeans {
+ public:
+  // In the order in which they are added up.
+  enum Term { l1, ssim, normal, normal_prior, distortion, lpips, rigidity, squared_error, term_count };
+
+  // Forgets the last frame's.
+  void begin(Device device);
+  // Where a term that counts with this weight leaves its value.
+  loss::MeanSlot add(Term term, double weight);
+  // Waits for the device. Terms that were not added are 0.
+  LossTerms read() const;
+
+ private:
+  Tensor<loss::Mean> means_;
+  std::array<std::optional<double>, term_count> weight_;
+};
+
 // Compares a frame with its photograph and sets dL/dframe. normal_losses: the terms on normals count in this
 // iteration; perceptual: the network of LPIPS where that counts.
-LossTerms evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
-                             bool normal_losses, FrameGradient& gradient,
-                             const lpips::Network* perceptual = nullptr);
+void evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
+                        bool normal_losses, FrameGradient& gradient, LossMeans& means,
+                        const lpips::Network* perceptual = nullptr);
 
 // The network of LPIPS where the options give it a weight. Throws InputError where its file cannot be used or
 // the capture's images are too small for it.

@@ -1,13 +1,14 @@
 #include "train/optimiser.h"
 
-#include <cmath>
+#include <algorithm>
 
 namespace traceflow {
 
 namespace {
 
 optimize::AdamState zero_state(const Tensor<float>& parameter) {
-  return {Tensor<float>(parameter.shape()), Tensor<float>(parameter.shape()), 0};
+  return {Tensor<float>(parameter.shape(), parameter.device()),
+          Tensor<float>(parameter.shape(), parameter.device()), 0};
 }
 
 std::vector<optimize::AdamState> zero_states(const Field& field) {
@@ -17,36 +18,25 @@ std::vector<optimize::AdamState> zero_states(const Field& field) {
   return states;
 }
 
-// One Adam step per tensor, with one note of what was not finite.
+// One Adam step per tensor, with a note of what was not finite.
 class Stepper {
  public:
-  Stepper(const optimize::AdamOptions& options, NonFiniteGradients& report)
-      : options_(options), report_(report) {}
+  Stepper(const optimize::AdamOptions& options, StepNotes& notes) : options_(options), notes_(notes) {}
 
   void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
                   optimize::AdamState& state, double rate) {
-    note(name, gradient, optimize::adam_step(parameter, gradient, state, static_cast<float>(rate), options_));
+    (*this)(name, parameter, gradient, state, std::vector<float>{static_cast<float>(rate)});
   }
   // A rate for each column of a row.
   void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
                   optimize::AdamState& state, const std::vector<float>& rates) {
-    note(name, gradient,
-         optimize::adam_step(parameter, gradient, state, std::span<const float>(rates), options_));
+    optimize::adam_step(parameter, gradient, state, std::span<const float>(rates), options_,
+                        notes_.add(name, parameter));
   }
 
  private:
-  void note(const std::string& name, const Tensor<float>& gradient, int64_t count) {
-    if (count > 0 && report_.count == 0) {
-      const auto values = gradient.values();
-      const auto bad = std::find_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v); });
-      const int64_t row = gradient.row_size() > 0 ? (bad - values.begin()) / gradient.row_size() : 0;
-      report_.first = name + ", row " + std::to_string(row);
-    }
-    report_.count += count;
-  }
-
   optimize::AdamOptions options_;
-  NonFiniteGradients& report_;
+  StepNotes& notes_;
 };
 
 void step_surfels(Stepper& step, const std::string& set, Surfels& surfels, const Surfels& gradient,
@@ -73,6 +63,30 @@ void step_field(Stepper& step, const std::string& name, Field& field, const Fiel
 }
 
 }  // namespace
+
+void StepNotes::begin(Device device, int64_t most) {
+  tensors_.clear();
+  notes_.place(device).reset({most});
+}
+
+optimize::LeftAloneSlot StepNotes::add(const std::string& name, const Tensor<float>& parameter) {
+  tensors_.push_back({name, parameter.row_size()});
+  return {notes_, static_cast<int64_t>(tensors_.size()) - 1};
+}
+
+NonFiniteGradients StepNotes::report() const {
+  NonFiniteGradients report;
+  const Tensor<optimize::LeftAlone> notes = notes_.on(Device::cpu);
+  for (size_t k = 0; k < tensors_.size(); ++k) {
+    const optimize::LeftAlone& note = notes[static_cast<int64_t>(k)];
+    if (note.count > 0 && report.count == 0) {
+      const int64_t row = tensors_[k].row_size > 0 ? note.first() / tensors_[k].row_size : 0;
+      report.first = tensors_[k].name + ", row " + std::to_string(row);
+    }
+    report.count += note.count;
+  }
+  return report;
+}
 
 void SurfelMoments::reset_like(const Surfels& surfels) {
   position = zero_state(surfels.position);
@@ -102,10 +116,12 @@ Optimiser::Optimiser(const Scene& scene) {
   }
 }
 
-NonFiniteGradients Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
-                                   const Schedule& schedule, const RateOptions& rates, int iteration) {
-  NonFiniteGradients report;
-  Stepper step(rates.adam(), report);
+void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
+                     const Schedule& schedule, const RateOptions& rates, int iteration) {
+  int64_t tensors = 0;
+  for_each(*this, [&](const std::string&, const optimize::AdamState&) { ++tensors; });
+  notes_.begin(scene.main.position.device(), tensors);
+  Stepper step(rates.adam(), notes_);
   const double position_rate = schedule.position_rate(iteration) * scene.extent;
   const double field_rate = schedule.field_rate(iteration);
 
@@ -133,7 +149,6 @@ NonFiniteGradients Optimiser::step(Scene& scene, const SceneGradient& gradient, 
                  field_rate);
     }
   }
-  return report;
 }
 
 template <class Self, class F>

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "files/safetensors.h"
 #include "ops/optimize/adam.h"
@@ -35,15 +36,35 @@ struct NonFiniteGradients {
   std::string first;
 };
 
+// Notes of what was not finite in a step, one for each tensor that it went through, where the tensors are.
+class StepNotes {
+ public:
+  // Forgets the last step's. At most `most` tensors follow.
+  void begin(Device device, int64_t most);
+  // The place of the next tensor's note.
+  optimize::LeftAloneSlot add(const std::string& name, const Tensor<float>& parameter);
+  NonFiniteGradients report() const;
+
+ private:
+  struct Noted {
+    std::string name;
+    int64_t row_size;
+  };
+  std::vector<Noted> tensors_;
+  Tensor<optimize::LeftAlone> notes_;
+};
+
 // Updates a scene by Adam with the schedule's rates (method §7.6).
 class Optimiser {
  public:
   // Zero moments in the shapes of the scene.
   explicit Optimiser(const Scene& scene);
 
-  // One step on whatever is trainable. Entries that are not finite are left alone and reported.
-  NonFiniteGradients step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
-                          const Schedule& schedule, const RateOptions& rates, int iteration);
+  // One step on whatever is trainable. Entries that are not finite are left alone.
+  void step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable, const Schedule& schedule,
+            const RateOptions& rates, int iteration);
+  // What the last step left alone. Waits for the device.
+  NonFiniteGradients left_alone() const { return notes_.report(); }
 
   SurfelMoments& main() { return main_; }
   SurfelMoments& environment() { return environment_; }
@@ -60,6 +81,7 @@ class Optimiser {
   SurfelMoments main_, environment_;
   std::vector<optimize::AdamState> main_field_, environment_field_, map_field_;
   optimize::AdamState map_;
+  StepNotes notes_;
 };
 
 }  // namespace traceflow

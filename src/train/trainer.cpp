@@ -128,10 +128,11 @@ LossTerms Trainer::step() {
   const Frame& frame = renderer_.forward(scene_, request, true);
   grad_frame_.main_position.resize({0});
   grad_rest_.resize({0});
-  LossTerms terms = evaluate_objective(
-      frame, *target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_,
-      schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
-  if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame, terms);
+  evaluate_objective(frame, *target, options_.loss,
+                     schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_, means_,
+                     schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
+  if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
+  const LossTerms terms = means_.read();
   non_finite_ = {};
   if (std::isfinite(terms.total)) {
     gradient_.reset(scene_);
@@ -141,7 +142,8 @@ LossTerms Trainer::step() {
     if (trainable.environment && scene_.environment.count() > 0) {
       environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
     }
-    non_finite_ = optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
+    optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
+    non_finite_ = optimiser_.left_alone();
     // The reach follows the field at once when it grows and slowly when it shrinks.
     scene_.main_reach = std::max(frame.reach, 0.995F * scene_.main_reach);
   }
@@ -150,15 +152,14 @@ LossTerms Trainer::step() {
   return terms;
 }
 
-void Trainer::add_rigidity(const Frame& frame, LossTerms& terms) {
+void Trainer::add_rigidity(const Frame& frame) {
   if (frame.main.count() == 0) return;
   if (bonds_.index.empty()) bonds_ = spread_neighbours(scene_.main.position, bonds_each, bond_stride);
   grad_frame_.main_position.reset(frame.main.position.shape());
   grad_rest_.reset(scene_.main.position.shape());
-  terms.rigidity = loss::rigidity(scene_.main.position, frame.main.position, frame.subset, bonds_,
-                                  options_.loss.rigidity_strain, options_.loss.rigidity, grad_rest_,
-                                  grad_frame_.main_position);
-  terms.total += options_.loss.rigidity * terms.rigidity;
+  loss::rigidity(scene_.main.position, frame.main.position, frame.subset, bonds_,
+                 options_.loss.rigidity_strain, options_.loss.rigidity, grad_rest_, grad_frame_.main_position,
+                 means_.add(LossMeans::rigidity, options_.loss.rigidity));
 }
 
 void Trainer::control_density(int done) {

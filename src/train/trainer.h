@@ -61,7 +61,7 @@ class Trainer {
   const View& draw_view();
   FrameRequest request_for(const View& view);
   // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
-  void add_rigidity(const Frame& frame, LossTerms& terms);
+  void add_rigidity(const Frame& frame);
   void control_density(int done);
   SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
   void save();
@@ -88,6 +88,7 @@ class Trainer {
   Renderer renderer_;
   SceneGradient gradient_;
   FrameGradient grad_frame_;
+  LossMeans means_;
   NonFiniteGradients non_finite_;
   events::Stream stream_;
   int iteration_ = 0;   // done so far

@@ -39,4 +39,15 @@ void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys
   sort(n, bits, keys, sorted_keys, values, sorted_values);
 }
 
+void exclusive_sum(const int32_t* in, int32_t* out, int64_t n, Tensor<uint8_t>& scratch) {
+  scratch.place(Device::cuda).resize({1});
+  const emulation::DeviceAccess access;
+  int32_t sum = 0;
+  for (int64_t i = 0; i < n; ++i) {
+    const int32_t value = in[i];
+    out[i] = sum;
+    sum += value;
+  }
+}
+
 }  // namespace traceflow::cuda

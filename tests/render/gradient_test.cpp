@@ -5,6 +5,7 @@
 #include "base/random.h"
 #include "render/reference_graph.h"
 #include "render/renderer.h"
+#include "support/loss_values.h"
 
 // The end-to-end gradient test: a small scene through every phase's graph. The references' analytic gradient
 // is held against central differences of the loss along a random direction in every parameter group of both

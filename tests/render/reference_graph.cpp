@@ -47,8 +47,8 @@ class Graph {
     grad_.tint.reset(raster_.tint.shape());
     const std::vector<float> weights(pixels_.size(), 1.0F);
     Tensor<double> grad_specular;
-    shade::backward(raster_.colour, raster_.tint, tensor_of(pixels_), std::span<const float>(weights),
-                    specular_, grad_colour_, grad_.colour, grad_.tint, grad_specular);
+    shade::backward(raster_.colour, raster_.tint, tensor_of(pixels_), tensor_of(weights), specular_,
+                    grad_colour_, grad_.colour, grad_.tint, grad_specular);
     if (s_.specular) backward_specular(grad_specular, g);
     surface::pseudo_normals_backward(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha,
                                      s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth,

@@ -35,10 +35,16 @@ struct Fixture {
   lpips::Network network = lpips::network_of(narrow_lpips_weights(2));
 };
 
+LossTerms evaluate(const Fixture& f, FrameGradient& gradient, const lpips::Network* network = nullptr) {
+  LossMeans means;
+  evaluate_objective(f.frame, f.target, f.options, true, gradient, means, network);
+  return means.read();
+}
+
 TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
   const Fixture f;
   FrameGradient gradient;
-  const LossTerms t = evaluate_objective(f.frame, f.target, f.options, true, gradient, &f.network);
+  const LossTerms t = evaluate(f, gradient, &f.network);
   for (const double term : {t.l1, t.ssim, t.normal, t.normal_prior, t.distortion, t.lpips})
     EXPECT_NE(term, 0);
   const LossOptions& o = f.options;
@@ -51,8 +57,8 @@ TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
 TEST(Objective, WithoutItsNetworkTheImageHasNoPerceptualTerm) {
   const Fixture f;
   FrameGradient with, without;
-  const LossTerms a = evaluate_objective(f.frame, f.target, f.options, true, with, &f.network);
-  const LossTerms b = evaluate_objective(f.frame, f.target, f.options, true, without);
+  const LossTerms a = evaluate(f, with, &f.network);
+  const LossTerms b = evaluate(f, without);
   EXPECT_EQ(b.lpips, 0);
   EXPECT_NEAR(a.total - b.total, f.options.lpips * a.lpips, 1e-12);
   // What the network adds to the gradient is the weighted gradient of its distance.

@@ -1,13 +1,15 @@
 #pragma once
 
+#include <array>
 #include <cmath>
-#include <vector>
+#include <cstdint>
 
-#include "base/parallel.h"
 #include "base/tensor.h"
+#include "math/ssim.h"
 #include "math/types.h"
+#include "ops/loss/mean.h"
 
-// What the loss terms share.
+// What the loss terms share, and their steps: one pixel or number each, which return what it adds to the sum.
 namespace traceflow::loss {
 
 inline constexpr int64_t block_pixels = 4096;
@@ -27,89 +29,136 @@ void check_is_image(const Tensor<T>& image) {
 
 // −1, 0 or 1; 0 for what is not a number.
 template <class T>
-T sign(T x) {
+TRACEFLOW_HD T sign(T x) {
   return static_cast<T>(x > T(0)) - static_cast<T>(x < T(0));
 }
 
 template <class T>
-bool is_zero(const Vec3<T>& v) {
+TRACEFLOW_HD bool is_zero(const Vec3<T>& v) {
   return v == Vec3<T>(T(0));
 }
 
 template <class T>
-bool is_finite(const Vec3<T>& v) {
+TRACEFLOW_HD bool is_finite(const Vec3<T>& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// SSIM's window as the fast paths take it: the middle tap and the five beside it.
+using HalfWindow = std::array<float, ssim_radius + 1>;
+inline HalfWindow half_window() {
+  const auto window = ssim_window();
+  HalfWindow half{};
+  for (size_t k = 0; k < half.size(); ++k) half[k] = static_cast<float>(window[ssim_radius + k]);
+  return half;
 }
 
 // A sum over some of the pixels and their number.
 struct CountedSum {
   double sum = 0;
   int64_t count = 0;
-  CountedSum& operator+=(const CountedSum& other) {
+  TRACEFLOW_HD CountedSum& operator+=(const CountedSum& other) {
     sum += other.sum;
     count += other.count;
     return *this;
   }
 };
 
+// What becomes of a sum: the mean over a number of things that is known, or that was found with it.
+struct MeanOver {
+  double count;
+  Mean* mean;
+  TRACEFLOW_HD void operator()(double sum) const { *mean = {count > 0 ? sum / count : 0, count}; }
+};
+struct MeanOverCounted {
+  Mean* mean;
+  TRACEFLOW_HD void operator()(const CountedSum& total) const {
+    const auto count = static_cast<double>(total.count);
+    *mean = {count > 0 ? total.sum / count : 0, count};
+  }
+};
+
+struct L1 {
+  const float *image, *target;
+  float scale;
+  float* gradient;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    const float difference = image[i] - target[i];
+    gradient[i] += scale * sign(difference);
+    return static_cast<double>(std::abs(difference));
+  }
+};
+
+struct SquaredError {
+  const float *image, *target;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    const double difference = static_cast<double>(image[i]) - static_cast<double>(target[i]);
+    return difference * difference;
+  }
+};
+
+struct Distortion {
+  const float* map;
+  float scale;
+  float* gradient;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    gradient[i] += scale;
+    return static_cast<double>(map[i]);
+  }
+};
+
 // Method §7.4, L_norm: a pixel is compared with the geometry around it.
 template <class T>
-double mean_normal_consistency(const Tensor<T>& normal, const Tensor<T>& pseudo, double weight,
-                               Tensor<T>& grad_normal, Tensor<T>& grad_pseudo) {
-  check_is_image(normal);
-  check_same_shape(normal, pseudo, grad_normal);
-  check_same_shape(normal, pseudo, grad_pseudo);
-  const int64_t pixels = normal.size() / 3;
-  if (pixels == 0) return 0;
-  const T scale = static_cast<T>(weight / static_cast<double>(pixels));
-  const double sum = ordered_sum<double>(
-      "loss: normal consistency", pixels,
-      [&](int64_t i) -> double {
-        const Vec3<T> n = load3<T>(normal.data() + 3 * i), p = load3<T>(pseudo.data() + 3 * i);
-        if (is_zero(p)) return 0;
-        if (is_finite(n) && is_finite(p)) {
-          add3(grad_normal.data() + 3 * i, -scale * p);
-          add3(grad_pseudo.data() + 3 * i, -scale * n);
-        }
-        return 1 - static_cast<double>(dot(n, p));
-      },
-      block_pixels);
-  return sum / static_cast<double>(pixels);
-}
+struct NormalConsistency {
+  const T *normal, *pseudo;
+  T scale;
+  T *grad_normal, *grad_pseudo;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(pseudo + 3 * i);
+    if (is_zero(p)) return 0;
+    if (is_finite(n) && is_finite(p)) {
+      add3(grad_normal + 3 * i, -scale * p);
+      add3(grad_pseudo + 3 * i, -scale * n);
+    }
+    return 1 - static_cast<double>(dot(n, p));
+  }
+};
 
 // Method §7.4, L_tc-norm: a pixel is compared with the capture's prior.
 template <class T>
-double mean_normal_prior(const Tensor<T>& normal, const Tensor<T>& prior, double weight,
-                         Tensor<T>& grad_normal) {
-  check_is_image(normal);
-  check_same_shape(normal, prior, grad_normal);
-  const int64_t pixels = normal.size() / 3;
-  const auto compared = [&](int64_t i) {
-    const Vec3<T> n = load3<T>(normal.data() + 3 * i);
-    return !is_zero(load3<T>(prior.data() + 3 * i)) && dot(n, n) != T(0);
-  };
-  const CountedSum total = ordered_sum<CountedSum>(
-      "loss: normal prior", pixels,
-      [&](int64_t i) -> CountedSum {
-        if (!compared(i)) return {};
-        const Vec3<T> n = load3<T>(normal.data() + 3 * i), p = load3<T>(prior.data() + 3 * i);
-        return {1 - static_cast<double>(dot(n, p) / std::sqrt(dot(n, n))), 1};
-      },
-      block_pixels);
-  if (total.count == 0) return 0;
-  const T scale = static_cast<T>(weight / static_cast<double>(total.count));
-  parallel_for(
-      "loss: normal prior backward", pixels,
-      [&](int64_t i) {
-        if (!compared(i)) return;
-        const Vec3<T> n = load3<T>(normal.data() + 3 * i), p = load3<T>(prior.data() + 3 * i);
-        const T inv_length = T(1) / std::sqrt(dot(n, n));
-        const Vec3<T> unit = n * inv_length;
-        const Vec3<T> gradient = -scale * inv_length * (p - dot(unit, p) * unit);
-        if (is_finite(gradient)) add3(grad_normal.data() + 3 * i, gradient);
-      },
-      block_pixels);
-  return total.sum / static_cast<double>(total.count);
-}
+struct NormalPrior {
+  const T *normal, *prior;
+
+  TRACEFLOW_HD bool compared(const Vec3<T>& n, const Vec3<T>& p) const {
+    return !is_zero(p) && dot(n, n) != T(0);
+  }
+  TRACEFLOW_HD CountedSum operator()(int64_t i) const {
+    const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(prior + 3 * i);
+    if (!compared(n, p)) return {};
+    return {1 - static_cast<double>(dot(n, p) / std::sqrt(dot(n, n))), 1};
+  }
+};
+
+// After NormalPrior, whose mean says how many pixels were compared.
+template <class T>
+struct NormalPriorBackward {
+  NormalPrior<T> forward;
+  double weight;
+  const Mean* mean;
+  T* grad_normal;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const Vec3<T> n = load3<T>(forward.normal + 3 * i), p = load3<T>(forward.prior + 3 * i);
+    if (!forward.compared(n, p)) return;
+    const T scale = static_cast<T>(weight / mean->count);
+    const T inv_length = T(1) / std::sqrt(dot(n, n));
+    const Vec3<T> unit = n * inv_length;
+    const Vec3<T> gradient = -scale * inv_length * (p - dot(unit, p) * unit);
+    if (is_finite(gradient)) add3(grad_normal + 3 * i, gradient);
+  }
+};
 
 }  // namespace traceflow::loss

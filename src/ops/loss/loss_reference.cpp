@@ -2,7 +2,7 @@
 
 #include "math/ssim.h"
 #include "ops/loss/loss.h"
-#include "ops/loss/loss_kernels.h"
+#include "ops/loss/normal_terms.h"
 
 // The plain truth in double precision: direct sums, the two-dimensional window as it is written.
 namespace traceflow::loss {
@@ -83,12 +83,16 @@ double ssim_loss_reference(const Tensor<double>& image, const Tensor<double>& ta
 
 double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& pseudo, double weight,
                                     Tensor<double>& grad_normal, Tensor<double>& grad_pseudo) {
-  return mean_normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo);
+  Mean mean{};
+  mean_normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo, &mean);
+  return mean.value;
 }
 
 double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>& prior, double weight,
                               Tensor<double>& grad_normal) {
-  return mean_normal_prior(normal, prior, weight, grad_normal);
+  Mean mean{};
+  mean_normal_prior(normal, prior, weight, grad_normal, &mean);
+  return mean.value;
 }
 
 }  // namespace traceflow::loss

@@ -2,40 +2,16 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "math/types.h"
-#include "ops/loss/rigidity.h"
+#include "ops/loss/rigidity_cuda.h"
+#include "ops/loss/rigidity_kernels.h"
 
 namespace traceflow::loss {
 
 namespace {
 
-// What one edge adds: its value, and the pull of its far end on its near end at rest and posed.
-struct Edge {
-  bool counts = false;
-  float value = 0;
-  Vec3<float> at_rest{0}, posed{0};
-};
-
-struct Ends {
-  Vec3<float> rest, posed;  // far end less near end
-};
-
-Edge measure(const Ends& ends, float reach, float strain2) {
-  const float rest_length = glm::length(ends.rest);
-  const float posed_length = glm::length(ends.posed);
-  const float inverse_reach = 1 / reach;
-  const float e = (posed_length - rest_length) * inverse_reach;
-  if (!(rest_length > 0) || !(posed_length > 0) || !std::isfinite(e)) return {};
-  const float sum = e * e + strain2;
-  const float slope = 2 * e * strain2 / (sum * sum) * inverse_reach;
-  return {true, e * e / sum, slope / rest_length * ends.rest, -slope / posed_length * ends.posed};
-}
-
-}  // namespace
-
-double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tensor<int32_t>& subset,
-                const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,
-                Tensor<float>& grad_posed) {
+Mean rigidity_on_host(const Tensor<float>& rest, const Tensor<float>& posed, const Tensor<int32_t>& subset,
+                      const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,
+                      Tensor<float>& grad_posed) {
   const int64_t k = edges.index.dim(1), count = posed.dim(0);
   const auto strain2 = static_cast<float>(strain * strain);
   const auto stored = [&](int64_t i) { return subset.empty() ? i : int64_t{subset[i]}; };
@@ -62,7 +38,7 @@ double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Ten
     sum += edge.value;
     counted += edge.counts ? 1 : 0;
   }
-  if (counted == 0) return 0;
+  if (counted == 0) return {0, 0};
   const auto scale = static_cast<float>(weight / static_cast<double>(counted));
   for (int64_t i = 0; i < count; ++i) {
     const int64_t near = stored(i);
@@ -76,7 +52,20 @@ double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Ten
       add3(grad_posed.row(posed_at[static_cast<size_t>(far)]), -scale * edge.posed);
     }
   }
-  return sum / static_cast<double>(counted);
+  return {sum / static_cast<double>(counted), static_cast<double>(counted)};
+}
+
+}  // namespace
+
+void rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tensor<int32_t>& subset,
+              const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,
+              Tensor<float>& grad_posed, const MeanSlot& value) {
+  Mean* const mean = value.on(posed.device());
+  if (posed.device() == Device::cuda) {
+    cuda::rigidity(rest, posed, subset, edges, strain, weight, grad_rest, grad_posed, mean);
+  } else {
+    *mean = rigidity_on_host(rest, posed, subset, edges, strain, weight, grad_rest, grad_posed);
+  }
 }
 
 }  // namespace traceflow::loss

@@ -6,6 +6,7 @@
 #include "math/ssim.h"
 #include "ops/loss/loss.h"
 #include "ops/loss/loss_kernels.h"
+#include "ops/loss/ssim_cuda.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "ops/loss/ssim_cpu.cpp"
@@ -28,8 +29,6 @@ inline constexpr int64_t channels = 3;
 inline constexpr int64_t row_padding = 16;
 static_assert(row_padding >= ssim_radius * channels);
 
-// The middle tap and the five beside it.
-using HalfWindow = std::array<float, ssim_radius + 1>;
 // A row and its neighbours, from ssim_radius above to ssim_radius below.
 using Rows = std::array<const float*, taps>;
 
@@ -171,13 +170,6 @@ HWY_EXPORT(add_gradient_row);
 
 constexpr int64_t rows_per_block = 8;
 
-HalfWindow half_window() {
-  const auto window = ssim_window();
-  HalfWindow half{};
-  for (size_t k = 0; k < half.size(); ++k) half[k] = static_cast<float>(window[ssim_radius + k]);
-  return half;
-}
-
 // Rows of n numbers, each with zeros on either side.
 class PaddedRows {
  public:
@@ -288,17 +280,23 @@ void add_gradient(const Tensor<float>& image, const Tensor<float>& target, const
 
 }  // namespace
 
-double ssim_loss(const Tensor<float>& image, const Tensor<float>& target, double weight,
-                 Tensor<float>& grad_image) {
+void ssim_loss(const Tensor<float>& image, const Tensor<float>& target, double weight,
+               Tensor<float>& grad_image, const MeanSlot& value) {
   check_same_shape(image, target, grad_image);
   check_is_image(image);
-  if (image.empty()) return 0;
-  const auto count = static_cast<double>(image.size());
+  Mean* const mean = value.on(image.device());
   const HalfWindow window = half_window();
+  if (image.device() == Device::cuda) {
+    cuda::ssim_loss(image, target, window, weight, grad_image, mean);
+    return;
+  }
+  *mean = {0, 0};
+  if (image.empty()) return;
+  const auto count = static_cast<double>(image.size());
   static thread_local DerivativeMaps maps;  // kept, so that an iteration does not ask for fresh pages
   const double sum = compare_images(image, target, window, maps);
   add_gradient(image, target, window, maps, static_cast<float>(-weight / count), grad_image);
-  return 1 - sum / count;
+  *mean = {1 - sum / count, count};
 }
 
 double ssim(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& mask) {
@@ -307,6 +305,12 @@ double ssim(const Tensor<float>& image, const Tensor<float>& target, const Tenso
   require(mask.empty() || mask.size() * channels == image.size(), "the mask has the image's size",
           mask.shape().to_string());
   const HalfWindow window = half_window();
+  if (image.device() == Device::cuda) {
+    Tensor<Mean> found({1}, Device::cuda);
+    cuda::ssim(image, target, window, mask.empty() ? nullptr : mask.data(), found.data());
+    const Mean mean = found.on(Device::cpu)[0];
+    return mean.count > 0 ? mean.value : std::numeric_limits<double>::quiet_NaN();
+  }
   const int64_t n = image.row_size();
   const auto masked_sum = [&](const float* value, int64_t row) {
     CountedSum total;

@@ -65,15 +65,21 @@ namespace {
 
 constexpr int64_t block_size = 1 << 14;
 
-}  // namespace
+// 1 / (1 − β^step)
+float inverse_correction(float beta, int64_t step) {
+  return static_cast<float>(1 / (1 - std::pow(static_cast<double>(beta), static_cast<double>(step))));
+}
 
-int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
-                  std::span<const float> learning_rates, const AdamOptions& options) {
-  require(gradient.size() == parameter.size() && state.first.size() == parameter.size() &&
-              state.second.size() == parameter.size() && !learning_rates.empty(),
-          "gradient and moments fit their parameter", parameter.shape().to_string());
-  ++state.step;
-  const auto step = static_cast<double>(state.step);
+void note(const Tensor<float>& gradient, int64_t count, LeftAlone& left_alone) {
+  if (count == 0) return;
+  const auto values = gradient.values();
+  const auto bad = std::find_if(values.begin(), values.end(), [](float v) { return !std::isfinite(v * v); });
+  left_alone = {static_cast<int32_t>(count),
+                LeftAlone::largest_index - static_cast<int32_t>(bad - values.begin())};
+}
+
+void step_on_host(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
+                  std::span<const float> learning_rates, const AdamOptions& options, LeftAlone& left_alone) {
   // Blocks begin at multiples of the row, so that one block's rates serve them all.
   const auto columns = static_cast<int64_t>(learning_rates.size());
   const int64_t grain = std::max<int64_t>(1, block_size / columns) * columns;
@@ -92,15 +98,58 @@ int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamS
     block.beta1 = options.beta1;
     block.beta2 = options.beta2;
     block.epsilon = options.epsilon;
-    block.inverse_correction1 =
-        static_cast<float>(1 / (1 - std::pow(static_cast<double>(options.beta1), step)));
-    block.inverse_correction2 =
-        static_cast<float>(1 / (1 - std::pow(static_cast<double>(options.beta2), step)));
+    block.inverse_correction1 = inverse_correction(options.beta1, state.step);
+    block.inverse_correction2 = inverse_correction(options.beta2, state.step);
     not_finite[static_cast<size_t>(begin / grain)] = HWY_DYNAMIC_DISPATCH(update_block)(block);
   });
   int64_t total = 0;
   for (const int64_t n : not_finite) total += n;
-  return total;
+  note(gradient, total, left_alone);
+}
+
+void step_on_device(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
+                    std::span<const float> learning_rates, const AdamOptions& options,
+                    LeftAlone* left_alone) {
+  cuda::AdamTensor tensor{parameter.data(),
+                          gradient.data(),
+                          state.first.data(),
+                          state.second.data(),
+                          parameter.size(),
+                          options.beta1,
+                          options.beta2,
+                          options.epsilon,
+                          inverse_correction(options.beta1, state.step),
+                          inverse_correction(options.beta2, state.step),
+                          static_cast<int32_t>(learning_rates.size()),
+                          {},
+                          left_alone};
+  std::copy(learning_rates.begin(), learning_rates.end(), tensor.rates.begin());
+  cuda::adam_step(tensor);
+}
+
+}  // namespace
+
+void adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
+               std::span<const float> learning_rates, const AdamOptions& options, const LeftAloneSlot& slot) {
+  require(gradient.size() == parameter.size() && state.first.size() == parameter.size() &&
+              state.second.size() == parameter.size() && !learning_rates.empty() &&
+              learning_rates.size() <= most_rates && parameter.size() <= LeftAlone::largest_index,
+          "gradient and moments fit their parameter", parameter.shape().to_string());
+  require(slot.list.device() == parameter.device() && slot.place >= 0 && slot.place < slot.list.size(),
+          "what a step leaves alone is noted where its parameter is", slot.list.shape().to_string());
+  ++state.step;
+  if (parameter.device() == Device::cuda) {
+    step_on_device(parameter, gradient, state, learning_rates, options, slot.list.data() + slot.place);
+  } else {
+    step_on_host(parameter, gradient, state, learning_rates, options, slot.list[slot.place]);
+  }
+}
+
+int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
+                  std::span<const float> learning_rates, const AdamOptions& options) {
+  Tensor<LeftAlone> left_alone({1}, parameter.device());
+  adam_step(parameter, gradient, state, learning_rates, options, {left_alone, 0});
+  return left_alone.on(Device::cpu)[0].count;
 }
 
 }  // namespace traceflow::optimize

@@ -4,7 +4,8 @@
 #include "base/tensor.h"
 #include "math/camera.h"
 
-// From depth and normals to the surface that light is reflected at (method §4).
+// From depth and normals to the surface that light is reflected at (method §4). Every step runs where its
+// pictures are.
 namespace traceflow::surface {
 
 // Pseudo-normals (method §4.1, §4.2): surface depth z = (1−ρ)·expected + ρ·median, points x = eye + z·ray,
@@ -46,9 +47,16 @@ struct SelectOptions {
 
 // Pixels that matter, and of the rest (with alpha above the threshold and a non-zero normal) a share drawn by
 // a hash of (seed, pixel). probes false: rendering, no random pixels. A pixel whose normal is zero or not
-// finite is never traced.
-TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint, const Tensor<float>& normal,
-                           const SelectOptions& options, bool probes, uint64_t seed);
+// finite is never traced. The lists lie where alpha does; their memory is kept.
+void select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint, const Tensor<float>& normal,
+                   const SelectOptions& options, bool probes, uint64_t seed, TracedPixels& traced);
+inline TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint,
+                                  const Tensor<float>& normal, const SelectOptions& options, bool probes,
+                                  uint64_t seed) {
+  TracedPixels traced;
+  select_pixels(alpha, tint, normal, options, probes, seed, traced);
+  return traced;
+}
 
 // Mirrored rays (method §4.3) of the listed pixels: origin = surface point, direction = d − 2(d·n̂)n̂ of unit
 // length, n̂ the blended normal normalised. origins, directions: P×3, world, resized. Differentiable: both

@@ -1,34 +1,15 @@
-#include <limits>
-
 #include "base/parallel.h"
-#include "math/pseudo_normal.h"
 #include "ops/surface/surface.h"
-#include "ops/surface/surface_kernels.h"
+#include "ops/surface/surface_backward.h"
 
-// Pseudo-normals. Both passes go by bands of rows. A band back-projects its own rows and the neighbours that
-// it needs into memory of its own, so bands are independent. The backward pass gathers: a pixel collects from
-// the four normals that it took part in, and no two threads write to one place.
+// Pseudo-normals. On the CPU both passes go by bands of rows. A band back-projects its own rows and the
+// neighbours that it needs into memory of its own, so bands are independent. The backward pass gathers: a
+// pixel collects from the four normals that it took part in, and no two threads write to one place.
 namespace traceflow::surface {
 
 namespace {
 
 constexpr int64_t band_rows = 16;
-
-// H×W inputs seen as one picture of points.
-template <class T>
-struct DepthImage {
-  const Camera<T>& camera;
-  const Tensor<T>& depth;
-  const Tensor<T>& median_depth;
-  const Tensor<T>& alpha;
-  T depth_ratio;
-
-  int64_t height() const { return depth.dim(0); }
-  int64_t width() const { return depth.dim(1); }
-  T z(int64_t row, int64_t column) const {
-    return surface_depth(depth(row, column), median_depth(row, column), depth_ratio);
-  }
-};
 
 template <class T>
 DepthImage<T> checked(const Camera<T>& camera, const Tensor<T>& depth, const Tensor<T>& median_depth,
@@ -36,7 +17,7 @@ DepthImage<T> checked(const Camera<T>& camera, const Tensor<T>& depth, const Ten
   require(depth.shape() == Shape({camera.height, camera.width}) && median_depth.shape() == depth.shape() &&
               alpha.shape() == depth.shape(),
           "depths and alpha have the camera's size", depth.shape().to_string());
-  return {camera, depth, median_depth, alpha, depth_ratio};
+  return {camera, depth.data(), median_depth.data(), alpha.data(), depth_ratio};
 }
 
 // Rows [first, last) of a picture of vectors, addressed by their row in the whole picture.
@@ -62,16 +43,12 @@ class RowBand {
   std::vector<Vec3<T>> values_;
 };
 
-// Points of the rows, not a number where nothing was drawn: every normal that touches one then vanishes by
-// itself. Relative to the eye, which differences do not see.
 template <class T>
 RowBand<T> back_project(const DepthImage<T>& image, int64_t first, int64_t last) {
   RowBand<T> points(std::max<int64_t>(first, 0), std::min(last, image.height()), image.width());
   for (int64_t row = points.first(); row < points.last(); ++row) {
     for (int64_t column = 0; column < image.width(); ++column) {
-      points(row, column) = image.alpha(row, column) > T(0)
-                                ? image.z(row, column) * pixel_ray(image.camera, row, column)
-                                : Vec3<T>(std::numeric_limits<T>::quiet_NaN());
+      points(row, column) = image.point(row, column);
     }
   }
   return points;
@@ -105,6 +82,13 @@ void pseudo_normals(const Camera<T>& camera, const Tensor<T>& depth, const Tenso
                     const Tensor<T>& alpha, T depth_ratio, Tensor<T>& normal) {
   const DepthImage<T> image = checked(camera, depth, median_depth, alpha, depth_ratio);
   const int64_t height = image.height(), width = image.width();
+  normal.place(depth.device());
+  if (depth.device() == Device::cuda) {
+    normal.resize({height, width, 3});
+    parallel_for(Device::cuda, "surface: pseudo-normals", depth.size(),
+                 PseudoNormals<T>{image, normal.data()});
+    return;
+  }
   normal.reset({height, width, 3});
   parallel_blocks("surface: pseudo-normals", height, band_rows, [&](int64_t begin, int64_t end) {
     const RowBand<T> points = back_project(image, begin - 1, end + 1);
@@ -129,14 +113,20 @@ void pseudo_normals_backward(const Camera<T>& camera, const Tensor<T>& depth, co
   require(grad_normal.shape() == Shape({height, width, 3}) && grad_depth.shape() == depth.shape() &&
               grad_median_depth.shape() == depth.shape(),
           "gradients have the shapes of their values");
-  std::vector<CameraGradient<T>> partial(static_cast<size_t>((height + band_rows - 1) / band_rows));
+  if (depth.device() == Device::cuda) {
+    const PseudoNormalsBackward<T> step{image, grad_normal.data(), grad_depth.data(),
+                                        grad_median_depth.data()};
+    backward_on_device("surface: pseudo-normals backward", depth.size(), step, grad_camera);
+    return;
+  }
+  std::vector<CameraSum<T>> partial(static_cast<size_t>((height + band_rows - 1) / band_rows));
   parallel_blocks("surface: pseudo-normals backward", height, band_rows, [&](int64_t begin, int64_t end) {
     const RowBand<T> points = back_project(image, begin - 2, end + 2);
     const int64_t first = std::max<int64_t>(begin - 1, 0), last = std::min(end + 1, height);
     RowBand<T> grad_across(first, last, width), grad_down(first, last, width);
     normal_gradients(image, grad_normal, points, grad_across, grad_down);
 
-    CameraGradient<T> sum;
+    CameraSum<T> sum;
     for (int64_t row = begin; row < end; ++row) {
       for (int64_t column = 0; column < width; ++column) {
         Vec3<T> g(T(0));

@@ -1,55 +1,264 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "math/camera.h"
+#include "math/pseudo_normal.h"
+#include "math/reflection.h"
 
-// What the surface ops share.
+// What the surface ops share, and their steps for one pixel or ray. Cameras travel by value.
 namespace traceflow::surface {
 
 // Method §4.1.
 template <class T>
-T surface_depth(T expected, T median, T depth_ratio) {
+TRACEFLOW_HD T surface_depth(T expected, T median, T depth_ratio) {
   return (T(1) - depth_ratio) * expected + depth_ratio * median;
 }
 
 template <class T>
-Vec3<T> pixel_ray(const Camera<T>& camera, int64_t row, int64_t column) {
+TRACEFLOW_HD Vec3<T> pixel_ray(const Camera<T>& camera, int64_t row, int64_t column) {
   return camera.ray_in_world(static_cast<T>(column) + T(0.5), static_cast<T>(row) + T(0.5));
 }
 
 template <class T>
-bool is_finite(const Vec3<T>& v) {
+TRACEFLOW_HD bool is_finite(const Vec3<T>& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+// A camera's gradient as a sum over pixels.
+template <class T>
+struct CameraSum : CameraGradient<T> {
+  TRACEFLOW_HD CameraSum& operator+=(const CameraGradient<T>& other) {
+    this->camera_from_world += other.camera_from_world;
+    this->position += other.position;
+    return *this;
+  }
+};
+
 // The camera's share of dL/d(ray) of one pixel.
 template <class T>
-void add_ray_gradient(const Camera<T>& camera, int64_t row, int64_t column, const Vec3<T>& grad_ray,
-                      CameraGradient<T>& gradient) {
+TRACEFLOW_HD void add_ray_gradient(const Camera<T>& camera, int64_t row, int64_t column,
+                                   const Vec3<T>& grad_ray, CameraSum<T>& gradient) {
   const Vec3<T> ray = camera.ray_in_camera(static_cast<T>(column) + T(0.5), static_cast<T>(row) + T(0.5));
   gradient.camera_from_world += glm::outerProduct(ray, grad_ray);
 }
 
 // The camera's share of dL/dx for the point x = eye + z·ray of one pixel.
 template <class T>
-void add_point_gradient(const Camera<T>& camera, int64_t row, int64_t column, T z, const Vec3<T>& grad_point,
-                        CameraGradient<T>& gradient) {
+TRACEFLOW_HD void add_point_gradient(const Camera<T>& camera, int64_t row, int64_t column, T z,
+                                     const Vec3<T>& grad_point, CameraSum<T>& gradient) {
   add_ray_gradient(camera, row, column, z * grad_point, gradient);
   gradient.position += grad_point;
 }
 
 // Partial gradients of blocks, added in block order.
 template <class T>
-void add_in_order(const std::vector<CameraGradient<T>>& partial, CameraGradient<T>& gradient) {
-  CameraGradient<T> total;
-  for (const CameraGradient<T>& p : partial) {
-    total.camera_from_world += p.camera_from_world;
-    total.position += p.position;
-  }
+void add_in_order(const std::vector<CameraSum<T>>& partial, CameraGradient<T>& gradient) {
+  CameraSum<T> total;
+  for (const CameraSum<T>& p : partial) total += p;
   gradient.camera_from_world += total.camera_from_world;
   gradient.position += total.position;
 }
+
+// H×W inputs seen as one picture of points.
+template <class T>
+struct DepthImage {
+  Camera<T> camera;
+  const T *depth, *median_depth, *alpha;
+  T depth_ratio;
+
+  TRACEFLOW_HD int64_t height() const { return camera.height; }
+  TRACEFLOW_HD int64_t width() const { return camera.width; }
+  TRACEFLOW_HD T z(int64_t row, int64_t column) const {
+    const int64_t i = row * camera.width + column;
+    return surface_depth(depth[i], median_depth[i], depth_ratio);
+  }
+  // Not a number where nothing was drawn: every normal that touches such a point then vanishes by itself.
+  // Relative to the eye, which differences do not see.
+  TRACEFLOW_HD Vec3<T> point(int64_t row, int64_t column) const {
+    return alpha[row * camera.width + column] > T(0) ? z(row, column) * pixel_ray(camera, row, column)
+                                                     : Vec3<T>(std::numeric_limits<T>::quiet_NaN());
+  }
+  // Whether a pixel has all its neighbours and something was drawn at it.
+  TRACEFLOW_HD bool may_have_normal(int64_t row, int64_t column) const {
+    return row > 0 && row < height() - 1 && column > 0 && column < width() - 1 &&
+           is_finite(point(row, column));
+  }
+  TRACEFLOW_HD Vec3<T> across(int64_t row, int64_t column) const {
+    return point(row, column + 1) - point(row, column - 1);
+  }
+  TRACEFLOW_HD Vec3<T> down(int64_t row, int64_t column) const {
+    return point(row + 1, column) - point(row - 1, column);
+  }
+};
+
+template <class T>
+struct PseudoNormals {
+  DepthImage<T> image;
+  T* normal;
+
+  TRACEFLOW_HD void operator()(int64_t pixel) const {
+    const int64_t row = static_cast<int32_t>(pixel) / image.camera.width;
+    const int64_t column = static_cast<int32_t>(pixel) % image.camera.width;
+    const bool may = image.may_have_normal(row, column);
+    store3(normal + 3 * pixel,
+           may ? pseudo_normal(image.across(row, column), image.down(row, column)) : Vec3<T>(T(0)));
+  }
+};
+
+// A pixel collects from the four normals that it took part in.
+template <class T>
+struct PseudoNormalsBackward {
+  DepthImage<T> image;
+  const T* grad_normal;
+  T *grad_depth, *grad_median_depth;
+
+  TRACEFLOW_HD CameraSum<T> operator()(int64_t pixel) const {
+    CameraSum<T> camera;
+    const int64_t row = static_cast<int32_t>(pixel) / image.camera.width;
+    const int64_t column = static_cast<int32_t>(pixel) % image.camera.width;
+    Vec3<T> g(T(0));
+    g += of_normal(row, column - 1).across;
+    g -= of_normal(row, column + 1).across;
+    g += of_normal(row - 1, column).down;
+    g -= of_normal(row + 1, column).down;
+    if (g == Vec3<T>(T(0))) return camera;
+    const T grad_z = dot(g, pixel_ray(image.camera, row, column));
+    grad_depth[pixel] += (T(1) - image.depth_ratio) * grad_z;
+    grad_median_depth[pixel] += image.depth_ratio * grad_z;
+    add_point_gradient(image.camera, row, column, image.z(row, column), g, camera);
+    return camera;
+  }
+
+  // Zero on the border and beyond it, and where there is no normal.
+  TRACEFLOW_HD PseudoNormalGradient<T> of_normal(int64_t row, int64_t column) const {
+    if (!image.may_have_normal(row, column)) return {};
+    const auto gradient =
+        pseudo_normal_backward(image.across(row, column), image.down(row, column),
+                               load3<T>(grad_normal + 3 * (row * image.camera.width + column)));
+    if (!is_finite(gradient.across) || !is_finite(gradient.down)) return {};
+    return gradient;
+  }
+};
+
+// What mirrored rays are made of.
+template <class T>
+struct Mirror {
+  Camera<T> camera;
+  const int32_t* pixels;
+  const T *depth, *median_depth, *normal;
+  T depth_ratio;
+
+  TRACEFLOW_HD int64_t row(int64_t i) const { return pixels[i] / camera.width; }
+  TRACEFLOW_HD int64_t column(int64_t i) const { return pixels[i] % camera.width; }
+  TRACEFLOW_HD Vec3<T> ray(int64_t i) const { return pixel_ray(camera, row(i), column(i)); }
+  TRACEFLOW_HD T z(int64_t i) const {
+    return surface_depth(depth[pixels[i]], median_depth[pixels[i]], depth_ratio);
+  }
+  TRACEFLOW_HD Vec3<T> normal_at(int64_t i) const { return load3<T>(normal + 3 * int64_t{pixels[i]}); }
+};
+
+template <class T>
+struct ReflectionRays {
+  Mirror<T> mirror;
+  T *origins, *directions;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const Vec3<T> ray = mirror.ray(i);
+    const Vec3<T> origin = mirror.camera.position + mirror.z(i) * ray;
+    const bool usable = is_finite(origin);
+    store3(origins + 3 * i, usable ? origin : mirror.camera.position);
+    store3(directions + 3 * i, usable ? reflect(ray, mirror.normal_at(i)) : Vec3<T>(T(0)));
+  }
+};
+
+template <class T>
+struct ReflectionRaysBackward {
+  Mirror<T> mirror;
+  const T *grad_origins, *grad_directions;
+  T *grad_depth, *grad_median_depth, *grad_normal;
+
+  TRACEFLOW_HD CameraSum<T> operator()(int64_t i) const {
+    CameraSum<T> camera;
+    add(i, camera);
+    return camera;
+  }
+
+  TRACEFLOW_HD void add(int64_t i, CameraSum<T>& camera) const {
+    const int64_t pixel = mirror.pixels[i];
+    const Vec3<T> ray = mirror.ray(i);
+    const T z = mirror.z(i);
+    const Vec3<T> n = mirror.normal_at(i);
+    if (!is_finite(mirror.camera.position + z * ray) || reflect(ray, n) == Vec3<T>(T(0))) return;
+
+    const Vec3<T> grad_point = load3<T>(grad_origins + 3 * i);
+    const auto mirrored = reflect_backward(ray, n, load3<T>(grad_directions + 3 * i));
+    if (!is_finite(grad_point) || !is_finite(mirrored.ray) || !is_finite(mirrored.normal)) return;
+    const T grad_z = dot(grad_point, ray);
+    grad_depth[pixel] += (T(1) - mirror.depth_ratio) * grad_z;
+    grad_median_depth[pixel] += mirror.depth_ratio * grad_z;
+    add3(grad_normal + 3 * pixel, mirrored.normal);
+    add_point_gradient(mirror.camera, mirror.row(i), mirror.column(i), z, grad_point, camera);
+    add_ray_gradient(mirror.camera, mirror.row(i), mirror.column(i), mirrored.ray, camera);
+  }
+};
+
+// A number in [0, 1) that depends on nothing but the seed and the pixel (the finaliser of splitmix64).
+TRACEFLOW_HD inline double hashed_uniform(uint64_t seed, int64_t pixel) {
+  uint64_t z = seed + 0x9E3779B97F4A7C15ULL * (static_cast<uint64_t>(pixel) + 1);
+  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
+  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
+  z ^= z >> 31U;
+  return static_cast<double>(z >> 11U) * 0x1.0p-53;
+}
+
+// The weight of a traced pixel's gradient (method §4.4); 0 for a pixel that is not traced.
+struct TraceWeight {
+  const float *alpha, *tint, *normal;
+  float min_alpha, min_tint, probe_share;
+  bool probes;
+  uint64_t seed;
+
+  TRACEFLOW_HD float operator()(int64_t pixel) const {
+    if (!(alpha[pixel] >= min_alpha)) return 0;
+    const Vec3<float> n = load3<float>(normal + 3 * pixel);
+    if (n == Vec3<float>(0) || !is_finite(n)) return 0;
+    if (tint[pixel] >= min_tint) return 1;
+    return probes && hashed_uniform(seed, pixel) < static_cast<double>(probe_share) ? 1.0F / probe_share : 0;
+  }
+};
+
+// 1 for a traced pixel. The entry after the last pixel is 0.
+struct FlagTraced {
+  TraceWeight weight;
+  int64_t pixels;
+  int32_t* flag;
+
+  TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = i < pixels && weight(i) != 0 ? 1 : 0; }
+};
+
+// Puts every traced pixel at its place, which is the number of those before it.
+struct ListTraced {
+  TraceWeight weight;
+  const int32_t* place;  // one entry more than there are pixels
+  int32_t* pixel;
+  float* pixel_weight;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (place[i] == place[i + 1]) return;
+    pixel[place[i]] = static_cast<int32_t>(i);
+    pixel_weight[place[i]] = weight(i);
+  }
+};
+
+// Puts a camera's gradient where the host fetches it.
+template <class T>
+struct KeepCamera {
+  CameraSum<T>* kept;
+  TRACEFLOW_HD void operator()(const CameraSum<T>& sum) const { *kept = sum; }
+};
 
 }  // namespace traceflow::surface

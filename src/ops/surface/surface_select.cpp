@@ -1,3 +1,5 @@
+#include "base/parallel.h"
+#include "base/sort.h"
 #include "ops/surface/surface.h"
 #include "ops/surface/surface_kernels.h"
 
@@ -5,13 +7,37 @@ namespace traceflow::surface {
 
 namespace {
 
-// A number in [0, 1) that depends on nothing but the seed and the pixel (the finaliser of splitmix64).
-double hashed_uniform(uint64_t seed, int64_t pixel) {
-  uint64_t z = seed + 0x9E3779B97F4A7C15ULL * (static_cast<uint64_t>(pixel) + 1);
-  z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
-  z = (z ^ (z >> 27U)) * 0x94D049BB133111EBULL;
-  z ^= z >> 31U;
-  return static_cast<double>(z >> 11U) * 0x1.0p-53;
+void select_on_host(const TraceWeight& weight_of, int64_t size, TracedPixels& traced) {
+  traced.pixel.place(Device::cpu).resize({size});
+  traced.weight.place(Device::cpu).resize({size});
+  int64_t count = 0;
+  for (int64_t pixel = 0; pixel < size; ++pixel) {
+    const float weight = weight_of(pixel);
+    if (weight == 0) continue;
+    traced.pixel[count] = static_cast<int32_t>(pixel);
+    traced.weight[count++] = weight;
+  }
+  traced.pixel.resize({count});
+  traced.weight.resize({count});
+}
+
+// Lists have room for every pixel, so that their memory stays where it is whatever their number. The host
+// waits for that number: the rays that follow are as many.
+void select_on_device(const TraceWeight& weight_of, int64_t size, TracedPixels& traced) {
+  static thread_local Tensor<int32_t> place;
+  static thread_local Tensor<uint8_t> scratch;
+  place.place(Device::cuda).resize({size + 1});
+  parallel_for(Device::cuda, "surface: flag traced pixels", size + 1,
+               FlagTraced{weight_of, size, place.data()});
+  cuda::exclusive_sum(place.data(), place.data(), size + 1, scratch);
+  traced.pixel.place(Device::cuda).resize({size});
+  traced.weight.place(Device::cuda).resize({size});
+  parallel_for(Device::cuda, "surface: list traced pixels", size,
+               ListTraced{weight_of, place.data(), traced.pixel.data(), traced.weight.data()});
+  int32_t count = 0;
+  memory::copy(Device::cpu, &count, Device::cuda, place.data() + size, sizeof(count));
+  traced.pixel.resize({count});
+  traced.weight.resize({count});
 }
 
 }  // namespace
@@ -22,23 +48,17 @@ void SelectOptions::validate() const {
   check_option(probe_share >= 0 && probe_share <= 1, "select.probe_share", probe_share, "0 to 1");
 }
 
-TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint, const Tensor<float>& normal,
-                           const SelectOptions& options, bool probes, uint64_t seed) {
+void select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint, const Tensor<float>& normal,
+                   const SelectOptions& options, bool probes, uint64_t seed, TracedPixels& traced) {
   require(tint.shape() == alpha.shape() && normal.size() == 3 * alpha.size(),
           "alpha, tint and normal show the same picture", alpha.shape().to_string());
-  std::vector<int32_t> pixels;
-  std::vector<float> weights;
-  for (int64_t pixel = 0; pixel < alpha.size(); ++pixel) {
-    if (!(alpha[pixel] >= options.min_alpha)) continue;
-    const Vec3<float> n = load3<float>(normal.data() + 3 * pixel);
-    if (n == Vec3<float>(0) || !is_finite(n)) continue;
-    const bool matters = tint[pixel] >= options.min_tint;
-    const bool probe = !matters && probes && hashed_uniform(seed, pixel) < options.probe_share;
-    if (!matters && !probe) continue;
-    pixels.push_back(static_cast<int32_t>(pixel));
-    weights.push_back(matters ? 1.0F : 1.0F / options.probe_share);
+  const TraceWeight weight{alpha.data(),     tint.data(),         normal.data(), options.min_alpha,
+                           options.min_tint, options.probe_share, probes,        seed};
+  if (alpha.device() == Device::cuda) {
+    select_on_device(weight, alpha.size(), traced);
+  } else {
+    select_on_host(weight, alpha.size(), traced);
   }
-  return {tensor_of(pixels), tensor_of(weights)};
 }
 
 }  // namespace traceflow::surface

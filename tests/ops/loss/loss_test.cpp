@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "support/gradients.h"
+#include "support/loss_values.h"
 
 namespace traceflow::loss {
 namespace {

@@ -3,6 +3,7 @@
 #include "math/ssim.h"
 #include "ops/loss/loss.h"
 #include "support/gradients.h"
+#include "support/loss_values.h"
 
 namespace traceflow::loss {
 namespace {

@@ -99,7 +99,7 @@ TEST(PseudoNormals, AddToTheGradients) {
   const auto once = gradients_of<double>(s, weight);
   auto twice = once;
   pseudo_normals_backward(s.camera, s.depth, s.median_depth, s.alpha, s.depth_ratio, weight, twice.depth,
-                          twice.median_depth, twice.camera);
+                          twice.median_depth, &twice.camera);
   for (int64_t i = 0; i < 81; ++i) EXPECT_DOUBLE_EQ(twice.depth[i], 2 * once.depth[i]);
 }
 

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/parallel.h"
+
+namespace traceflow {
+
+namespace cuda {
+// The sum of f(i) over [0, n) as kernels. Defined in base/sum_kernels.h; the .cu file beside the functors
+// instantiates it.
+template <class T, class F, class G>
+TRACEFLOW_WITH_CUDA void sum_each_index(const char* description, int64_t n, const F& f, const G& finish);
+}  // namespace cuda
+
+// Sum of f(i) over [0, n) in a fixed order, on any device. finish(sum) takes it there, once, so that the host
+// need not wait for what stays on the device. f and finish are functors of plain numbers and addresses whose
+// operator() is TRACEFLOW_HD; T is a number, or a struct of such with a += that starts at zeros.
+template <class T, class F, class G>
+void ordered_sum(Device device, const char* description, int64_t n, const F& f, const G& finish,
+                 int64_t grain) {
+  if (device == Device::cpu) {
+    finish(ordered_sum<T>(description, n, f, grain));
+    return;
+  }
+  void (*const sum)(const char*, int64_t, const F&, const G&) = &cuda::sum_each_index<T, F, G>;
+  require(sum != nullptr, "a sum has code for the CUDA device", description);
+  sum(description, n, f, finish);
+}
+
+}  // namespace traceflow

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "base/sums.h"
+#include "ops/loss/loss_kernels.h"
+
+// The terms on normals, for single precision on any device and for the reference.
+namespace traceflow::loss {
+
+template <class T>
+void mean_normal_consistency(const Tensor<T>& normal, const Tensor<T>& pseudo, double weight,
+                             Tensor<T>& grad_normal, Tensor<T>& grad_pseudo, Mean* mean) {
+  check_is_image(normal);
+  check_same_shape(normal, pseudo, grad_normal);
+  check_same_shape(normal, pseudo, grad_pseudo);
+  const int64_t pixels = normal.size() / 3;
+  const auto count = static_cast<double>(pixels);
+  const NormalConsistency<T> step{normal.data(), pseudo.data(), static_cast<T>(weight / count),
+                                  grad_normal.data(), grad_pseudo.data()};
+  ordered_sum<double>(normal.device(), "loss: normal consistency", pixels, step, MeanOver{count, mean},
+                      block_pixels);
+}
+
+template <class T>
+void mean_normal_prior(const Tensor<T>& normal, const Tensor<T>& prior, double weight, Tensor<T>& grad_normal,
+                       Mean* mean) {
+  check_is_image(normal);
+  check_same_shape(normal, prior, grad_normal);
+  const int64_t pixels = normal.size() / 3;
+  const NormalPrior<T> forward{normal.data(), prior.data()};
+  ordered_sum<CountedSum>(normal.device(), "loss: normal prior", pixels, forward, MeanOverCounted{mean},
+                          block_pixels);
+  parallel_for(normal.device(), "loss: normal prior backward", pixels,
+               NormalPriorBackward<T>{forward, weight, mean, grad_normal.data()}, block_pixels);
+}
+
+}  // namespace traceflow::loss

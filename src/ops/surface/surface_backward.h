@@ -1,0 +1,26 @@
+#pragma once
+
+#include "base/sums.h"
+#include "base/tensor.h"
+#include "ops/surface/surface_kernels.h"
+
+namespace traceflow::surface {
+
+// step(i) for every i in [0, n) on the CUDA device, where the camera's gradient is summed up only for those
+// who want it. The host waits for it: poses live there.
+template <class T, class Step>
+void backward_on_device(const char* description, int64_t n, const Step& step,
+                        CameraGradient<T>* grad_camera) {
+  if (grad_camera == nullptr) {
+    parallel_for(Device::cuda, description, n, step);
+    return;
+  }
+  static thread_local Tensor<CameraSum<T>> kept;
+  kept.place(Device::cuda).resize({1});
+  ordered_sum<CameraSum<T>>(Device::cuda, description, n, step, KeepCamera<T>{kept.data()}, 0);
+  std::vector<CameraSum<T>> total(1);
+  memory::copy(Device::cpu, total.data(), Device::cuda, kept.data(), sizeof(total[0]));
+  add_in_order(total, *grad_camera);
+}
+
+}  // namespace traceflow::surface

@@ -1,0 +1,23 @@
+#include "base/kernel.h"
+#include "base/sum_kernels.h"
+#include "ops/surface/surface_kernels.h"
+
+namespace traceflow {
+
+using surface::CameraSum;
+using surface::KeepCamera;
+
+template void cuda::for_each_index(const char*, int64_t, const surface::PseudoNormals<float>&);
+template void cuda::for_each_index(const char*, int64_t, const surface::PseudoNormalsBackward<float>&);
+template void cuda::sum_each_index<CameraSum<float>>(const char*, int64_t,
+                                                     const surface::PseudoNormalsBackward<float>&,
+                                                     const KeepCamera<float>&);
+template void cuda::for_each_index(const char*, int64_t, const surface::ReflectionRays<float>&);
+template void cuda::for_each_index(const char*, int64_t, const surface::ReflectionRaysBackward<float>&);
+template void cuda::sum_each_index<CameraSum<float>>(const char*, int64_t,
+                                                     const surface::ReflectionRaysBackward<float>&,
+                                                     const KeepCamera<float>&);
+template void cuda::for_each_index(const char*, int64_t, const surface::FlagTraced&);
+template void cuda::for_each_index(const char*, int64_t, const surface::ListTraced&);
+
+}  // namespace traceflow

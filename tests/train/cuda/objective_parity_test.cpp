@@ -1,0 +1,109 @@
+#include <limits>
+
+#include "support/device.h"
+#include "train/objective.h"
+#include "train/optimiser.h"
+
+namespace traceflow {
+namespace {
+
+using namespace traceflow::testing;
+
+using TrainOnDevice = OnDevice;
+
+struct Outcome {
+  LossTerms terms;
+  FrameGradient gradient;
+};
+
+Outcome evaluate(Device device, bool normal_losses) {
+  Random random(1);
+  const Shape shape{20, 24, 3};
+  Frame frame;
+  ViewImages target;
+  const auto noise = [&](double low) { return random_tensor<float>(shape, random, low, 1).on(device); };
+  frame.colour = noise(0);
+  frame.raster.normal = noise(-1);
+  frame.pseudo_normal = noise(-1);
+  frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1).on(device);
+  target.colour = noise(0);
+  target.normal_prior = noise(-1);
+  LossOptions options;
+  options.distortion = 3;
+  Outcome o;
+  LossMeans means;
+  evaluate_objective(frame, target, options, normal_losses, o.gradient, means);
+  o.terms = means.read();
+  return o;
+}
+
+TEST_F(TrainOnDevice, TheObjectiveAgreesWithTheCpu) {
+  for (const bool normal_losses : {false, true}) {
+    const Outcome expected = evaluate(Device::cpu, normal_losses),
+                  found = evaluate(Device::cuda, normal_losses);
+    for (double LossTerms::*term :
+         {&LossTerms::total, &LossTerms::l1, &LossTerms::ssim, &LossTerms::normal, &LossTerms::normal_prior,
+          &LossTerms::distortion, &LossTerms::rigidity, &LossTerms::psnr}) {
+      EXPECT_NEAR(found.terms.*term, expected.terms.*term, 1e-5);
+    }
+    expect_close_on_host(found.gradient.colour, expected.gradient.colour, 1e-5, "colour");
+    expect_close_on_host(found.gradient.distortion, expected.gradient.distortion, 1e-6, "distortion");
+    EXPECT_EQ(found.gradient.normal.empty(), !normal_losses);
+    if (!normal_losses) continue;
+    expect_close_on_host(found.gradient.normal, expected.gradient.normal, 1e-5, "normal");
+    expect_close_on_host(found.gradient.pseudo_normal, expected.gradient.pseudo_normal, 1e-5, "pseudo");
+  }
+}
+
+Surfels noisy_surfels(int64_t count, Random& random) {
+  Surfels s;
+  s.position = random_tensor<float>({count, 3}, random, -1, 1);
+  s.log_scale = random_tensor<float>({count, 2}, random, -1, 1);
+  s.rotation = random_tensor<float>({count, 4}, random, -1, 1);
+  s.opacity_logit = random_tensor<float>({count}, random, -1, 1);
+  s.sh = random_tensor<float>({count, 4, 3}, random, -1, 1);
+  s.tint_logit = random_tensor<float>({count}, random, -1, 1);
+  return s;
+}
+
+struct Stepped {
+  Scene scene;
+  NonFiniteGradients left_alone;
+};
+
+Stepped step(Device device) {
+  Random random(2);
+  Stepped result;
+  SceneGradient gradient;
+  result.scene.main = noisy_surfels(50, random);
+  gradient.main = noisy_surfels(50, random);
+  gradient.main.rotation(17, 2) = std::numeric_limits<float>::quiet_NaN();
+  gradient.main.rotation(40, 0) = 1e30F;
+  gradient.main.sh(3, 1, 1) = std::numeric_limits<float>::infinity();
+  const auto move = [&](const char*, Tensor<float>& t) { t = t.on(device); };
+  result.scene.main.for_each(move);
+  gradient.main.for_each(move);
+  const TrainOptions options;
+  Optimiser optimiser(result.scene);
+  Trainable trainable;
+  trainable.environment = false;
+  optimiser.step(result.scene, gradient, trainable, Schedule(options), options.rates, 0);
+  result.left_alone = optimiser.left_alone();
+  return result;
+}
+
+TEST_F(TrainOnDevice, TheOptimiserAgreesWithTheCpuAndNamesTheFirstBadGradient) {
+  const Stepped expected = step(Device::cpu), found = step(Device::cuda);
+  EXPECT_EQ(expected.left_alone.count, 3);
+  EXPECT_EQ(expected.left_alone.first, "main.rotation, row 17");
+  EXPECT_EQ(found.left_alone.count, 3);
+  EXPECT_EQ(found.left_alone.first, expected.left_alone.first);
+  std::vector<const Tensor<float>*> tensors;
+  expected.scene.main.for_each([&](const char*, const Tensor<float>& t) { tensors.push_back(&t); });
+  size_t k = 0;
+  found.scene.main.for_each(
+      [&](const char* name, const Tensor<float>& t) { expect_close_on_host(t, *tensors[k++], 1e-6, name); });
+}
+
+}  // namespace
+}  // namespace traceflow
