@@ -16,7 +16,6 @@ template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep
 template void cuda::for_each_index(const char*, int64_t, const raster::IsVisible&);
 
 namespace raster::cuda_stage {
-namespace {
 
 struct TileGrid {
   int columns;
@@ -115,6 +114,8 @@ struct FindTiles {
   }
 };
 
+namespace {
+
 template <class T>
 T* resized(Tensor<T>& tensor, int64_t size) {
   tensor.place(Device::cuda).resize({size});
@@ -165,7 +166,7 @@ void bin(SortOrder order, Saved& saved) {
                                     tiles, places, unsorted});
   TileEntry* const sorted = resized(saved.entries, entries);
   if (entries > 0) {
-    const int bits = std::bit_width(static_cast<uint64_t>(saved.tiles()));
+    const int bits = static_cast<int>(std::bit_width(static_cast<uint64_t>(saved.tiles())));
     cuda::sort_pairs(entries, bits, tiles, tiles_sorted, places, places_sorted, s.bytes);
     cuda::for_each_index("raster: sort entries", entries, SortEntries{places_sorted, unsorted, sorted});
   }

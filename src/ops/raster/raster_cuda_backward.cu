@@ -123,19 +123,21 @@ struct PixelGradient {
 };
 
 // Lane i gets the sum over the lanes of value[i]; value is used up. 31 exchanges instead of five for each
-// value.
+// value. A recursion, so that every index is known to the compiler and value stays in registers.
+template <int half = cuda::warp_lanes / 2>
 __device__ float transposed_sum(float (&value)[cuda::warp_lanes], int lane) {
+  const bool upper = (lane & half) != 0;
 #pragma unroll
-  for (int half = cuda::warp_lanes / 2; half > 0; half /= 2) {
-    const bool upper = (lane & half) != 0;
-#pragma unroll
-    for (int i = 0; i < half; ++i) {
-      const float keep = upper ? value[i + half] : value[i];
-      const float send = upper ? value[i] : value[i + half];
-      value[i] = keep + __shfl_xor_sync(cuda::full_warp, send, half);
-    }
+  for (int i = 0; i < half; ++i) {
+    const float keep = upper ? value[i + half] : value[i];
+    const float send = upper ? value[i] : value[i + half];
+    value[i] = keep + __shfl_xor_sync(cuda::full_warp, send, half);
   }
-  return value[0];
+  if constexpr (half > 1) {
+    return transposed_sum<half / 2>(value, lane);
+  } else {
+    return value[0];
+  }
 }
 
 template <Asked asked>
