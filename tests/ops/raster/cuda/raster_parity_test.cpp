@@ -236,8 +236,8 @@ TEST_P(RasterOnDevice, TheSameBytesEveryTime) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Orders, RasterOnDevice, ::testing::Values(SortOrder::centre, SortOrder::hit),
-                         [](const auto& info) {
-                           return std::string(enum_names(info.param)[static_cast<size_t>(info.param)]);
+                         [](const auto& order) {
+                           return std::string(enum_names(order.param)[static_cast<size_t>(order.param)]);
                          });
 
 }  // namespace
