@@ -45,7 +45,7 @@ function(traceflow_cuda_library)
   target_include_directories(traceflow_cuda_objects PRIVATE ${CMAKE_SOURCE_DIR}/src)
   target_compile_definitions(traceflow_cuda_objects PRIVATE GLM_FORCE_SILENT_WARNINGS GLM_FORCE_XYZW_ONLY)
   # The standard is named as an option because CMake 3.25 does not know that nvcc has it.
-  set_target_properties(traceflow_cuda_objects PROPERTIES CUDA_EXTENSIONS ON)
+  set_target_properties(traceflow_cuda_objects PROPERTIES CUDA_EXTENSIONS ON CXX_STANDARD_REQUIRED OFF)
   set_property(TARGET traceflow_cuda_objects PROPERTY CXX_STANDARD)
   # 20012: GLM marks its defaulted constructors for the device, which needs no mark.
   target_compile_options(traceflow_cuda_objects PRIVATE
