@@ -4,7 +4,9 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/parallel.h"
 #include "math/rotation.h"
+#include "train/density_kernels.h"
 
 namespace traceflow {
 
@@ -33,11 +35,15 @@ void scatter_child(Surfels& s, int64_t i, Random& random) {
 void DensityControl::accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched) {
   require(signal.size() == sum_.size() && touched.size() == sum_.size(), "density statistics cover the set",
           std::to_string(signal.size()) + " for " + std::to_string(sum_.size()));
-  for (int64_t i = 0; i < sum_.size(); ++i) {
-    if (!touched[i] || !std::isfinite(signal[i])) continue;
-    sum_[i] += signal[i];
-    seen_[i] += 1;
-  }
+  move_statistics(signal.device());
+  parallel_for(signal.device(), "density: accumulate", sum_.size(),
+               AccumulateSignal{signal.data(), touched.data(), sum_.data(), seen_.data()});
+}
+
+void DensityControl::move_statistics(Device device) {
+  if (sum_.device() == device) return;
+  sum_ = sum_.on(device);
+  seen_ = seen_.on(device);
 }
 
 std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, const SceneSize& size,
@@ -83,6 +89,7 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
                                               int64_t cap, Random& random) {
   events::DensityChanged change;
   change.set = set_;
+  move_statistics(Device::cpu);
   const std::vector<Fate> fate = fates(surfels, size, cap, change.at_cap);
   const auto each = [&](Fate wanted, auto&& f) {
     int64_t found = 0;
@@ -131,8 +138,8 @@ void DensityControl::reset_opacity(Surfels& surfels, SurfelMoments& moments) con
 
 void DensityControl::put(Safetensors& file) const {
   if (sum_.empty()) return;
-  file.add("density/" + set_ + "/sum", sum_);
-  file.add("density/" + set_ + "/seen", seen_);
+  file.add("density/" + set_ + "/sum", sum_.on(Device::cpu));
+  file.add("density/" + set_ + "/seen", seen_.on(Device::cpu));
 }
 
 void DensityControl::get(const Safetensors& file) {

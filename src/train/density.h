@@ -25,7 +25,7 @@ class DensityControl {
   DensityControl(std::string set, const DensityOptions& options, int64_t count)
       : set_(std::move(set)), options_(options), sum_({count}), seen_({count}) {}
 
-  // Adds an iteration's signal (N) of the surfels that it touched (N flags).
+  // Adds an iteration's signal (N) of the surfels that it touched (N flags), where the signal is.
   void accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched);
 
   // Clones, splits and prunes; forgets the statistics. `cap`: the most surfels there may be.
@@ -41,6 +41,7 @@ class DensityControl {
  private:
   enum class Fate : uint8_t { keep, clone, split, prune_transparent, prune_large };
   std::vector<Fate> fates(const Surfels& surfels, const SceneSize& size, int64_t cap, bool& at_cap) const;
+  void move_statistics(Device device);
   float mean_signal(int64_t i) const { return seen_[i] > 0 ? sum_[i] / seen_[i] : 0; }
 
   std::string set_;
