@@ -1,57 +1,17 @@
 #include <algorithm>
-#include <cmath>
+#include <type_traits>
 #include <vector>
 
 #include "base/parallel.h"
-#include "math/cube_map.h"
 #include "ops/environment_map/environment_map.h"
+#include "ops/environment_map/environment_map_cuda.h"
+#include "ops/environment_map/environment_map_kernels.h"
 
 // Backward, rays are sorted by the row of texels that they look at, and each row of the map collects its own
 // rays in their order: no two threads write to one texel, and the sum does not depend on their number.
 namespace traceflow::environment_map {
 
 namespace {
-
-// The four texels around a direction: rows row, next_row of the map (all faces stacked), columns column,
-// next_column. At a clamped edge both are the same and the fraction is 0.
-template <class T>
-struct Lookup {
-  CubeCoordinates<T> at;
-  int64_t row, next_row, column, next_column;
-  T fraction_x, fraction_y;
-  bool inside_x, inside_y;  // false where the clamped edge holds the position still
-};
-
-template <class T>
-Lookup<T> look_up(const Vec3<T>& direction, int64_t size) {
-  Lookup<T> l;
-  l.at = cube_coordinates(direction);
-  const T last = static_cast<T>(size - 1);
-  const T x = l.at.s * static_cast<T>(size) - T(0.5);
-  const T y = l.at.t * static_cast<T>(size) - T(0.5);
-  l.inside_x = x > T(0) && x < last;
-  l.inside_y = y > T(0) && y < last;
-  const T clamped_x = std::clamp(x, T(0), last);
-  const T clamped_y = std::clamp(y, T(0), last);
-  l.column = static_cast<int64_t>(clamped_x);
-  const auto row_in_face = static_cast<int64_t>(clamped_y);
-  l.fraction_x = clamped_x - static_cast<T>(l.column);
-  l.fraction_y = clamped_y - static_cast<T>(row_in_face);
-  l.next_column = std::min(l.column + 1, size - 1);
-  l.row = l.at.face * size + row_in_face;
-  l.next_row = l.at.face * size + std::min(row_in_face + 1, size - 1);
-  return l;
-}
-
-template <class T>
-bool is_finite(const Vec3<T>& d) {
-  return std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
-}
-
-template <class T>
-bool usable(const Vec3<T>& direction) {
-  return is_finite(direction) && direction != Vec3<T>(T(0));
-}
 
 template <class T>
 void check_shapes(const Tensor<T>& logit, const Tensor<T>& directions) {
@@ -60,53 +20,6 @@ void check_shapes(const Tensor<T>& logit, const Tensor<T>& directions) {
       "a cube map has 6·S×S×3 logits", logit.shape().to_string());
   require(directions.shape().rank() == 2 && directions.dim(1) == 3, "directions are R×3",
           directions.shape().to_string());
-}
-
-// The four logits around a direction.
-template <class T>
-struct Corners {
-  Vec3<T> top_left, top_right, bottom_left, bottom_right;
-
-  Corners(const Tensor<T>& logit, const Lookup<T>& l)
-      : top_left(load3<T>(&logit(l.row, l.column, 0))),
-        top_right(load3<T>(&logit(l.row, l.next_column, 0))),
-        bottom_left(load3<T>(&logit(l.next_row, l.column, 0))),
-        bottom_right(load3<T>(&logit(l.next_row, l.next_column, 0))) {}
-
-  Vec3<T> interpolated(T fx, T fy) const {
-    const Vec3<T> top = (T(1) - fx) * top_left + fx * top_right;
-    const Vec3<T> bottom = (T(1) - fx) * bottom_left + fx * bottom_right;
-    return (T(1) - fy) * top + fy * bottom;
-  }
-  Vec3<T> by_x(T fy) const {
-    return (T(1) - fy) * (top_right - top_left) + fy * (bottom_right - bottom_left);
-  }
-  Vec3<T> by_y(T fx) const {
-    return (T(1) - fx) * (bottom_left - top_left) + fx * (bottom_right - top_right);
-  }
-};
-
-template <class T>
-Vec3<T> logistic(const Vec3<T>& x) {
-  return T(1) / (T(1) + exp(-x));
-}
-
-// What a ray sends back: dL/d(interpolated logit) and dL/d(direction).
-template <class T>
-struct RayGradient {
-  Vec3<T> logit, direction;
-};
-
-template <class T>
-RayGradient<T> ray_backward(const Tensor<T>& logit, const Vec3<T>& direction, const Vec3<T>& grad_colour) {
-  const auto size = static_cast<T>(logit.dim(1));
-  const Lookup<T> l = look_up(direction, logit.dim(1));
-  const Corners<T> corners(logit, l);
-  const Vec3<T> colour = logistic(corners.interpolated(l.fraction_x, l.fraction_y));
-  const Vec3<T> grad = grad_colour * colour * (T(1) - colour);
-  const T grad_s = l.inside_x ? size * dot(grad, corners.by_x(l.fraction_y)) : T(0);
-  const T grad_t = l.inside_y ? size * dot(grad, corners.by_y(l.fraction_x)) : T(0);
-  return {grad, cube_coordinates_backward(direction, l.at, grad_s, grad_t)};
 }
 
 // Rays in the order of the map's rows that they look at, and in their own order within a row.
@@ -160,16 +73,9 @@ void collect_row(int64_t row, const RaysByRow& rays, const Tensor<T>& directions
 template <class T>
 void forward(const Tensor<T>& logit, const Tensor<T>& directions, Tensor<T>& colour) {
   check_shapes(logit, directions);
-  colour.resize(directions.shape());
-  parallel_for("environment map: look up", directions.dim(0), [&](int64_t i) {
-    const Vec3<T> d = load3<T>(directions.row(i));
-    Vec3<T> c(T(0));
-    if (usable(d)) {
-      const Lookup<T> l = look_up(d, logit.dim(1));
-      c = logistic(Corners<T>(logit, l).interpolated(l.fraction_x, l.fraction_y));
-    }
-    store3(colour.row(i), c);
-  });
+  colour.place(directions.device()).resize(directions.shape());
+  parallel_for(directions.device(), "environment map: look up", directions.dim(0),
+               LookUpColour<T>{{logit.data(), logit.dim(1)}, directions.data(), colour.data()});
 }
 
 template <class T>
@@ -180,12 +86,19 @@ void backward(const Tensor<T>& logit, const Tensor<T>& directions, const Tensor<
               grad_directions.shape() == directions.shape(),
           "gradients have the shapes of their values", grad_colour.shape().to_string());
   const int64_t count = directions.dim(0);
+  if constexpr (std::is_same_v<T, float>) {
+    if (directions.device() == Device::cuda) {
+      cuda::backward(logit, directions, grad_colour, grad_logit, grad_directions);
+      return;
+    }
+  }
+  const MapView<T> map{logit.data(), logit.dim(1)};
   Tensor<T> grad_interpolated(directions.shape());
   std::vector<int32_t> row_of_ray(static_cast<size_t>(count), -1);
   parallel_for("environment map: backward by ray", count, [&](int64_t i) {
     const Vec3<T> d = load3<T>(directions.row(i));
     if (!usable(d)) return;
-    const RayGradient<T> g = ray_backward(logit, d, load3<T>(grad_colour.row(i)));
+    const RayGradient<T> g = ray_backward(map, d, load3<T>(grad_colour.row(i)));
     if (!is_finite(g.logit) || !is_finite(g.direction)) return;
     store3(grad_interpolated.row(i), g.logit);
     add3(grad_directions.row(i), g.direction);
