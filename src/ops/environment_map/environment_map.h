@@ -5,7 +5,8 @@
 
 // Looks colours up in the learnable cube map by direction (method §9). The directions come already moved by
 // the map's residual field (render/ adds it); this op is the lookup alone. Differentiable: the map's logits,
-// the directions (not constrained to unit length; only their direction matters).
+// the directions (not constrained to unit length; only their direction matters). Runs where the directions
+// are.
 namespace traceflow::environment_map {
 
 // directions: R×3. colour: R×3, resized: σ of the bilinearly interpolated logits within the face, edges

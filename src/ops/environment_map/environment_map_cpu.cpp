@@ -1,14 +1,14 @@
-#include <span>
+#include <algorithm>
+#include <type_traits>
 #include <vector>
 
-#include "base/lists.h"
 #include "base/parallel.h"
 #include "ops/environment_map/environment_map.h"
+#include "ops/environment_map/environment_map_cuda.h"
 #include "ops/environment_map/environment_map_kernels.h"
 
-// Backward, rays are listed by where they look, and the map collects from the lists in their order: no two
-// threads write to one texel, and the sum does not depend on their number. On the CPU a list and a collector
-// is a row of texels, on the CUDA device one texel.
+// Backward, rays are sorted by the row of texels that they look at, and each row of the map collects its own
+// rays in their order: no two threads write to one texel, and the sum does not depend on their number.
 namespace traceflow::environment_map {
 
 namespace {
@@ -25,20 +25,18 @@ void check_shapes(const Tensor<T>& logit, const Tensor<T>& directions) {
 // Rays in the order of the map's rows that they look at, and in their own order within a row.
 class RaysByRow {
  public:
-  // texel: by ray, −1 for one that is left out.
-  RaysByRow(const Tensor<int32_t>& texel, int64_t rows, int64_t size)
-      : first_(static_cast<size_t>(rows) + 1) {
-    for (const int32_t t : texel.values()) {
-      if (t >= 0) first_[static_cast<size_t>(t / size) + 1] += 1;
+  // row_of_ray: −1 for a ray that is left out.
+  RaysByRow(const std::vector<int32_t>& row_of_ray, int64_t rows) : first_(static_cast<size_t>(rows) + 1) {
+    for (const int32_t row : row_of_ray) {
+      if (row >= 0) first_[static_cast<size_t>(row) + 1] += 1;
     }
     for (size_t row = 0; row < static_cast<size_t>(rows); ++row) first_[row + 1] += first_[row];
     rays_.resize(static_cast<size_t>(first_.back()));
     std::vector<int32_t> next(first_.begin(), first_.end() - 1);
-    for (int64_t ray = 0; ray < texel.size(); ++ray) {
-      if (texel[ray] >= 0) {
-        rays_[static_cast<size_t>(next[static_cast<size_t>(texel[ray] / size)]++)] =
-            static_cast<int32_t>(ray);
-      }
+    for (size_t ray = 0; ray < row_of_ray.size(); ++ray) {
+      if (row_of_ray[ray] < 0) continue;
+      int32_t& place = next[static_cast<size_t>(row_of_ray[ray])];
+      rays_[static_cast<size_t>(place++)] = static_cast<int32_t>(ray);
     }
   }
   std::span<const int32_t> operator[](int64_t row) const {
@@ -50,11 +48,6 @@ class RaysByRow {
  private:
   std::vector<int32_t> first_, rays_;
 };
-
-template <class T>
-Map<T> map_of(const Tensor<T>& logit) {
-  return {logit.data(), logit.dim(1)};
-}
 
 // Adds to one row of the map what the rays between it and the row before it, and between it and the next,
 // send back.
@@ -80,9 +73,9 @@ void collect_row(int64_t row, const RaysByRow& rays, const Tensor<T>& directions
 template <class T>
 void forward(const Tensor<T>& logit, const Tensor<T>& directions, Tensor<T>& colour) {
   check_shapes(logit, directions);
-  colour.place(logit.device()).resize(directions.shape());
-  parallel_for(logit.device(), "environment map: look up", directions.dim(0),
-               LookUp<T>{map_of(logit), directions.data(), colour.data()});
+  colour.place(directions.device()).resize(directions.shape());
+  parallel_for(directions.device(), "environment map: look up", directions.dim(0),
+               LookUpColour<T>{{logit.data(), logit.dim(1)}, directions.data(), colour.data()});
 }
 
 template <class T>
@@ -93,28 +86,28 @@ void backward(const Tensor<T>& logit, const Tensor<T>& directions, const Tensor<
               grad_directions.shape() == directions.shape(),
           "gradients have the shapes of their values", grad_colour.shape().to_string());
   const int64_t count = directions.dim(0);
-  const int64_t size = logit.dim(1);
-  static thread_local Tensor<T> grad_interpolated;
-  static thread_local Tensor<int32_t> texel;
-  grad_interpolated.place(logit.device()).resize(directions.shape());
-  texel.place(logit.device()).resize({count});
-  parallel_for(logit.device(), "environment map: backward by ray", count,
-               BackwardByRay<T>{map_of(logit), directions.data(), grad_colour.data(),
-                                grad_interpolated.data(), grad_directions.data(), texel.data()});
-  if (logit.device() == Device::cuda) {
-    static thread_local cuda::Lists rays;
-    cuda::list_by_key(texel.data(), count, logit.dim(0) * size, rays);
-    parallel_for(Device::cuda, "environment map: backward by texel", logit.dim(0) * size,
-                 BackwardByTexel<T>{size, directions.data(), grad_interpolated.data(), rays.begin.data(),
-                                    rays.entry.data(), grad_logit.data()});
-    return;
+  if constexpr (std::is_same_v<T, float>) {
+    if (directions.device() == Device::cuda) {
+      cuda::backward(logit, directions, grad_colour, grad_logit, grad_directions);
+      return;
+    }
   }
-  const RaysByRow rays(texel, logit.dim(0), size);
-  // Its address: each thread has a tensor of its own.
-  const Tensor<T>* const interpolated = &grad_interpolated;
+  const MapView<T> map{logit.data(), logit.dim(1)};
+  Tensor<T> grad_interpolated(directions.shape());
+  std::vector<int32_t> row_of_ray(static_cast<size_t>(count), -1);
+  parallel_for("environment map: backward by ray", count, [&](int64_t i) {
+    const Vec3<T> d = load3<T>(directions.row(i));
+    if (!usable(d)) return;
+    const RayGradient<T> g = ray_backward(map, d, load3<T>(grad_colour.row(i)));
+    if (!is_finite(g.logit) || !is_finite(g.direction)) return;
+    store3(grad_interpolated.row(i), g.logit);
+    add3(grad_directions.row(i), g.direction);
+    row_of_ray[static_cast<size_t>(i)] = static_cast<int32_t>(look_up(d, logit.dim(1)).row);
+  });
+  const RaysByRow rays(row_of_ray, logit.dim(0));
   parallel_for(
       "environment map: backward by row", logit.dim(0),
-      [&, interpolated](int64_t row) { collect_row(row, rays, directions, *interpolated, grad_logit); }, 4);
+      [&](int64_t row) { collect_row(row, rays, directions, grad_interpolated, grad_logit); }, 4);
 }
 
 template void forward(const Tensor<float>&, const Tensor<float>&, Tensor<float>&);

@@ -1,10 +1,62 @@
+#include <bit>
+
 #include "base/kernel.h"
+#include "base/sort.h"
+#include "ops/environment_map/environment_map_cuda.h"
 #include "ops/environment_map/environment_map_kernels.h"
 
+// Rays are sorted by the first texel that they look at, and each texel collects from its own and its
+// neighbours' rays in their order: the same bytes every run.
 namespace traceflow {
+namespace environment_map::cuda {
 
-template void cuda::for_each_index(const char*, int64_t, const environment_map::LookUp<float>&);
-template void cuda::for_each_index(const char*, int64_t, const environment_map::BackwardByRay<float>&);
-template void cuda::for_each_index(const char*, int64_t, const environment_map::BackwardByTexel<float>&);
+namespace {
+
+// Room that is kept between calls; all work is on one stream. Never given back, since what would take it may
+// be gone before.
+struct Room {
+  Tensor<float> grad_interpolated;
+  Tensor<uint32_t> texels, sorted_texels, rays, sorted_rays, first;
+  Tensor<uint8_t> sort_scratch;
+};
+
+Room& room() {
+  static Room* const the_room = new Room;
+  return *the_room;
+}
+
+}  // namespace
+
+void backward(const Tensor<float>& logit, const Tensor<float>& directions, const Tensor<float>& grad_colour,
+              Tensor<float>& grad_logit, Tensor<float>& grad_directions) {
+  constexpr Device device = Device::cuda;
+  const int64_t count = directions.dim(0), size = logit.dim(1), texels = 6 * size * size;
+  Room& r = room();
+  r.grad_interpolated.place(device).resize({count, 3});
+  for (auto* tensor : {&r.texels, &r.sorted_texels, &r.rays, &r.sorted_rays}) {
+    tensor->place(device).resize({count});
+  }
+  r.first.place(device).resize({texels + 1});
+  parallel_for(device, "environment map: backward by ray", count,
+               RayStep<float>{{logit.data(), size},
+                              directions.data(),
+                              grad_colour.data(),
+                              r.grad_interpolated.data(),
+                              grad_directions.data(),
+                              r.texels.data(),
+                              r.rays.data()});
+  traceflow::cuda::sort_pairs(count, static_cast<int>(std::bit_width(static_cast<uint64_t>(texels))),
+                              r.texels.data(), r.sorted_texels.data(), r.rays.data(), r.sorted_rays.data(),
+                              r.sort_scratch);
+  parallel_for(device, "environment map: sort", texels + 1,
+               FindFirst{r.sorted_texels.data(), count, r.first.data()});
+  parallel_for(device, "environment map: backward by texel", texels,
+               CollectTexel<float>{size, r.first.data(), r.sorted_rays.data(), directions.data(),
+                                   r.grad_interpolated.data(), grad_logit.data()});
+}
+
+}  // namespace environment_map::cuda
+
+template void cuda::for_each_index(const char*, int64_t, const environment_map::LookUpColour<float>&);
 
 }  // namespace traceflow

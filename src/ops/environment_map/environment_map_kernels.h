@@ -6,19 +6,8 @@
 
 #include "math/cube_map.h"
 
-// One ray's look-up in the cube map, its derivative, and the steps over rays and texels.
+// The steps of looking up the map, one ray or one texel each.
 namespace traceflow::environment_map {
-
-// (6·S)×S×3 logits.
-template <class T>
-struct Map {
-  const T* logit;
-  int64_t size;  // S
-
-  TRACEFLOW_HD Vec3<T> at(int64_t row, int64_t column) const {
-    return load3<T>(logit + 3 * (row * size + column));
-  }
-};
 
 // The four texels around a direction: rows row, next_row of the map (all faces stacked), columns column,
 // next_column. At a clamped edge both are the same and the fraction is 0.
@@ -61,16 +50,27 @@ TRACEFLOW_HD bool usable(const Vec3<T>& direction) {
   return is_finite(direction) && direction != Vec3<T>(T(0));
 }
 
+// The logits' address, on any device.
+template <class T>
+struct MapView {
+  const T* logit;
+  int64_t size;  // of a face
+
+  TRACEFLOW_HD Vec3<T> texel(int64_t row, int64_t column) const {
+    return load3<T>(logit + 3 * (row * size + column));
+  }
+};
+
 // The four logits around a direction.
 template <class T>
 struct Corners {
   Vec3<T> top_left, top_right, bottom_left, bottom_right;
 
-  TRACEFLOW_HD Corners(const Map<T>& map, const Lookup<T>& l)
-      : top_left(map.at(l.row, l.column)),
-        top_right(map.at(l.row, l.next_column)),
-        bottom_left(map.at(l.next_row, l.column)),
-        bottom_right(map.at(l.next_row, l.next_column)) {}
+  TRACEFLOW_HD Corners(const MapView<T>& map, const Lookup<T>& l)
+      : top_left(map.texel(l.row, l.column)),
+        top_right(map.texel(l.row, l.next_column)),
+        bottom_left(map.texel(l.next_row, l.column)),
+        bottom_right(map.texel(l.next_row, l.next_column)) {}
 
   TRACEFLOW_HD Vec3<T> interpolated(T fx, T fy) const {
     const Vec3<T> top = (T(1) - fx) * top_left + fx * top_right;
@@ -97,7 +97,7 @@ struct RayGradient {
 };
 
 template <class T>
-TRACEFLOW_HD RayGradient<T> ray_backward(const Map<T>& map, const Vec3<T>& direction,
+TRACEFLOW_HD RayGradient<T> ray_backward(const MapView<T>& map, const Vec3<T>& direction,
                                          const Vec3<T>& grad_colour) {
   const auto size = static_cast<T>(map.size);
   const Lookup<T> l = look_up(direction, map.size);
@@ -110,8 +110,8 @@ TRACEFLOW_HD RayGradient<T> ray_backward(const Map<T>& map, const Vec3<T>& direc
 }
 
 template <class T>
-struct LookUp {
-  Map<T> map;
+struct LookUpColour {
+  MapView<T> map;
   const T* directions;
   T* colour;
 
@@ -126,47 +126,67 @@ struct LookUp {
   }
 };
 
-// A ray's gradient by the interpolated logit, with the texel whose list the ray goes to: the first of the
-// four, −1 for a ray that passes nothing on. Adds to grad_directions.
+// What a ray sends back, and the first of the texels that it looks at: one behind the last where nothing is
+// sent.
 template <class T>
-struct BackwardByRay {
-  Map<T> map;
+struct RayStep {
+  MapView<T> map;
   const T *directions, *grad_colour;
   T *grad_interpolated, *grad_directions;
-  int32_t* texel;
+  uint32_t *texel, *ray;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    texel[i] = -1;
     const Vec3<T> d = load3<T>(directions + 3 * i);
+    ray[i] = static_cast<uint32_t>(i);
+    texel[i] = static_cast<uint32_t>(6 * map.size * map.size);
     if (!usable(d)) return;
     const RayGradient<T> g = ray_backward(map, d, load3<T>(grad_colour + 3 * i));
     if (!is_finite(g.logit) || !is_finite(g.direction)) return;
     store3(grad_interpolated + 3 * i, g.logit);
     add3(grad_directions + 3 * i, g.direction);
     const Lookup<T> l = look_up(d, map.size);
-    texel[i] = static_cast<int32_t>(l.row * map.size + l.column);
+    texel[i] = static_cast<uint32_t>(l.row * map.size + l.column);
   }
 };
 
-// A texel collects from the rays of its own list and of those above and to the left of it.
+// Where the rays of texel i begin in the sorted list.
+struct FindFirst {
+  const uint32_t* texels;  // sorted
+  int64_t rays;
+  uint32_t* first;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    int64_t begin = 0;
+    for (int64_t count = rays; count > 0;) {
+      const int64_t half = count / 2;
+      const bool before = static_cast<int64_t>(texels[begin + half]) < i;
+      begin = before ? begin + half + 1 : begin;
+      count = before ? count - half - 1 : half;
+    }
+    first[i] = static_cast<uint32_t>(begin);
+  }
+};
+
+// Adds to texel i what the rays send back that look at it and at its neighbours on either side.
 template <class T>
-struct BackwardByTexel {
-  int64_t size;  // S
+struct CollectTexel {
+  int64_t size;
+  const uint32_t *first, *rays;  // sorted by texel
   const T *directions, *grad_interpolated;
-  const int32_t *begin, *ray;  // the lists
   T* grad_logit;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    const int64_t row = i / size, column = i % size;
+    const bool has_above = i / size % size > 0, has_left = i % size > 0;
     Vec3<T> sum(T(0));
-    for (int64_t up = row % size > 0 ? 1 : 0; up >= 0; --up) {
-      for (int64_t left = column > 0 ? 1 : 0; left >= 0; --left) {
-        const int64_t list = i - up * size - left;
-        for (int32_t k = begin[list]; k < begin[list + 1]; ++k) {
-          const Lookup<T> l = look_up(load3<T>(directions + 3 * int64_t{ray[k]}), size);
-          const T weight_x = left == 1 ? l.fraction_x : T(1) - l.fraction_x;
-          const T weight_y = up == 1 ? l.fraction_y : T(1) - l.fraction_y;
-          sum += weight_x * weight_y * load3<T>(grad_interpolated + 3 * int64_t{ray[k]});
+    for (int above = 0; above <= (has_above ? 1 : 0); ++above) {
+      for (int left = 0; left <= (has_left ? 1 : 0); ++left) {
+        const int64_t texel = i - above * size - left;
+        for (uint32_t k = first[texel]; k < first[texel + 1]; ++k) {
+          const int64_t ray = rays[k];
+          const Lookup<T> l = look_up(load3<T>(directions + 3 * ray), size);
+          const T weight = (above != 0 ? l.fraction_y : T(1) - l.fraction_y) *
+                           (left != 0 ? l.fraction_x : T(1) - l.fraction_x);
+          sum += weight * load3<T>(grad_interpolated + 3 * ray);
         }
       }
     }
