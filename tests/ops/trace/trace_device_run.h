@@ -52,7 +52,8 @@ inline int64_t count_far(const Tensor<float>& found, const Tensor<float>& expect
 // that is some 1e-6 of a number, more where gradients of both signs are added up.
 inline void expect_same(const Traced& found, const Traced& expected, double value = 2e-5,
                         double slope = 5e-4) {
-  EXPECT_EQ(found.hits, expected.hits);
+  // A hit at the cut-off, which weighs next to nothing, may fall to either side.
+  EXPECT_NEAR(static_cast<double>(found.hits), static_cast<double>(expected.hits), 2);
   EXPECT_EQ(count_far(found.output.colour, expected.output.colour, value), 0);
   EXPECT_EQ(count_far(found.output.alpha, expected.output.alpha, value), 0);
   EXPECT_EQ(count_far(found.output.distance, expected.output.distance, value), 0);

@@ -124,17 +124,23 @@ TEST_F(TraceOnDevice, AnyNumberOfHits) {
   }
 }
 
+// In one plane, but not in one place: the tree's order is not that of the index.
 TEST_F(TraceOnDevice, HitsAtOneDistanceBlendInOrderOfIndex) {
-  constexpr int64_t count = 70;
-  TestScene scene{make_surfels(count, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  constexpr int64_t count = 200;
+  TestScene scene{make_surfels(count, 0), Tensor<float>({40, 3}), Tensor<float>({40, 3})};
+  Random random(11);
   for (int64_t i = 0; i < count; ++i) {
-    set_facing(scene.surfels, i, 1, 1, 0.5F);
-    for (int c = 0; c < 3; ++c) {
-      scene.surfels.sh.row(i)[c] = static_cast<float>((i == 0 ? 0.5 : -0.5) / sh_c0);
-    }
+    set_facing(scene.surfels, i, 1, 1, 0.02F);
+    for (int k = 0; k < 2; ++k) scene.surfels.position(i, k) = static_cast<float>(random.uniform(-0.5, 0.5));
+    for (int c = 0; c < 3; ++c) scene.surfels.sh.row(i)[c] = static_cast<float>(5 * random.normal());
   }
-  scene.directions(0, 2) = 1;
-  EXPECT_NEAR(trace_on_device(scene, {}).output.colour(0, 0), 0.5, 1e-6);
+  for (int64_t r = 0; r < 40; ++r) {
+    for (int k = 0; k < 2; ++k) scene.origins(r, k) = static_cast<float>(random.uniform(-0.5, 0.5));
+    scene.directions(r, 2) = 1;
+  }
+  const Traced expected = trace(scene, smooth_options());
+  EXPECT_EQ(expected.hits, count * 40);
+  expect_same(trace_on_device(scene, smooth_options()), expected);
 }
 
 // What does not fit is traced again in parts, in either kind of sum.
