@@ -21,11 +21,12 @@ add_library(traceflow_settings INTERFACE)
 target_compile_options(traceflow_settings INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion -Wno-sign-conversion -ffp-contract=off -fno-math-errno)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  # GCC 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651), GCC 13 copies beyond
-  # the end in fmt 9's and references that dangle wherever a function that returns one is given a temporary (109642).
-  target_compile_options(traceflow_settings INTERFACE -Wno-restrict -Wno-array-bounds -Wno-stringop-overflow)
+  # GCC 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
+  target_compile_options(traceflow_settings INTERFACE -Wno-restrict)
+  # GCC 13 sees copies beyond the end in fmt 9's buffers, and references that dangle wherever a function that returns one
+  # is given a temporary (GCC bug 109642).
   if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
-    target_compile_options(traceflow_settings INTERFACE -Wno-dangling-reference)
+    target_compile_options(traceflow_settings INTERFACE -Wno-array-bounds -Wno-dangling-reference)
   endif()
 endif()
 if(TRACEFLOW_WERROR)
