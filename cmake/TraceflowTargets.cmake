@@ -26,7 +26,7 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC 13 sees copies beyond the end in fmt 9's buffers, and references that dangle wherever a function that returns one
   # is given a temporary (GCC bug 109642).
   if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
-    target_compile_options(traceflow_settings INTERFACE -Wno-array-bounds -Wno-dangling-reference)
+    target_compile_options(traceflow_settings INTERFACE -Wno-array-bounds -Wno-stringop-overflow -Wno-dangling-reference)
   endif()
 endif()
 if(TRACEFLOW_WERROR)
