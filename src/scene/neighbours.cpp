@@ -21,6 +21,12 @@ struct Cloud {
 };
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<float, Cloud>, Cloud, 3>;
 
+#if NANOFLANN_VERSION >= 0x150
+using SearchParameters = nanoflann::SearchParameters;
+#else
+using SearchParameters = nanoflann::SearchParams;
+#endif
+
 }  // namespace
 
 Neighbours nearest_neighbours(const Tensor<float>& points, int k) {
@@ -37,7 +43,7 @@ Neighbours nearest_neighbours(const Tensor<float>& points, int k) {
     std::vector<float> distance2(wanted);
     nanoflann::KNNResultSet<float> found(wanted);
     found.init(index.data(), distance2.data());
-    tree.findNeighbors(found, points.row(i), nanoflann::SearchParams());
+    tree.findNeighbors(found, points.row(i), SearchParameters());
     int filled = 0;
     for (size_t j = 0; j < found.size() && filled < k; ++j) {
       if (index[j] == static_cast<size_t>(i)) continue;
@@ -76,7 +82,7 @@ Tensor<int32_t> nearest_of(const Tensor<float>& points, const Tensor<float>& que
     float distance2 = 0;
     nanoflann::KNNResultSet<float> found(1);
     found.init(&index, &distance2);
-    tree.findNeighbors(found, queries.row(i), nanoflann::SearchParams());
+    tree.findNeighbors(found, queries.row(i), SearchParameters());
     nearest[i] = static_cast<int32_t>(index);
   });
   return nearest;

@@ -42,6 +42,14 @@ dnnl::memory::desc matrix(int64_t rows, int64_t columns, Number number, bool tra
   return {{rows, columns}, data_type(number), strides};
 }
 
+dnnl::memory::dims dims_of(const dnnl::memory::desc& description) {
+#if DNNL_VERSION_MAJOR >= 3
+  return description.get_dims();
+#else
+  return description.dims();
+#endif
+}
+
 dnnl::primitive_attr attributes(const ProductShape& shape) {
   dnnl::post_ops after;
   if (shape.accumulate) after.append_sum(1.0F);
@@ -121,7 +129,7 @@ int64_t Product::packed_bytes() const { return static_cast<int64_t>(compiled_->b
 
 void Product::pack(const float* b, int64_t row_stride, int64_t column_stride, void* packed) const {
   const OneThread one_thread;
-  const dnnl::memory::desc from(compiled_->b.dims(), dnnl::memory::data_type::f32,
+  const dnnl::memory::desc from(dims_of(compiled_->b), dnnl::memory::data_type::f32,
                                 dnnl::memory::dims{row_stride, column_stride});
   dnnl::primitive_attr attributes;
   attributes.set_scratchpad_mode(dnnl::scratchpad_mode::user);
