@@ -125,7 +125,7 @@ TEST(Parallel, LoopsNest) {
 
 TEST(Indices, RiseWithinTheirRange) {
   const auto check = [](const std::vector<int32_t>& indices, int64_t limit) {
-    require_ascending(std::span(indices), limit);
+    require_ascending(tensor_of(indices), limit);
   };
   EXPECT_NO_THROW(check({}, 0));
   EXPECT_NO_THROW(check({0, 1, 5}, 6));
