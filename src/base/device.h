@@ -33,5 +33,6 @@ TRACEFLOW_HD inline void prefetch([[maybe_unused]] const void* begin, [[maybe_un
 // Where a tensor lives and where the op that reads it runs.
 enum class Device { cpu, cuda };
 constexpr std::array<std::string_view, 2> enum_names(Device) { return {"cpu", "cuda"}; }
+constexpr std::string_view name_of(Device device) { return enum_names(device)[static_cast<size_t>(device)]; }
 
 }  // namespace traceflow

@@ -1,5 +1,7 @@
 #include <cuda_runtime.h>
 
+#include <limits>
+
 #include "base/device_memory.h"
 #include "base/kernel.h"
 
@@ -18,9 +20,47 @@ void check(cudaError_t result, const char* what) {
   require(result == cudaSuccess, what, result == cudaSuccess ? "" : cudaGetErrorString(result));
 }
 
+namespace {
+
+__global__ void nothing() {}
+
+// Whether this program holds code for the device.
+cudaError_t find_code() {
+  cudaFuncAttributes attributes{};
+  return cudaFuncGetAttributes(&attributes, reinterpret_cast<const void*>(nothing));
+}
+
+// Memory that was given back stays in the pool: the driver is asked only while a program still grows. Null
+// where the device has no pools.
+cudaMemPool_t pool() {
+  static const cudaMemPool_t the_pool = [] {
+    int has_pools = 0;
+    check(cudaDeviceGetAttribute(&has_pools, cudaDevAttrMemoryPoolsSupported, 0), "the CUDA device's pools");
+    cudaMemPool_t made = nullptr;
+    if (has_pools == 0) return made;
+    cudaMemPoolProps properties{};
+    properties.allocType = cudaMemAllocationTypePinned;
+    properties.location = {cudaMemLocationTypeDevice, 0};
+    check(cudaMemPoolCreate(&made, &properties), "a pool of memory on the CUDA device");
+    uint64_t kept = std::numeric_limits<uint64_t>::max();
+    check(cudaMemPoolSetAttribute(made, cudaMemPoolAttrReleaseThreshold, &kept),
+          "a pool of memory on the CUDA device");
+    return made;
+  }();
+  return the_pool;
+}
+
+cudaError_t take(void** memory, size_t bytes) {
+  return pool() == nullptr ? cudaMalloc(memory, bytes)
+                           : cudaMallocFromPoolAsync(memory, bytes, pool(), stream());
+}
+
+}  // namespace
+
 bool answers(std::string& why_not) {
   int count = 0;
-  const cudaError_t result = cudaGetDeviceCount(&count);
+  cudaError_t result = cudaGetDeviceCount(&count);
+  if (result == cudaSuccess && count > 0) result = find_code();
   if (result == cudaSuccess && count > 0) return true;
   why_not = result == cudaSuccess ? "no device is there" : cudaGetErrorString(result);
   cudaGetLastError();  // forgets it
@@ -38,7 +78,14 @@ DeviceFacts facts() {
 void* allocate(size_t bytes) {
   if (bytes == 0) return nullptr;
   void* memory = nullptr;
-  const cudaError_t result = cudaMalloc(&memory, bytes);
+  cudaError_t result = take(&memory, bytes);
+  if (result == cudaErrorMemoryAllocation && pool() != nullptr) {
+    // What the pool holds in pieces that are too small goes back before the last try.
+    cudaGetLastError();
+    synchronise();
+    check(cudaMemPoolTrimTo(pool(), 0), "a pool of memory on the CUDA device");
+    result = take(&memory, bytes);
+  }
   if (result == cudaErrorMemoryAllocation) {
     cudaGetLastError();
     throw memory::OutOfMemory(bytes, facts().free_bytes);
@@ -47,7 +94,13 @@ void* allocate(size_t bytes) {
   return memory;
 }
 
-void release(void* memory) noexcept { cudaFree(memory); }
+void release(void* memory) noexcept {
+  if (pool() == nullptr) {
+    cudaFree(memory);
+  } else {
+    cudaFreeAsync(memory, stream());
+  }
+}
 
 void copy(Device to_device, void* to, Device from_device, const void* from, size_t bytes) {
   const cudaMemcpyKind kind = to_device == Device::cpu     ? cudaMemcpyDeviceToHost

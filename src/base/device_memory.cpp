@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstring>
+#include <limits>
 
 #include "base/error.h"
 
@@ -11,6 +12,24 @@ namespace traceflow::memory {
 namespace {
 
 constexpr std::align_val_t alignment{64};
+
+// What stands on the CUDA device.
+struct Account {
+  std::atomic<size_t> bytes = 0, most = 0;
+  std::atomic<size_t> budget = std::numeric_limits<size_t>::max();
+
+  void take(size_t wanted) {
+    const size_t now = bytes += wanted;
+    if (now > budget) {
+      bytes -= wanted;
+      throw OutOfMemory(wanted, budget - std::min<size_t>(budget, now - wanted));
+    }
+    size_t before = most;
+    while (now > before && !most.compare_exchange_weak(before, now)) {
+    }
+  }
+};
+Account account;
 
 }  // namespace
 
@@ -21,15 +40,22 @@ OutOfMemory::OutOfMemory(size_t wanted, size_t available)
 void* allocate(Device device, size_t bytes) {
   if (device == Device::cpu) return ::operator new(bytes, alignment);
   require(cuda::allocate != nullptr, "tensors are put on the CUDA device by programs built with CUDA");
-  return cuda::allocate(bytes);
+  account.take(bytes);
+  try {
+    return cuda::allocate(bytes);
+  } catch (...) {
+    account.bytes -= bytes;
+    throw;
+  }
 }
 
-void release(Device device, void* memory) noexcept {
+void release(Device device, void* memory, size_t bytes) noexcept {
   if (memory == nullptr) return;
   if (device == Device::cpu) {
     ::operator delete(memory, alignment);
   } else {
     cuda::release(memory);
+    account.bytes -= bytes;
   }
 }
 
@@ -50,6 +76,14 @@ void zero(Device device, void* memory, size_t bytes) {
     cuda::zero(memory, bytes);
   }
 }
+
+void synchronise(Device device) {
+  if (device == Device::cuda) cuda::synchronise();
+}
+
+size_t device_bytes() { return account.bytes; }
+size_t most_device_bytes() { return account.most; }
+void set_device_budget(size_t bytes) { account.budget = bytes; }
 
 }  // namespace traceflow::memory
 

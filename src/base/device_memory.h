@@ -23,10 +23,19 @@ class OutOfMemory : public std::bad_alloc {
 
 // `bytes` on the device, aligned to 64 bytes or more. Throws OutOfMemory.
 void* allocate(Device device, size_t bytes);
-void release(Device device, void* memory) noexcept;
+void release(Device device, void* memory, size_t bytes) noexcept;
 // Between any two devices. The host waits where it is the one that reads.
 void copy(Device to_device, void* to, Device from_device, const void* from, size_t bytes);
 void zero(Device device, void* memory, size_t bytes);
+// Waits for all work on the device; nothing to wait for on the CPU.
+void synchronise(Device device);
+
+// Bytes that stand on the CUDA device now, and the most that ever did.
+size_t device_bytes();
+size_t most_device_bytes();
+// The most that may stand there: what goes beyond throws OutOfMemory. No limit but the device's own until it
+// is set.
+void set_device_budget(size_t bytes);
 
 }  // namespace traceflow::memory
 
@@ -53,6 +62,7 @@ struct DeviceFacts {
 // Whether a device answers; where not, why, in words.
 TRACEFLOW_WITH_CUDA bool answers(std::string& why_not);
 TRACEFLOW_WITH_CUDA DeviceFacts facts();
+// From a pool that keeps what is given back, so that a program in its stride asks the driver for nothing.
 TRACEFLOW_WITH_CUDA void* allocate(size_t bytes);
 TRACEFLOW_WITH_CUDA void release(void* memory) noexcept;
 TRACEFLOW_WITH_CUDA void copy(Device to_device, void* to, Device from_device, const void* from, size_t bytes);

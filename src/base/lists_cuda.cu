@@ -1,6 +1,7 @@
 #include "base/lists.h"
 
 #include "base/kernel.h"
+#include "base/list_where.h"
 #include "base/sort.h"
 
 // Counts the entries of every key, adds the counts up to places, fills the places as threads come, and puts
@@ -63,5 +64,7 @@ void list_by_key(const int32_t* key, int64_t n, int64_t keys, Lists& lists) {
          lists.entry.data());
   launch("lists: sort", {blocks_for(keys, threads), threads}, sort_lists, keys, begin, lists.entry.data());
 }
+
+template void for_each_index(const char*, int64_t, const PutFlagged&);
 
 }  // namespace traceflow::cuda

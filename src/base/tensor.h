@@ -110,11 +110,13 @@ class Tensor {
     const int64_t wanted = shape.elements();
     if (wanted > capacity_) {
       const Device device = this->device();
+      const int64_t room = roomier(wanted);
       memory_.reset();  // first, so that both do not stand side by side
       shape_ = Shape();
       size_ = capacity_ = 0;
-      memory_.reset(static_cast<T*>(memory::allocate(device, static_cast<size_t>(wanted) * sizeof(T))));
-      capacity_ = wanted;
+      const size_t bytes = static_cast<size_t>(room) * sizeof(T);
+      memory_ = memory_type(static_cast<T*>(memory::allocate(device, bytes)), Free{device, bytes});
+      capacity_ = room;
     }
     shape_ = shape;
     size_ = wanted;
@@ -140,13 +142,18 @@ class Tensor {
  private:
   struct Free {
     Device device = Device::cpu;
-    void operator()(T* p) const noexcept { memory::release(device, p); }
+    size_t bytes = 0;
+    void operator()(T* p) const noexcept { memory::release(device, p, bytes); }
   };
   using memory_type = std::unique_ptr<T, Free>;
 
   explicit Tensor(memory_type memory) : memory_(std::move(memory)) {}
 
   size_t bytes() const { return static_cast<size_t>(size_) * sizeof(T); }
+  // A list on the CUDA device that grows once will grow again, and new memory there is dear: a quarter more.
+  int64_t roomier(int64_t wanted) const {
+    return device() == Device::cuda && capacity_ > 0 ? wanted + wanted / 4 : wanted;
+  }
   void copy_from(const Tensor& other, Device device) {
     place(device);
     resize(other.shape_);
@@ -165,6 +172,14 @@ Tensor<T> tensor_of(const std::vector<T>& list) {
   Tensor<T> tensor(Shape{static_cast<int64_t>(list.size())});
   std::copy(list.begin(), list.end(), tensor.data());
   return tensor;
+}
+
+// The tensor itself where the host can read it, else a copy of it, left in `fetched`.
+template <class T>
+const Tensor<T>& on_host(const Tensor<T>& tensor, Tensor<T>& fetched) {
+  if (tensor.device() == Device::cpu) return tensor;
+  fetched = tensor.on(Device::cpu);
+  return fetched;
 }
 
 // The same numbers in another scalar type, e.g. to hand float parameters to a double-precision reference.

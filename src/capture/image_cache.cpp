@@ -4,7 +4,6 @@
 
 #include "base/parallel.h"
 #include "capture/decode.h"
-#include "files/png.h"
 
 namespace traceflow {
 
@@ -21,31 +20,9 @@ Tensor<int16_t> narrow(const Tensor<float>& normals) {
   return result;
 }
 
-Tensor<float> widen(const Tensor<int16_t>& normals) {
-  Tensor<float> result;
-  result.resize(normals.shape());
-  for (int64_t i = 0; i < normals.size(); i += 3) {
-    const Vec3<float> n = load3<float>(&normals[i]);
-    const float length2 = dot(n, n);
-    store3(&result[i], length2 > 0 ? n / std::sqrt(length2) : Vec3<float>(0));
-  }
-  return result;
-}
-
 }  // namespace
 
-std::shared_ptr<const ViewImages> ImageCache::load(const std::string& id) {
-  const std::shared_ptr<const Pixels> pixels = find_or_decode(id);
-  auto images = std::make_shared<ViewImages>();
-  images->colour = from_8bit(pixels->colour);
-  images->mask = pixels->mask;
-  images->normal_prior = widen(pixels->normal_prior);
-  return images;
-}
-
 ViewTruth ImageCache::load_truth(const std::string& id) const { return decode_truth(source(id), capture_); }
-
-void ImageCache::warm(const std::string& id) { find_or_decode(id); }
 
 const ViewSource& ImageCache::source(const std::string& id) const {
   const auto found = views_.find(id);
@@ -63,7 +40,7 @@ int64_t ImageCache::bytes_of(const std::string& id) const {
   return view.width() * view.height() * (3 + (view.mask.empty() ? 0 : 1) + (view.has_prior() ? 6 : 0));
 }
 
-std::shared_ptr<const ImageCache::Pixels> ImageCache::find_or_decode(const std::string& id) {
+std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
   {
     const std::lock_guard lock(mutex_);
     const auto found = by_id_.find(id);
@@ -73,14 +50,14 @@ std::shared_ptr<const ImageCache::Pixels> ImageCache::find_or_decode(const std::
     }
   }
   // Outside the lock: two threads may decode the same view, which costs time but nothing else.
-  auto pixels = std::make_shared<const Pixels>(decode(id));
+  auto pixels = std::make_shared<const ViewPixels>(decode(id));
   insert(id, pixels);
   return pixels;
 }
 
-ImageCache::Pixels ImageCache::decode(const std::string& id) const {
+ViewPixels ImageCache::decode(const std::string& id) const {
   const ViewSource& view = source(id);
-  Pixels pixels;
+  ViewPixels pixels;
   pixels.colour = decode_colour(view);
   if (!view.mask.empty()) pixels.mask = decode_mask(view);
   if (view.has_prior()) {
@@ -91,7 +68,7 @@ ImageCache::Pixels ImageCache::decode(const std::string& id) const {
   return pixels;
 }
 
-void ImageCache::insert(const std::string& id, const std::shared_ptr<const Pixels>& pixels) {
+void ImageCache::insert(const std::string& id, const std::shared_ptr<const ViewPixels>& pixels) {
   const std::lock_guard lock(mutex_);
   const int64_t size = pixels->bytes();
   if (size > limit_bytes_ || by_id_.contains(id)) return;
@@ -106,7 +83,9 @@ void ImageCache::insert(const std::string& id, const std::shared_ptr<const Pixel
 }
 
 std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View& view) {
-  return capture.images->load(view.id);
+  auto images = std::make_shared<ViewImages>();
+  widen(*load_pixels(capture, view), *images);
+  return images;
 }
 
 void prefetch(const Capture& capture, std::span<const View> views) {
@@ -116,7 +95,7 @@ void prefetch(const Capture& capture, std::span<const View> views) {
   while (count < views.size() && (bytes += cache.bytes_of(views[count].id)) <= cache.limit_bytes()) ++count;
   parallel_for(
       "capture: decode", static_cast<int64_t>(count),
-      [&](int64_t i) { cache.warm(views[static_cast<size_t>(i)].id); }, 1);
+      [&](int64_t i) { cache.load(views[static_cast<size_t>(i)].id); }, 1);
 }
 
 ViewTruth load_truth(const Capture& capture, const View& view) { return capture.images->load_truth(view.id); }

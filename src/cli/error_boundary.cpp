@@ -6,6 +6,7 @@
 #include <ostream>
 #include <string>
 
+#include "base/device_memory.h"
 #include "base/error.h"
 
 namespace traceflow::cli {
@@ -30,6 +31,8 @@ int guarded(const std::function<int()>& work, std::ostream& err) {
     return report(err, "", e.what(), "", exit_input);
   } catch (const std::filesystem::filesystem_error& e) {
     return report(err, "", e.what(), "", exit_input);
+  } catch (const memory::OutOfMemory& e) {
+    return report(err, "", e.what(), "; try a higher --downscale, or --device cpu", exit_memory);
   } catch (const std::bad_alloc&) {
     return report(err, "", "out of memory", "; try a higher --downscale or a lower --memory-budget",
                   exit_memory);

@@ -50,6 +50,8 @@ const char* ending_text(events::Ending ending) {
       return "interrupted";
     case events::Ending::diverged:
       return "diverged";
+    case events::Ending::out_of_memory:
+      return "ended for want of memory";
   }
   return "ended";
 }
@@ -104,9 +106,11 @@ void Progress::print_line(const std::string& text) {
 }
 
 void Progress::show(const events::Started& e) {
-  print_line(fmt::format("{}: {} iterations{} on {} thread{}, {} -> {}", e.capture, e.iterations,
-                         e.iteration > 0 ? fmt::format(" from {}", e.iteration) : "", e.threads,
-                         e.threads == 1 ? "" : "s", surfel_text(e.surfels), e.run.string()));
+  const std::string threads = fmt::format("{} thread{}", e.threads, e.threads == 1 ? "" : "s");
+  print_line(fmt::format("{}: {} iterations{} on {}, {}, at most {} MiB -> {}", e.capture, e.iterations,
+                         e.iteration > 0 ? fmt::format(" from {}", e.iteration) : "",
+                         e.device == "cpu" ? threads : e.device, surfel_text(e.surfels),
+                         (e.forecast_bytes + (1 << 20) - 1) >> 20, e.run.string()));
 }
 
 void Progress::show(const events::Step& e) {

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "base/atomic_file.h"
+#include "cli/device_arguments.h"
 #include "cli/trained_run.h"
 #include "cli/verbs.h"
 #include "eval/camera_file.h"
@@ -40,15 +41,17 @@ std::optional<lpips::Network> read_lpips(const std::string& path) {
   return std::nullopt;
 }
 
-void run_eval(const EvalArguments& a) {
+void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
   const std::vector<eval::Layer> layers =
       a.layers == "none" ? std::vector<eval::Layer>{} : eval::parse_layers(a.layers);
-  const TrainedRun run = read_run(a.run);
+  TrainedRun run = read_run(a.run);
   if (!run.note.empty()) fmt::print(stderr, "{}\n", run.note);
   const Capture capture = capture_of(run, a.capture, a.downscale);
   const std::vector<View>& views = views_of(capture, a.split);
   for (const View& view : views) eval::check_name(capture.folder.string(), "view id", view.id);
-  const std::optional<lpips::Network> network = read_lpips(a.lpips);
+  std::optional<lpips::Network> network = read_lpips(a.lpips);
+  const Device device = devices.choose();
+  run.subject.scene.move_to(device);
 
   const std::filesystem::path folder = std::filesystem::path(a.run) / "eval" / a.split;
   std::filesystem::create_directories(folder);
@@ -58,6 +61,7 @@ void run_eval(const EvalArguments& a) {
   report.capture = capture.name;
   report.split = a.split;
   report.downscale = a.downscale > 0 ? a.downscale : run.options.capture.downscale;
+  report.device = name_of(device);
   report.iterations = run.iterations;
   report.train_seconds = run.train_seconds;
   eval::evaluate(
@@ -97,7 +101,8 @@ void add_eval(CLI::App& program) {
   verb->add_option("--sheet-width", a->sheet_width, "Columns of one picture on it, pixels")
       ->check(CLI::Range(16, 4096))
       ->capture_default_str();
-  verb->callback([a] { run_eval(*a); });
+  const DeviceArguments devices(*verb);
+  verb->callback([a, devices] { run_eval(*a, devices); });
 }
 
 }  // namespace traceflow::cli

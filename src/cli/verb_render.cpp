@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "cli/device_arguments.h"
 #include "cli/option_arguments.h"
 #include "cli/trained_run.h"
 #include "cli/verbs.h"
@@ -110,7 +111,7 @@ void check_arguments(const RenderArguments& a) {
   if (!a.video.empty()) eval::Video::prepare(a.video);
 }
 
-void run_render(const RenderArguments& a, const OptionArguments& options) {
+void run_render(const RenderArguments& a, const OptionArguments& options, const DeviceArguments& devices) {
   check_arguments(a);
   const std::vector<eval::Layer> layers = eval::parse_layers(a.layers);
   Loaded loaded = load(a);
@@ -120,6 +121,8 @@ void run_render(const RenderArguments& a, const OptionArguments& options) {
   const std::vector<eval::Shot> shots = choose_shots(a, loaded);
   if (!(subject.scene.extent > 0)) subject.scene.extent = eval::extent_seen_from(subject.scene.main, shots);
   if (!subject.warning.empty()) fmt::print(stderr, "{}\n", subject.warning);
+
+  subject.scene.move_to(devices.choose());
 
   const double scale = subject.scene.normalisation.scale;
   eval::LayerFiles files(a.output, layers,
@@ -195,7 +198,8 @@ void add_render(CLI::App& program) {
       ->capture_default_str();
   const auto defaults = std::make_shared<RenderOptions>();
   const OptionArguments options(*verb, option_fields(*defaults));
-  verb->callback([a, defaults, options] { run_render(*a, options); });
+  const DeviceArguments devices(*verb);
+  verb->callback([a, defaults, options, devices] { run_render(*a, options, devices); });
 }
 
 }  // namespace traceflow::cli

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "cli/device_arguments.h"
 #include "cli/option_arguments.h"
 #include "cli/verbs.h"
 #include "files/npy.h"
@@ -38,10 +39,13 @@ Rays read_rays(const std::filesystem::path& path) {
   return rays;
 }
 
-void run_trace(const TraceArguments& a) {
+void run_trace(const TraceArguments& a, const DeviceArguments& devices) {
   a.options.validate();
-  const Surfels surfels = read_ply(a.ply).surfels;
-  const Rays rays = read_rays(a.rays);
+  Surfels surfels = read_ply(a.ply).surfels;
+  Rays rays = read_rays(a.rays);
+  const Device device = devices.choose();
+  surfels = surfels.on(device);
+  rays = {rays.origins.on(device), rays.directions.on(device)};
   PosedSurfels posed;
   deform::forward(surfels, nullptr, 0, {}, sh_degree(surfels.sh.dim(1)), field::Precision::fp32, posed,
                   nullptr);
@@ -52,9 +56,9 @@ void run_trace(const TraceArguments& a) {
 
   const std::filesystem::path folder(a.output);
   std::filesystem::create_directories(folder);
-  write_npy(folder / "colour.npy", output.colour);
-  write_npy(folder / "alpha.npy", output.alpha);
-  write_npy(folder / "distance.npy", output.distance);
+  write_npy(folder / "colour.npy", output.colour.on(Device::cpu));
+  write_npy(folder / "alpha.npy", output.alpha.on(Device::cpu));
+  write_npy(folder / "distance.npy", output.distance.on(Device::cpu));
   fmt::print("{} rays through {} surfels: {}\n", rays.origins.dim(0), surfels.count(), folder.string());
 }
 
@@ -68,9 +72,10 @@ void add_trace(CLI::App& program) {
   verb->add_option("--rays", a->rays, "Rays, a .npy of Nx6: origin and direction")->required();
   verb->add_option("-o,--output", a->output, "Folder for colour.npy, alpha.npy and distance.npy")->required();
   const OptionArguments options(*verb, option_fields(a->options));
-  verb->callback([a, options] {
+  const DeviceArguments devices(*verb);
+  verb->callback([a, options, devices] {
     options.apply(option_fields(a->options));
-    run_trace(*a);
+    run_trace(*a, devices);
   });
 }
 

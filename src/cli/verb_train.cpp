@@ -1,8 +1,11 @@
+#include <fmt/core.h>
+
 #include <atomic>
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <memory>
 
+#include "cli/device_arguments.h"
 #include "cli/error_boundary.h"
 #include "cli/option_arguments.h"
 #include "cli/progress.h"
@@ -28,15 +31,9 @@ struct TrainArguments {
   std::string data;
   std::string output;
   std::string preset_name = "paper";
-  std::string device = "auto";
   bool resume = false;
   bool quiet = false;
 };
-
-void check_device(const std::string& device) {
-  if (device == "auto" || device == "cpu") return;
-  throw InputError("--device", "", device, "auto or cpu", "this build has no other device");
-}
 
 // The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
 // either.
@@ -62,15 +59,24 @@ std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& argument
   return nullptr;
 }
 
-void train(const TrainArguments& arguments, const OptionArguments& given) {
-  check_device(arguments.device);
+// A quiet run still says why it ended early.
+[[noreturn]] void end_with(int code, const TrainArguments& arguments, const events::Finished& end) {
+  if (arguments.quiet && code != exit_interrupted) {
+    fmt::print(stderr, "traceflow: ended at iteration {}: {}\n", end.iteration, end.reason);
+  }
+  throw Exit{code};
+}
+
+void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices) {
   const std::unique_ptr<Safetensors> checkpoint = checkpoint_to_resume(arguments);
   const TrainOptions options = settings(arguments, given, checkpoint.get());
   std::string data = arguments.data;
   if (data.empty() && checkpoint) data = checkpoint->metadata.at("capture_folder");
   if (data.empty()) throw InputError("--data", "", "nothing", "a capture's folder");
 
-  Trainer trainer(options, load_capture(data, options.capture), arguments.output);
+  Capture capture = load_capture(data, options.capture);
+  const Device device = devices.choose(arguments.quiet);
+  Trainer trainer(options, std::move(capture), arguments.output, device);
   std::filesystem::create_directories(arguments.output);
   if (!arguments.quiet) trainer.stream().listen(Progress::for_stderr());
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
@@ -80,8 +86,9 @@ void train(const TrainArguments& arguments, const OptionArguments& given) {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   const events::Finished end = trainer.run(stop_requested);
-  if (end.ending == events::Ending::diverged) throw Exit{exit_diverged};
-  if (end.ending == events::Ending::interrupted) throw Exit{exit_interrupted};
+  if (end.ending == events::Ending::diverged) end_with(exit_diverged, arguments, end);
+  if (end.ending == events::Ending::out_of_memory) end_with(exit_memory, arguments, end);
+  if (end.ending == events::Ending::interrupted) end_with(exit_interrupted, arguments, end);
 }
 
 }  // namespace
@@ -98,16 +105,14 @@ void add_train(CLI::App& program) {
                    "240x135) or demo (minutes)")
       ->option_text("NAME")
       ->capture_default_str();
-  verb->add_option("--device", arguments->device, "auto or cpu")
-      ->option_text("DEVICE")
-      ->capture_default_str();
   verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint");
   verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
   // The presets differ in values alone, so any of them names the flags.
   auto defaults = std::make_shared<TrainOptions>();
   auto given =
       std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
-  verb->callback([arguments, given] { train(*arguments, *given); });
+  const DeviceArguments devices(*verb);
+  verb->callback([arguments, given, devices] { train(*arguments, *given, devices); });
 }
 
 }  // namespace traceflow::cli

@@ -49,6 +49,7 @@ void evaluate(const Subject& subject, const Capture& capture, const std::vector<
     request.time = view.time;
     const Clock::time_point start = Clock::now();
     const Frame& frame = renderer.forward(subject.scene, request);
+    memory::synchronise(subject.scene.device());
     seconds += std::chrono::duration<double>(Clock::now() - start).count();
 
     const std::shared_ptr<const ViewImages> images = load_images(capture, view);

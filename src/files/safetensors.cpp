@@ -240,8 +240,9 @@ std::vector<std::byte> widened(const std::vector<std::byte>& narrow, Widen widen
 
 template <class T>
 std::vector<std::byte> bytes_of(const Tensor<T>& tensor) {
-  const auto bytes = std::as_bytes(tensor.values());
-  return {bytes.begin(), bytes.end()};
+  std::vector<std::byte> bytes(static_cast<size_t>(tensor.size()) * sizeof(T));
+  memory::copy(Device::cpu, bytes.data(), tensor.device(), tensor.data(), bytes.size());
+  return bytes;
 }
 
 Json shape_list(const Shape& shape) {

@@ -17,6 +17,7 @@ class Safetensors {
   // Throws InputError for a file that is not one or whose header points outside it.
   static Safetensors read(const std::filesystem::path& path);
 
+  // Takes a copy of the tensor, wherever it is.
   void add(const std::string& name, const Tensor<float>& tensor);
   void add(const std::string& name, const Tensor<double>& tensor);
   void add(const std::string& name, const Tensor<int32_t>& tensor);

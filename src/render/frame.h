@@ -27,7 +27,7 @@ struct FrameRequest {
   bool cull = false;
 };
 
-// A picture with all its layers.
+// A picture with all its layers, on the device of the scene that it shows.
 struct Frame {
   PosedSurfels main;            // what was rasterised
   Tensor<int32_t> subset;       // which stored main surfels these are; empty means all
@@ -37,9 +37,9 @@ struct Frame {
   surface::TracedPixels traced;
   Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
   Tensor<float> colour;         // H×W×3, the final image (method §6)
-  float reach = 0;              // the largest distance by which the field moved a surfel of this frame
+  Tensor<float> reach;          // one number: the largest distance by which the field moved a surfel of it
 
-  // The specular colours as an image: H×W×3, black where nothing was traced.
+  // The specular colours as an image on the CPU: H×W×3, black where nothing was traced.
   Tensor<float> specular_image() const;
 };
 
@@ -78,7 +78,7 @@ struct SceneGradient {
   Tensor<float> environment_signal;     // N, trace::BasicInputGradient::position_gradient
   Tensor<uint8_t> environment_visible;  // N, 1 where the signal is not zero
 
-  // Zeros in the shapes of the scene.
+  // Zeros in the shapes of the scene and on its device.
   void reset(const Scene& scene);
 };
 

@@ -2,6 +2,7 @@
 
 #include "base/parallel.h"
 #include "ops/environment_map/environment_map.h"
+#include "render/frame_kernels.h"
 
 namespace traceflow::reflection_map {
 
@@ -10,8 +11,8 @@ void forward(const EnvironmentMap& map, const Tensor<float>& directions, float t
   saved.moved = directions;
   if (deform && map.field) {
     field::forward(*map.field, directions, time, precision, saved.residual, &saved.field);
-    parallel_for("render: move directions", saved.moved.size(),
-                 [&](int64_t i) { saved.moved[i] += saved.residual[i]; });
+    parallel_for(directions.device(), "render: move directions", saved.moved.size(),
+                 AddNumbers{saved.residual.data(), saved.moved.data()});
   }
   environment_map::forward(map.logit, saved.moved, colour);
 }
@@ -19,7 +20,7 @@ void forward(const EnvironmentMap& map, const Tensor<float>& directions, float t
 void backward(const EnvironmentMap& map, const Tensor<float>& directions, float time, bool deform,
               bool train_field, const Saved& saved, const Tensor<float>& grad_colour,
               EnvironmentMap& gradient, Tensor<float>& grad_directions) {
-  grad_directions.reset(directions.shape());
+  grad_directions.place(directions.device()).reset(directions.shape());
   environment_map::backward(map.logit, saved.moved, grad_colour, gradient.logit, grad_directions);
   // The direction enters the field detached, so what reaches the moved direction reaches both d and F
   // unchanged.

@@ -1,10 +1,10 @@
 #include "render/renderer.h"
 
-#include <cmath>
-
 #include "base/parallel.h"
+#include "base/sums.h"
 #include "math/spherical_harmonics.h"
 #include "ops/shade/shade.h"
+#include "render/frame_kernels.h"
 #include "render/visibility.h"
 
 namespace traceflow {
@@ -17,24 +17,25 @@ const Field* field_if(const std::optional<Field>& field, bool wanted) {
 
 int stored_degree(const Surfels& surfels) { return surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0; }
 
-// The largest distance between posed and stored positions.
-float largest_move(const Surfels& stored, const Frame& frame) {
-  float largest2 = 0;
-  for (int64_t i = 0; i < frame.main.count(); ++i) {
-    const int64_t k = frame.subset.empty() ? i : frame.subset[i];
-    const Vec3<float> move = load3<float>(frame.main.position.row(i)) - load3<float>(stored.position.row(k));
-    const float length2 = dot(move, move);
-    if (length2 > largest2 && std::isfinite(length2)) largest2 = length2;
-  }
-  return std::sqrt(largest2);
+StoredRow stored_row(const Frame& frame) {
+  return {frame.subset.empty() ? nullptr : frame.subset.data()};
+}
+
+// Leaves the largest distance between posed and stored positions in the frame.
+void find_reach(const Surfels& stored, Frame& frame) {
+  const SquareOfMove move{stored_row(frame), stored.position.data(), frame.main.position.data()};
+  ordered_sum<LargestSquare>(stored.device(), "render: largest move", frame.main.count(), move,
+                             KeepRoot{frame.reach.data()}, 4096);
 }
 
 }  // namespace
 
 Tensor<float> Frame::specular_image() const {
+  const Tensor<int32_t> pixel = traced.pixel.on(Device::cpu);
+  const Tensor<float> rays = specular_rays.on(Device::cpu);
   Tensor<float> image(colour.shape());
-  for (int64_t k = 0; k < traced.pixel.size(); ++k) {
-    store3(image.data() + 3 * int64_t{traced.pixel[k]}, load3<float>(specular_rays.row(k)));
+  for (int64_t k = 0; k < pixel.size(); ++k) {
+    store3(image.data() + 3 * int64_t{pixel[k]}, load3<float>(rays.row(k)));
   }
   return image;
 }
@@ -45,16 +46,25 @@ void SceneGradient::reset(const Scene& scene) {
   if (scene.main_field) main_field = zeros_like<float>(*scene.main_field);
   if (scene.environment_field) environment_field = zeros_like<float>(*scene.environment_field);
   if (scene.environment_map) {
-    environment_map.logit.reset(scene.environment_map->logit.shape());
+    const Tensor<float>& logit = scene.environment_map->logit;
+    environment_map.logit.place(logit.device()).reset(logit.shape());
     environment_map.field.reset();
     if (scene.environment_map->field)
       environment_map.field = zeros_like<float>(*scene.environment_map->field);
   }
   camera = {};
-  main_signal.reset({scene.main.count()});
-  main_visible.reset({scene.main.count()});
-  environment_signal.reset({scene.environment.count()});
-  environment_visible.reset({scene.environment.count()});
+  const Device device = scene.device();
+  main_signal.place(device).reset({scene.main.count()});
+  main_visible.place(device).reset({scene.main.count()});
+  environment_signal.place(device).reset({scene.environment.count()});
+  environment_visible.place(device).reset({scene.environment.count()});
+}
+
+Renderer::Renderer(const RenderOptions& options, const KeptMemory& kept) : options_(options) {
+  main_saved_.field.memory_limit = kept.field_bytes;
+  environment_saved_.field.memory_limit = kept.field_bytes;
+  map_saved_.field.memory_limit = kept.field_bytes;
+  trace::limit_device_bytes(*trace_saved_, kept.hit_bytes);
 }
 
 bool Renderer::reflects(const Scene& scene, const FrameRequest& request) const {
@@ -66,23 +76,23 @@ bool Renderer::reflects(const Scene& scene, const FrameRequest& request) const {
 const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
   const Field* field = field_if(scene.main_field, request.deform_main);
   const raster::Options raster_options = options_.raster_options(scene.extent);
+  const Device device = scene.device();
 
   // Choose the surfels that can show, and pose them.
-  frame_.subset.resize({0});
-  bool nothing_in_view = false;
+  frame_.subset.place(device).resize({0});
   if (request.cull) {
-    frame_.subset =
-        surfels_in_view(scene.main, request.camera, raster_options.near_plane, field ? scene.main_reach : 0);
-    nothing_in_view = frame_.subset.empty();
+    surfels_in_view(scene.main, request.camera, raster_options.near_plane, field ? scene.main_reach : 0,
+                    frame_.subset);
   }
-  if (nothing_in_view) {
-    frame_.main = PosedSurfels{};
+  if (request.cull && frame_.subset.empty()) {
+    frame_.main.reset_like(PosedSurfels{}.on(device));
   } else {
     deform::forward(scene.main, field, request.time, frame_.subset,
                     std::min(request.sh_degree_main, stored_degree(scene.main)), options_.precision,
                     frame_.main, keep_for_backward ? &main_saved_ : nullptr);
   }
-  frame_.reach = field ? largest_move(scene.main, frame_) : 0;
+  frame_.reach.place(device).reset({1});
+  if (field) find_reach(scene.main, frame_);
 
   // Draw them.
   raster::forward(frame_.main, request.camera, raster_options, frame_.raster,
@@ -93,9 +103,9 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   }
 
   // Mirror the view at what was drawn.
-  frame_.traced.pixel.resize({0});
-  frame_.traced.weight.resize({0});
-  frame_.specular_rays.resize({0, 3});
+  frame_.traced.pixel.place(device).resize({0});
+  frame_.traced.weight.place(device).resize({0});
+  frame_.specular_rays.place(device).resize({0, 3});
   if (reflects(scene, request)) {
     forward_specular(scene, request, keep_for_backward);
   }
@@ -122,17 +132,18 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
   trace::build(frame_.environment, trace_options, *bvh_);
   trace::forward(frame_.environment, *bvh_, origins_, directions_, trace_options, trace_output_,
                  keep_for_backward ? trace_saved_.get() : nullptr);
-  frame_.specular_rays = trace_output_.colour;
+  frame_.specular_rays.swap(trace_output_.colour);
 }
 
 void Renderer::begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors) {
   const Shape none{0};
   const Shape image = frame_.raster.alpha.shape();
   const Shape depths = faces || mirrors ? image : none;
-  grad_raster_.tint.reset(image);
-  grad_raster_.depth.reset(depths);
-  grad_raster_.median_depth.reset(depths);
-  grad_raster_.normal.reset(mirrors ? frame_.raster.normal.shape() : none);
+  const Device device = frame_.raster.alpha.device();
+  grad_raster_.tint.place(device).reset(image);
+  grad_raster_.depth.place(device).reset(depths);
+  grad_raster_.median_depth.place(device).reset(depths);
+  grad_raster_.normal.place(device).reset(mirrors ? frame_.raster.normal.shape() : none);
   grad_raster_.alpha = grad_frame.alpha;
   grad_raster_.distortion = grad_frame.distortion;
   if (!grad_frame.normal.empty()) grad_raster_.normal = grad_frame.normal;
@@ -173,17 +184,14 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   grad_raster_input_.wants_camera = trainable.camera;
   raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
                    grad_raster_, grad_raster_input_);
-  for (int64_t i = 0; i < grad_frame.main_position.size(); ++i) {
-    grad_raster_input_.surfels.position[i] += grad_frame.main_position[i];
-  }
+  parallel_for(scene.device(), "render: add gradients of positions", grad_frame.main_position.size(),
+               AddNumbers{grad_frame.main_position.data(), grad_raster_input_.surfels.position.data()});
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;
   gradient.camera.position += grad_raster_input_.camera.position;
   raster::visible(*raster_saved_, drawn_);
-  for (int64_t i = 0; i < frame_.main.count(); ++i) {
-    const int64_t k = frame_.subset.empty() ? i : frame_.subset[i];
-    gradient.main_signal[k] = grad_raster_input_.screen_gradient[i];
-    gradient.main_visible[k] = drawn_[i];
-  }
+  parallel_for(scene.device(), "render: place signals", frame_.main.count(),
+               PlaceSignal{stored_row(frame_), grad_raster_input_.screen_gradient.data(), drawn_.data(),
+                           gradient.main_signal.data(), gradient.main_visible.data()});
   // Deform.
   deform::backward(scene.main, field, request.time, frame_.subset, frame_.main, main_saved_,
                    grad_raster_input_.surfels, gradient.main,
@@ -195,7 +203,7 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
   Tensor<float>* grad_origins = &grad_trace_input_.origins;
   Tensor<float>* grad_directions = &grad_trace_input_.directions;
   if (scene.specular == Specular::environment_map) {
-    grad_origins->reset(origins_.shape());
+    grad_origins->place(scene.device()).reset(origins_.shape());
     reflection_map::backward(*scene.environment_map, directions_, request.time, request.deform_environment,
                              trainable.environment_field, map_saved_, grad_trace_.colour,
                              gradient.environment_map, *grad_directions);
@@ -204,9 +212,9 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
     trace::backward(frame_.environment, origins_, directions_, options_.trace_options(scene.extent),
                     *trace_saved_, grad_trace_, grad_trace_input_);
     gradient.environment_signal = grad_trace_input_.position_gradient;
-    for (int64_t i = 0; i < frame_.environment.count(); ++i) {
-      gradient.environment_visible[i] = gradient.environment_signal[i] != 0 ? 1 : 0;
-    }
+    parallel_for(
+        scene.device(), "render: flag signals", frame_.environment.count(),
+        FlagNonZero{gradient.environment_signal.data(), gradient.environment_visible.data()});
     if (trainable.environment) {
       deform::backward(scene.environment, field, request.time, {}, frame_.environment, environment_saved_,
                        grad_trace_input_.surfels, gradient.environment,

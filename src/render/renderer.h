@@ -7,11 +7,17 @@
 
 namespace traceflow {
 
+// Bytes that ops may take for what they keep for backward. What does not fit is computed again there.
+struct KeptMemory {
+  int64_t field_bytes = int64_t{1} << 29;  // activations of either field
+  int64_t hit_bytes = int64_t{1} << 30;    // the tracer's hits, where they are limited: on the CUDA device
+};
+
 // Strings the ops into a frame (method §1.3 … §6), and its derivative in the mirror order. Holds the memory
-// that frames need, so that one renderer used for many frames stops allocating.
+// that frames need, so that one renderer used for many frames stops allocating. Works where the scene is.
 class Renderer {
  public:
-  explicit Renderer(const RenderOptions& options) : options_(options) {}
+  explicit Renderer(const RenderOptions& options, const KeptMemory& kept = {});
 
   const RenderOptions& options() const { return options_; }
   RenderOptions& options() { return options_; }

@@ -16,6 +16,11 @@ struct BasicEnvironmentMap {
   std::optional<BasicField<T>> field;  // 3 outputs
 
   int64_t face_size() const { return logit.empty() ? 0 : logit.dim(1); }
+
+  // The same map on a device.
+  BasicEnvironmentMap on(Device device) const {
+    return {logit.on(device), field ? std::optional(field->on(device)) : std::nullopt};
+  }
 };
 using EnvironmentMap = BasicEnvironmentMap<float>;
 

@@ -9,6 +9,9 @@ namespace traceflow {
 struct Neighbours {
   Tensor<int32_t> index;    // N×k
   Tensor<float> distance2;  // N×k, squared
+
+  // The same lists on a device.
+  Neighbours on(Device device) const { return {index.on(device), distance2.on(device)}; }
 };
 Neighbours nearest_neighbours(const Tensor<float>& points, int k);
 // Every stride-th of the k·stride nearest others: as many, but from farther around.

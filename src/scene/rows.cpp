@@ -1,6 +1,9 @@
 #include "scene/rows.h"
 
+#include <limits>
+
 #include "base/parallel.h"
+#include "scene/rows_kernels.h"
 
 namespace traceflow {
 
@@ -21,19 +24,28 @@ Shape with_rows(const Shape& shape, int64_t rows) {
 
 }  // namespace
 
-Tensor<float> edited_rows(const Tensor<float>& tensor, const RowEdit& edit, bool zero_fresh) {
+Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, bool zero_fresh) {
   const int64_t row = tensor.row_size();
-  Tensor<float> result(with_rows(tensor.shape(), edit.count()));
-  parallel_for("scene: edit rows", edit.count(), [&](int64_t i) {
-    const auto k = static_cast<size_t>(i);
-    if (zero_fresh && edit.fresh[k]) return;
-    std::copy_n(tensor.data() + edit.source[k] * row, row, result.data() + i * row);
-  });
+  Tensor<float> result;
+  result.place(tensor.device()).resize(with_rows(tensor.shape(), edit.count()));
+  require(result.size() <= std::numeric_limits<uint32_t>::max(), "numbers of a set are counted in 32 bits",
+          result.shape().to_string());
+  parallel_for(tensor.device(), "scene: edit rows", result.size(),
+               TakeRow{edit.source.data(), zero_fresh ? edit.fresh.data() : nullptr,
+                       static_cast<uint32_t>(row), tensor.data(), result.data()},
+               16384);
   return result;
 }
 
-void edit_rows(Surfels& surfels, const RowEdit& edit) {
-  surfels.for_each([&](const char*, Tensor<float>& tensor) { tensor = edited_rows(tensor, edit, false); });
+Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
+  Surfels result{edited_rows(surfels.position, edit, false),
+                 edited_rows(surfels.log_scale, edit, false),
+                 edited_rows(surfels.rotation, edit, false),
+                 edited_rows(surfels.opacity_logit, edit, false),
+                 edited_rows(surfels.sh, edit, false),
+                 {}};
+  if (surfels.has_tint()) result.tint_logit = edited_rows(surfels.tint_logit, edit, false);
+  return result;
 }
 
 void append_rows(Surfels& surfels, const Surfels& more) {

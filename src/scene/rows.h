@@ -23,11 +23,23 @@ struct RowEdit {
   }
 };
 
-// Applies an edit to a tensor whose first index counts surfels. zero_fresh: fresh rows become zero instead of
-// copies.
-Tensor<float> edited_rows(const Tensor<float>& tensor, const RowEdit& edit, bool zero_fresh);
-void edit_rows(Surfels& surfels, const RowEdit& edit);
-// Adds the rows of another set, which has the same groups and degree, after those of the first.
+// An edit where the tensors that it is applied to are.
+struct PlacedEdit {
+  Tensor<int32_t> source;
+  Tensor<uint8_t> fresh;
+
+  PlacedEdit(const RowEdit& edit, Device device)
+      : source(tensor_of(edit.source).on(device)), fresh(tensor_of(edit.fresh).on(device)) {}
+  int64_t count() const { return source.size(); }
+};
+
+// A tensor whose first index counts surfels, edited. zero_fresh: fresh rows become zero instead of copies.
+Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, bool zero_fresh);
+Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit);
+inline void edit_rows(Surfels& surfels, const RowEdit& edit) {
+  surfels = edited_rows(surfels, PlacedEdit(edit, surfels.device()));
+}
+// Adds the rows of another set, which has the same groups and degree, after those of the first. On the CPU.
 void append_rows(Surfels& surfels, const Surfels& more);
 
 }  // namespace traceflow

@@ -37,6 +37,11 @@ struct Scene {
       1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
   // The largest distance by which the main field lately moved a surfel: what view culling must allow for.
   float main_reach = 0;
+
+  // Where all of it lives.
+  Device device() const { return main.device(); }
+  // Takes all of it to a device. What cannot go there stays where it is, whole (memory::OutOfMemory).
+  void move_to(Device device);
 };
 
 }  // namespace traceflow

@@ -5,29 +5,20 @@
 #include <numeric>
 
 #include "base/parallel.h"
-#include "math/rotation.h"
 #include "train/density_kernels.h"
 
 namespace traceflow {
 
 namespace {
 
-// A split surfel's children are this many times smaller, as in 2DGS.
-constexpr float split_shrink = 1.6F;
-
-float largest_scale(const Surfels& s, int64_t i) {
-  return std::exp(std::max(s.log_scale(i, 0), s.log_scale(i, 1)));
+float largest_scale(const Tensor<float>& log_scale, int64_t i) {
+  return std::exp(std::max(log_scale(i, 0), log_scale(i, 1)));
 }
 
-// Moves a child to a point drawn from its parent's own Gaussian and shrinks it.
-void scatter_child(Surfels& s, int64_t i, Random& random) {
-  const Mat3<float> rotation = rotation_from_quaternion(load4<float>(s.rotation.row(i)));
-  const auto u = static_cast<float>(random.normal());
-  const auto v = static_cast<float>(random.normal());
-  add3(s.position.row(i),
-       u * std::exp(s.log_scale(i, 0)) * rotation[0] + v * std::exp(s.log_scale(i, 1)) * rotation[1]);
-  s.log_scale(i, 0) -= std::log(split_shrink);
-  s.log_scale(i, 1) -= std::log(split_shrink);
+Tensor<float> drawn_normal(int64_t count, Random& random) {
+  Tensor<float> drawn({count});
+  for (float& number : drawn.values()) number = static_cast<float>(random.normal());
+  return drawn;
 }
 
 }  // namespace
@@ -48,6 +39,11 @@ void DensityControl::move_statistics(Device device) {
 
 std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, const SceneSize& size,
                                                         int64_t cap, bool& at_cap) const {
+  Tensor<float> fetched[4];
+  const Tensor<float>&log_scale = on_host(surfels.log_scale, fetched[0]),
+               &opacity_logit = on_host(surfels.opacity_logit, fetched[1]), &sum = on_host(sum_, fetched[2]),
+               &seen = on_host(seen_, fetched[3]);
+  const auto mean_signal = [&](int64_t i) { return seen[i] > 0 ? sum[i] / seen[i] : 0; };
   const int64_t count = surfels.count();
   const float faint = std::log(options_.prune_opacity / (1 - options_.prune_opacity));
   const float widest = std::min(options_.prune_above * size.extent, options_.prune_above_cloud * size.cloud);
@@ -55,9 +51,9 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
   std::vector<int64_t> growing;
   int64_t left = 0;
   for (int64_t i = 0; i < count; ++i) {
-    const float scale = largest_scale(surfels, i);
+    const float scale = largest_scale(log_scale, i);
     Fate& f = fate[static_cast<size_t>(i)];
-    if (!(surfels.opacity_logit[i] >= faint)) {
+    if (!(opacity_logit[i] >= faint)) {
       f = Fate::prune_transparent;
     } else if (!(scale <= widest)) {
       f = Fate::prune_large;
@@ -79,7 +75,7 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
     growing.resize(static_cast<size_t>(allowed));
   }
   for (const int64_t i : growing) {
-    const bool small = largest_scale(surfels, i) <= options_.clone_below * size.extent;
+    const bool small = largest_scale(log_scale, i) <= options_.clone_below * size.extent;
     fate[static_cast<size_t>(i)] = small ? Fate::clone : Fate::split;
   }
   return fate;
@@ -89,7 +85,6 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
                                               int64_t cap, Random& random) {
   events::DensityChanged change;
   change.set = set_;
-  move_statistics(Device::cpu);
   const std::vector<Fate> fate = fates(surfels, size, cap, change.at_cap);
   const auto each = [&](Fate wanted, auto&& f) {
     int64_t found = 0;
@@ -119,27 +114,37 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
     edit.add(i);
     edit.add(i);
   });
-  edit_rows(surfels, edit);
-  moments.edit(edit);
-  for (int64_t i = first_child; i < edit.count(); ++i) scatter_child(surfels, i, random);
-
-  sum_.reset({edit.count()});
-  seen_.reset({edit.count()});
+  // Everything is made before anything is replaced: where memory runs out, the set is as it was.
+  const Device device = surfels.device();
+  const PlacedEdit placed(edit, device);
+  Surfels edited = edited_rows(surfels, placed);
+  SurfelMoments edited_moments = moments.edited(placed);
+  Tensor<float> sum({edit.count()}, device), seen({edit.count()}, device);
+  const int64_t children = edit.count() - first_child;
+  const Tensor<float> drawn = drawn_normal(2 * children, random).on(device);
+  parallel_for(device, "density: scatter children", children,
+               ScatterChild{first_child, drawn.data(), edited.position.data(), edited.log_scale.data(),
+                            edited.rotation.data()});
+  surfels = std::move(edited);
+  moments = std::move(edited_moments);
+  sum_ = std::move(sum);
+  seen_ = std::move(seen);
   change.count = edit.count();
   return change;
 }
 
 void DensityControl::reset_opacity(Surfels& surfels, SurfelMoments& moments) const {
   const float ceiling = std::log(options_.opacity_reset / (1 - options_.opacity_reset));
-  for (float& logit : surfels.opacity_logit.values()) logit = std::min(logit, ceiling);
+  parallel_for(surfels.device(), "density: lower opacity", surfels.count(),
+               LowerTo{ceiling, surfels.opacity_logit.data()});
   moments.opacity_logit.first.zero();
   moments.opacity_logit.second.zero();
 }
 
 void DensityControl::put(Safetensors& file) const {
   if (sum_.empty()) return;
-  file.add("density/" + set_ + "/sum", sum_.on(Device::cpu));
-  file.add("density/" + set_ + "/seen", seen_.on(Device::cpu));
+  file.add("density/" + set_ + "/sum", sum_);
+  file.add("density/" + set_ + "/seen", seen_);
 }
 
 void DensityControl::get(const Safetensors& file) {

@@ -28,7 +28,8 @@ class DensityControl {
   // Adds an iteration's signal (N) of the surfels that it touched (N flags), where the signal is.
   void accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched);
 
-  // Clones, splits and prunes; forgets the statistics. `cap`: the most surfels there may be.
+  // Clones, splits and prunes; forgets the statistics. `cap`: the most surfels there may be. What becomes of
+  // each surfel is decided on the host; rows move where they are.
   events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, const SceneSize& size, int64_t cap,
                                 Random& random);
 
@@ -42,7 +43,6 @@ class DensityControl {
   enum class Fate : uint8_t { keep, clone, split, prune_transparent, prune_large };
   std::vector<Fate> fates(const Surfels& surfels, const SceneSize& size, int64_t cap, bool& at_cap) const;
   void move_statistics(Device device);
-  float mean_signal(int64_t i) const { return seen_[i] > 0 ? sum_[i] / seen_[i] : 0; }
 
   std::string set_;
   DensityOptions options_;

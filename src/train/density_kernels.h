@@ -3,7 +3,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/device.h"
+#include "math/rotation.h"
+#include "math/types.h"
 
 namespace traceflow {
 
@@ -17,6 +18,36 @@ struct AccumulateSignal {
     if (touched[i] == 0 || !std::isfinite(signal[i])) return;
     sum[i] += signal[i];
     seen[i] += 1;
+  }
+};
+
+// Moves the children of split surfels, the last rows of a set, to points drawn from their parents' own
+// Gaussians, and shrinks them.
+struct ScatterChild {
+  // As in 2DGS.
+  static constexpr float shrink = 1.6F;
+
+  int64_t first;
+  const float* drawn;  // two normal numbers a child
+  float *position, *log_scale;
+  const float* rotation;
+
+  TRACEFLOW_HD void operator()(int64_t child) const {
+    const int64_t i = first + child;
+    const Mat3<float> axes = rotation_from_quaternion(load4<float>(rotation + 4 * i));
+    float* const scale = log_scale + 2 * i;
+    add3(position + 3 * i, drawn[2 * child] * std::exp(scale[0]) * axes[0] +
+                               drawn[2 * child + 1] * std::exp(scale[1]) * axes[1]);
+    scale[0] -= std::log(shrink);
+    scale[1] -= std::log(shrink);
+  }
+};
+
+struct LowerTo {
+  float ceiling;
+  float* value;
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (ceiling < value[i]) value[i] = ceiling;
   }
 };
 

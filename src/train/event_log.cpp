@@ -17,8 +17,9 @@ Json to_json(const events::SurfelCounts& counts) {
 
 Json to_json(const events::Started& e) {
   return {{"event", "started"},       {"capture", e.capture},         {"run", e.run.string()},
-          {"iteration", e.iteration}, {"iterations", e.iterations},   {"threads", e.threads},
-          {"seed", e.seed},           {"surfels", to_json(e.surfels)}};
+          {"iteration", e.iteration}, {"iterations", e.iterations},   {"device", e.device},
+          {"threads", e.threads},     {"seed", e.seed},               {"surfels", to_json(e.surfels)},
+          {"forecast_bytes", e.forecast_bytes}};
 }
 
 Json to_json(const events::Step& e) {
@@ -74,6 +75,8 @@ const char* name(events::Ending ending) {
       return "interrupted";
     case events::Ending::diverged:
       return "diverged";
+    case events::Ending::out_of_memory:
+      return "out_of_memory";
   }
   return "unknown";
 }

@@ -30,9 +30,11 @@ struct Started {
   std::filesystem::path run;
   int64_t iteration = 0;   // already done: 0, or where a resumed run goes on
   int64_t iterations = 0;  // in all
+  std::string device = "cpu";
   int threads = 1;
   uint64_t seed = 0;
   SurfelCounts surfels;
+  int64_t forecast_bytes = 0;  // memory that the run takes at most, by its shapes
 };
 
 // One iteration is done.
@@ -88,7 +90,7 @@ struct Saved {
   double seconds = 0;  // that saving took
 };
 
-enum class Ending { completed, interrupted, diverged };
+enum class Ending { completed, interrupted, diverged, out_of_memory };
 
 // Last of all events.
 struct Finished {

@@ -11,61 +11,104 @@ namespace traceflow {
 
 namespace {
 
-// Parameter, gradient, two moments, one copy while rows are edited, one in a checkpoint being written.
-constexpr int64_t copies_of_parameters = 6;
-// Tensors of one number a pixel that a frame, its gradient and the ops' saved state hold, tile lists
-// included.
-constexpr int64_t planes_of_a_frame = 160;
-// A ray's saved hits and their gradient records.
-constexpr int64_t bytes_per_ray = 64 * 48;
 constexpr int64_t mebibyte = 1 << 20;
+// Parameter, gradient and two moments; and while rows are edited, or a checkpoint is written, another three.
+constexpr int64_t copies_of_parameters = 7;
+// Tensors of one number a pixel that a frame, its gradient and the ops' saved state hold, tile lists on the
+// CPU included.
+constexpr int64_t planes_of_a_frame = 160;
+// A ray's saved hits and their gradient records on the CPU, where they are not limited.
+constexpr int64_t bytes_per_ray = 64 * 48;
+// A ray's place in the order, sums and basis on the CUDA device.
+constexpr int64_t device_bytes_per_ray = 320;
+// An entry of a tile's list with its keys and its share of the gradient, and how many tiles a surfel is in.
+constexpr int64_t device_bytes_per_entry = 192;
+constexpr int64_t entries_per_surfel = 8;
+// A surfel's node, disk and keys in the tracer's tree, and its sums.
+constexpr int64_t device_bytes_per_disk = 640;
+// Of the matrix library, and of small lists.
+constexpr int64_t device_bytes_of_ops = 128 * mebibyte;
 
-int64_t bytes_per_surfel(int degree, bool field, const NetworkOptions& network) {
-  const int64_t numbers = 3 + 2 + 4 + 1 + 1 + 3 * sh_coefficients(degree);
+struct SetShape {
+  int degree;
+  bool has_field;
+  const NetworkOptions& network;
+};
+
+int64_t bytes_per_surfel(const SetShape& set) {
+  const int64_t numbers = 3 + 2 + 4 + 1 + 1 + 3 * sh_coefficients(set.degree);
   const int64_t posed = 2 * numbers;
   const int64_t screen = 128;
-  const int64_t activations =
-      field ? static_cast<int64_t>(network.depth + 1) * network.width + network.encoding_size() : 0;
-  return 4 * (copies_of_parameters * numbers + posed + screen + activations);
+  const int64_t encoding = set.has_field ? set.network.encoding_size() : 0;
+  return 4 * (copies_of_parameters * numbers + posed + screen + encoding);
+}
+
+// Of a field at so many points: the activations, as far as they are kept.
+int64_t field_bytes(const SetShape& set, int64_t count, const KeptMemory& kept) {
+  if (!set.has_field) return 0;
+  const int64_t each = 4 * static_cast<int64_t>(set.network.depth + 1) * set.network.width;
+  return std::min(each * count, kept.field_bytes);
+}
+
+KeptMemory kept_memory(Device device, int64_t budget) {
+  if (device == Device::cpu) return {};
+  // What does not fit is computed again, so that a small device is slower instead of refused.
+  return {.field_bytes = std::min(budget / 12, 4096 * mebibyte),
+          .hit_bytes = std::min(budget / 6, 4096 * mebibyte)};
 }
 
 }  // namespace
 
-int64_t forecast_bytes(const TrainOptions& options, int64_t main, int64_t environment, int width,
-                       int height) {
-  const int64_t pixels = static_cast<int64_t>(width) * height;
-  const int64_t perceptual =
-      options.loss.lpips > 0 ? lpips::network_bytes + pixels * lpips::gradient_bytes_per_pixel : 0;
-  const int64_t rays = options.specular == Specular::environment_gaussians ? pixels : 0;
-  return main * bytes_per_surfel(options.initial.sh_degree, options.deform.main, options.deform.network) +
-         environment * bytes_per_surfel(options.initial.environment_sh_degree, options.deform.environment,
-                                        options.deform.environment_network) +
-         4 * planes_of_a_frame * pixels + perceptual + rays * bytes_per_ray +
-         options.capture.cache_mebibytes * mebibyte + 64 * mebibyte;
+int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t main, int64_t environment) {
+  const TrainOptions& o = run.options;
+  const int64_t pixels = static_cast<int64_t>(run.width) * run.height;
+  const bool traced = o.specular == Specular::environment_gaussians;
+  const SetShape main_set{o.initial.sh_degree, o.deform.main, o.deform.network};
+  const SetShape environment_set{o.initial.environment_sh_degree, o.deform.environment,
+                                 o.deform.environment_network};
+  int64_t bytes = main * bytes_per_surfel(main_set) + environment * bytes_per_surfel(environment_set) +
+                  field_bytes(main_set, main, kept) + field_bytes(environment_set, environment, kept) +
+                  4 * planes_of_a_frame * pixels + o.capture.cache_mebibytes * mebibyte + 64 * mebibyte;
+  if (o.loss.lpips > 0) bytes += lpips::network_bytes + pixels * lpips::gradient_bytes_per_pixel;
+  if (run.device == Device::cpu) return bytes + (traced ? pixels * bytes_per_ray : 0);
+  bytes += device_bytes_of_ops + main * entries_per_surfel * device_bytes_per_entry;
+  if (traced) bytes += environment * device_bytes_per_disk + pixels * device_bytes_per_ray + kept.hit_bytes;
+  return bytes;
 }
 
-int64_t memory_budget_bytes(const TrainOptions& options) {
+int64_t memory_budget_bytes(const TrainOptions& options, Device device) {
   if (options.memory_budget > 0) return options.memory_budget * mebibyte;
-  const int64_t available = static_cast<int64_t>(sysconf(_SC_AVPHYS_PAGES)) * sysconf(_SC_PAGESIZE);
+  const int64_t available = device == Device::cuda ? static_cast<int64_t>(cuda::facts().free_bytes)
+                                                   : static_cast<int64_t>(sysconf(_SC_AVPHYS_PAGES)) *
+                                                         sysconf(_SC_PAGESIZE);
   return available / 4 * 3;
 }
 
-SurfelCaps surfel_caps(const TrainOptions& options, int width, int height) {
-  const bool traced = options.specular == Specular::environment_gaussians;
-  const int64_t main = options.density.max_surfels;
-  const int64_t environment = traced ? options.environment_density.max_surfels : 0;
-  const int64_t fixed = forecast_bytes(options, 0, 0, width, height);
-  const int64_t wanted = forecast_bytes(options, main, environment, width, height) - fixed;
-  const int64_t room = memory_budget_bytes(options) - fixed;
+MemoryPlan plan_memory(const MemorySetting& run) {
+  const TrainOptions& o = run.options;
+  const bool traced = o.specular == Specular::environment_gaussians;
+  MemoryPlan plan;
+  plan.budget_bytes = memory_budget_bytes(o, run.device);
+  plan.kept = kept_memory(run.device, plan.budget_bytes);
+  plan.image_bytes = o.capture.cache_mebibytes * mebibyte;
+  const int64_t main = o.density.max_surfels;
+  const int64_t environment = traced ? o.environment_density.max_surfels : 0;
+  const int64_t fixed = forecast_bytes(run, plan.kept, 0, 0);
+  const int64_t wanted = forecast_bytes(run, plan.kept, main, environment) - fixed;
+  const int64_t room = plan.budget_bytes - fixed;
   if (room <= 0) {
-    throw InputError("option", "memory_budget", number_text(memory_budget_bytes(options) / mebibyte) + " MiB",
+    throw InputError("option", "memory_budget", number_text(plan.budget_bytes / mebibyte) + " MiB",
                      "more than " + number_text(fixed / mebibyte) + " MiB for images of this size",
-                     "raise it, or use --downscale");
+                     "raise it, use --downscale, or lower capture.cache_mebibytes");
   }
-  if (wanted <= room) return {main, environment, false};
-  const double share = static_cast<double>(room) / static_cast<double>(wanted);
-  return {static_cast<int64_t>(share * static_cast<double>(main)),
-          static_cast<int64_t>(share * static_cast<double>(environment)), true};
+  plan.caps = {main, environment, wanted > room};
+  if (plan.caps.lowered) {
+    const double share = static_cast<double>(room) / static_cast<double>(wanted);
+    plan.caps.main = static_cast<int64_t>(share * static_cast<double>(main));
+    plan.caps.environment = static_cast<int64_t>(share * static_cast<double>(environment));
+  }
+  plan.forecast_bytes = forecast_bytes(run, plan.kept, plan.caps.main, plan.caps.environment);
+  return plan;
 }
 
 }  // namespace traceflow

@@ -1,13 +1,25 @@
 #pragma once
 
+#include "render/renderer.h"
 #include "train/options.h"
 
 namespace traceflow {
 
-// What a run of this size takes at most, in bytes: parameters, gradients, moments, posed copies, the fields'
-// activations, the tracer's hit lists, images and the image cache. An estimate from the shapes, on the high
-// side.
-int64_t forecast_bytes(const TrainOptions& options, int64_t main, int64_t environment, int width, int height);
+// Where a run trains, and on what: all that its memory depends on beside the sets' sizes.
+struct MemorySetting {
+  const TrainOptions& options;
+  Device device;
+  int width, height;  // of its photographs
+};
+
+// Bytes that a run may take: options.memory_budget, or three quarters of what the device (for the CPU: the
+// machine) has free.
+int64_t memory_budget_bytes(const TrainOptions& options, Device device);
+
+// What a run with sets of these sizes takes at most, in bytes on its device: parameters, gradients, moments,
+// posed copies, the fields' activations, tile lists, the tracer's tree and hit lists, images and those that
+// are kept. An estimate from the shapes, on the high side.
+int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t main, int64_t environment);
 
 // Caps on the two sets' sizes that keep a run within its memory budget.
 struct SurfelCaps {
@@ -15,9 +27,16 @@ struct SurfelCaps {
   int64_t environment = 0;
   bool lowered = false;  // the budget allows less than the options ask for
 };
-SurfelCaps surfel_caps(const TrainOptions& options, int width, int height);
 
-// Bytes that a run may take: options.memory_budget, or three quarters of what the machine has free.
-int64_t memory_budget_bytes(const TrainOptions& options);
+// How a run's memory is dealt out before it starts. Throws InputError where the budget does not even hold its
+// images.
+struct MemoryPlan {
+  int64_t budget_bytes = 0;
+  int64_t forecast_bytes = 0;  // with both sets at their caps
+  SurfelCaps caps;
+  KeptMemory kept;
+  int64_t image_bytes = 0;  // photographs kept on the device
+};
+MemoryPlan plan_memory(const MemorySetting& run);
 
 }  // namespace traceflow

@@ -97,12 +97,13 @@ void SurfelMoments::reset_like(const Surfels& surfels) {
   tint_logit = zero_state(surfels.tint_logit);
 }
 
-void SurfelMoments::edit(const RowEdit& edit) {
-  for_each([&](const char*, optimize::AdamState& state) {
-    if (state.first.empty()) return;
-    state.first = edited_rows(state.first, edit, true);
-    state.second = edited_rows(state.second, edit, true);
-  });
+SurfelMoments SurfelMoments::edited(const PlacedEdit& edit) const {
+  const auto state = [&](const optimize::AdamState& from) -> optimize::AdamState {
+    if (from.first.empty()) return {};
+    return {edited_rows(from.first, edit, true), edited_rows(from.second, edit, true), from.step};
+  };
+  return {state(position),      state(log_scale), state(rotation),
+          state(opacity_logit), state(sh),        state(tint_logit)};
 }
 
 Optimiser::Optimiser(const Scene& scene) {
@@ -185,7 +186,7 @@ void Optimiser::get(const Safetensors& file) {
     if (stored.shape() != into.shape()) {
       throw InputError("checkpoint", name, "shape " + stored.shape().to_string(), into.shape().to_string());
     }
-    into = std::move(stored);
+    into = stored.on(into.device());
   };
   for_each(*this, [&](const std::string& name, optimize::AdamState& state) {
     if (state.first.empty()) return;

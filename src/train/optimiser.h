@@ -27,7 +27,7 @@ struct SurfelMoments {
   }
   void reset_like(const Surfels& surfels);
   // Fresh rows get zero moments (method §7.7).
-  void edit(const RowEdit& edit);
+  SurfelMoments edited(const PlacedEdit& edit) const;
 };
 
 // Gradients that were not finite: how many, and where the first one was ("main.position, surfel 17").

@@ -253,7 +253,7 @@ struct TrainOptions {
     v.field("specular", specular, "",
             "Where reflections come from: none, environment-gaussians, environment-map.");
     v.field("memory_budget", memory_budget, "MiB",
-            "Memory that the run may take; 0 for three quarters of the machine's.");
+            "Memory that the run may take on its device; 0 for three quarters of what is free.");
     v.field("save_every", save_every, "iterations", "Interval of checkpoints.");
     v.field("non_finite", non_finite, "",
             "A gradient that is not finite stops the run, or is dropped and counted.");

@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "files/options_json.h"
 #include "ops/loss/rigidity.h"
+#include "render/frame_kernels.h"
 #include "scene/scene_file.h"
 #include "train/initialise.h"
 
@@ -52,6 +53,11 @@ void check_bonds(const Neighbours& bonds, int64_t surfels) {
 
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
 
+Scene scene_on(Device device, Scene scene) {
+  scene.move_to(device);
+  return scene;
+}
+
 }  // namespace
 
 int32_t ViewOrder::draw(Random& random) {
@@ -73,22 +79,27 @@ void ViewOrder::set_state(Tensor<int32_t> order, int64_t next) {
   next_ = next;
 }
 
-Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run)
+Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run, Device device)
     : options_(options),
+      device_(device),
       capture_(std::move(capture)),
       run_{std::move(run)},
       schedule_(options),
       perceptual_(perceptual_network(options.loss, capture_)),
       random_(seeded(options.seed)),
-      scene_(initial_scene(capture_, options, random_)),
+      memory_(plan_memory(
+          {options_, device, capture_.train.at(0).camera.width, capture_.train.at(0).camera.height})),
+      targets_(device, memory_.image_bytes),
+      scene_(scene_on(device, initial_scene(capture_, options, random_))),
       optimiser_(scene_),
       main_density_("main", options.density, scene_.main.count()),
       environment_density_("environment", options.environment_density, scene_.environment.count()),
-      caps_(surfel_caps(options, capture_.train.at(0).camera.width, capture_.train.at(0).camera.height)),
       cloud_radius_(cloud_radius(capture_.points)),
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
-      renderer_(options.render) {}
+      renderer_(options.render, memory_.kept) {
+  if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
+}
 
 FrameRequest Trainer::request_for(const View& view) {
   FrameRequest request;
@@ -121,40 +132,45 @@ const View& Trainer::draw_view() {
 
 LossTerms Trainer::step() {
   const View& view = draw_view();
-  const std::shared_ptr<const ViewImages> target = load_images(capture_, view);
+  const ViewImages& target = targets_.of(capture_, view);
   const FrameRequest request = request_for(view);
   const Trainable trainable = schedule_.trainable(iteration_);
 
   const Frame& frame = renderer_.forward(scene_, request, true);
-  grad_frame_.main_position.resize({0});
-  grad_rest_.resize({0});
-  evaluate_objective(frame, *target, options_.loss,
+  grad_frame_.main_position.place(device_).resize({0});
+  grad_rest_.place(device_).resize({0});
+  evaluate_objective(frame, target, options_.loss,
                      schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_, means_,
                      schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
   non_finite_ = {};
-  if (std::isfinite(terms.total)) {
-    gradient_.reset(scene_);
-    renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
-    for (int64_t i = 0; i < grad_rest_.size(); ++i) gradient_.main.position[i] += grad_rest_[i];
-    if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
-    if (trainable.environment && scene_.environment.count() > 0) {
-      environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
-    }
-    optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
-    non_finite_ = optimiser_.left_alone();
-    // The reach follows the field at once when it grows and slowly when it shrinks.
-    scene_.main_reach = std::max(frame.reach, 0.995F * scene_.main_reach);
-  }
+  if (std::isfinite(terms.total)) learn(frame, request, trainable);
   ++iteration_;
   control_density(iteration_);
   return terms;
 }
 
+void Trainer::learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable) {
+  gradient_.reset(scene_);
+  renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
+  parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
+               AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
+  if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
+  if (trainable.environment && scene_.environment.count() > 0) {
+    environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
+  }
+  optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
+  non_finite_ = optimiser_.left_alone();
+  // The reach follows the field at once when it grows and slowly when it shrinks.
+  scene_.main_reach = std::max(frame.reach.on(Device::cpu)[0], 0.995F * scene_.main_reach);
+}
+
 void Trainer::add_rigidity(const Frame& frame) {
   if (frame.main.count() == 0) return;
-  if (bonds_.index.empty()) bonds_ = spread_neighbours(scene_.main.position, bonds_each, bond_stride);
+  if (bonds_.index.empty()) {
+    bonds_ = spread_neighbours(scene_.main.position.on(Device::cpu), bonds_each, bond_stride).on(device_);
+  }
   grad_frame_.main_position.reset(frame.main.position.shape());
   grad_rest_.reset(scene_.main.position.shape());
   loss::rigidity(scene_.main.position, frame.main.position, frame.subset, bonds_,
@@ -170,13 +186,13 @@ void Trainer::control_density(int done) {
   };
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
-    tell(main_density_.update(scene_.main, optimiser_.main(), size_of_scene(), caps_.main, random_), reset);
+    tell(main_density_.update(scene_.main, optimiser_.main(), size_of_scene(), memory_.caps.main, random_), reset);
     bonds_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
     const bool reset = schedule_.resets_environment_opacity(done);
     tell(environment_density_.update(scene_.environment, optimiser_.environment(), size_of_scene(),
-                                     caps_.environment, random_),
+                                     memory_.caps.environment, random_),
          reset);
   }
   if (schedule_.resets_main_opacity(done)) {
@@ -215,12 +231,13 @@ events::Finished Trainer::finish(events::Ending ending, const std::string& reaso
 }
 
 events::Finished Trainer::run(const std::atomic<bool>& stop) {
-  stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations, thread_count(),
-                               static_cast<uint64_t>(options_.seed), counts()});
+  stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations,
+                               std::string(name_of(device_)), thread_count(), static_cast<uint64_t>(options_.seed),
+                               counts(), memory_.forecast_bytes});
   for (const std::string& warning : capture_.warnings) stream_.emit(events::Warning{iteration_, warning});
-  if (caps_.lowered) {
-    stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(caps_.main) +
-                                                 " main and " + std::to_string(caps_.environment) +
+  if (memory_.caps.lowered) {
+    stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(memory_.caps.main) +
+                                                 " main and " + std::to_string(memory_.caps.environment) +
                                                  " environment surfels at most"});
   }
   const Clock::time_point start = Clock::now();
@@ -232,7 +249,16 @@ events::Finished Trainer::run(const std::atomic<bool>& stop) {
     if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
       stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
     }
-    const LossTerms terms = step();
+    const Random random = random_;
+    const ViewOrder views = views_;
+    LossTerms terms;
+    try {
+      terms = step();
+    } catch (const std::bad_alloc& error) {
+      seconds_ = before + seconds_since(start);
+      save_before(random, views);
+      return finish(events::Ending::out_of_memory, error.what(), seconds_);
+    }
     const std::string trouble = health_.check(terms, non_finite_);
     seconds_ = before + seconds_since(start);
 
@@ -291,6 +317,16 @@ void Trainer::save() {
   stream_.emit(events::Saved{iteration_, run_.checkpoint(), seconds_since(start)});
 }
 
+void Trainer::save_before(const Random& random, const ViewOrder& views) {
+  random_ = random;
+  views_ = views;
+  // What the next frame would need is free for the copies that saving makes.
+  renderer_ = Renderer(options_.render, memory_.kept);
+  gradient_ = {};
+  grad_frame_ = {};
+  save();
+}
+
 void Trainer::resume() {
   std::string note;
   const Safetensors file = read_checkpoint(run_, note);
@@ -299,7 +335,7 @@ void Trainer::resume() {
     throw InputError("checkpoint", "version", file.metadata.at("version"),
                      std::to_string(checkpoint_version));
   }
-  scene_ = get_scene(file);
+  scene_ = scene_on(device_, get_scene(file));
   optimiser_ = Optimiser(scene_);
   optimiser_.get(file);
   main_density_ = DensityControl("main", options_.density, scene_.main.count());
@@ -311,6 +347,7 @@ void Trainer::resume() {
   if (file.has("bonds/index")) {
     bonds_ = {file.tensor<int32_t>("bonds/index"), file.tensor<float>("bonds/distance2")};
     check_bonds(bonds_, scene_.main.count());
+    bonds_ = bonds_.on(device_);
   }
   views_.set_state(file.tensor<int32_t>("views/order"), metadata_number(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");

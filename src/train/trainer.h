@@ -16,6 +16,7 @@
 #include "train/objective.h"
 #include "train/optimiser.h"
 #include "train/schedule.h"
+#include "train/targets.h"
 
 namespace traceflow {
 
@@ -40,13 +41,15 @@ class ViewOrder {
 // nothing.
 class Trainer {
  public:
-  // Starts a scene from the capture. The run's folder is made when the first checkpoint is saved.
-  Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run);
+  // Starts a scene from the capture and takes it to the device. The run's folder is made when the first
+  // checkpoint is saved.
+  Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run,
+          Device device = Device::cpu);
 
   // Continues from the run's checkpoint; call before run(). Throws InputError when it does not fit.
   void resume();
 
-  // Trains to the last iteration, or until `stop` is set; saves in either case.
+  // Trains to the last iteration, until `stop` is set, or until memory runs out; saves in every case.
   events::Finished run(const std::atomic<bool>& stop);
 
   // One iteration of the loop, without saving; returns the loss.
@@ -62,26 +65,32 @@ class Trainer {
   FrameRequest request_for(const View& view);
   // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
   void add_rigidity(const Frame& frame);
+  // Everything of a step that follows a loss that is a number.
+  void learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done);
   SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
   void save();
+  // Saves what stands after a step that ran out of memory, whose iteration did not happen.
+  void save_before(const Random& random, const ViewOrder& views);
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
   events::Step step_event(const LossTerms& terms, double seconds);
   events::Finished finish(events::Ending ending, const std::string& reason, double seconds);
 
   TrainOptions options_;
+  Device device_;
   Capture capture_;
   RunFolder run_;
   Schedule schedule_;
   std::optional<lpips::Network> perceptual_;
   Random random_;
+  MemoryPlan memory_;
+  Targets targets_;
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
   Neighbours bonds_;         // of the main surfels, for loss.rigidity; empty until wanted
   Tensor<float> grad_rest_;  // dL/d(stored positions) of that term
-  SurfelCaps caps_;
   float cloud_radius_;
   ViewOrder views_;
   Health health_;

@@ -98,12 +98,12 @@ TEST(Progress, RedrawsOneLineOnATerminalAndClearsItForOthers) {
 TEST(Progress, TellsHowARunBeginsAndEnds) {
   std::ostringstream out;
   Progress progress(out, 0);
-  progress(events::Started{"plate", "runs/plate", 200, 1000, 2, 1, {500, 0}});
+  progress(events::Started{"plate", "runs/plate", 200, 1000, "cpu", 2, 1, {500, 0}, 5 << 20});
   progress(events::Saved{1000, "runs/plate/state.safetensors", 0.1});
   progress(events::Evaluated{1000, "test", 4, 25.5, 0.9, 3});
   progress(events::Finished{events::Ending::diverged, 700, 61, 12.25, {500, 40}, "main.position[3] is nan"});
   EXPECT_EQ(out.str(),
-            "plate: 1000 iterations from 200 on 2 threads, 500 surfels -> runs/plate\n"
+            "plate: 1000 iterations from 200 on 2 threads, 500 surfels, at most 5 MiB -> runs/plate\n"
             "saved runs/plate/state.safetensors at iteration 1000\n"
             "iteration 1000: PSNR 25.50 dB, SSIM 0.9000 over 4 test views\n"
             "diverged after 700 iterations and 1:01: PSNR 12.25 dB over the last views, 500+40 surfels; "

@@ -126,7 +126,7 @@ TEST(Rows, AnEditCopiesDropsAndAdds) {
     EXPECT_EQ(s.sh.row(0)[k], before.sh.row(4)[k]);
     EXPECT_EQ(s.sh.row(2)[k], before.sh.row(1)[k]);
   }
-  const Tensor<float> moments = edited_rows(before.rotation, edit, true);
+  const Tensor<float> moments = edited_rows(before.rotation, PlacedEdit(edit, Device::cpu), true);
   EXPECT_EQ(moments(1, 3), before.rotation(1, 3));
   EXPECT_EQ(moments(2, 3), 0);
 }

@@ -40,7 +40,7 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   const auto path = folder / "log.jsonl";
   {
     EventLog log(path);
-    log(events::Started{"plate", "runs/plate", 0, 10, 2, 42, {100, 20}});
+    log(events::Started{"plate", "runs/plate", 0, 10, "cpu", 2, 42, {100, 20}, 5 << 20});
     log(full);
     log(events::DensityChanged{8, "main", 1, 2, 3, 4, true, false, 96});
     log(events::PhaseEntered{9, "joint"});
@@ -52,7 +52,8 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   const std::vector<json> written = lines(path);
   ASSERT_EQ(written.size(), 8U);
   EXPECT_EQ(written[0], json::parse(R"({"event":"started","capture":"plate","run":"runs/plate","iteration":0,
-      "iterations":10,"threads":2,"seed":42,"surfels":{"main":100,"environment":20}})"));
+      "iterations":10,"device":"cpu","threads":2,"seed":42,"surfels":{"main":100,"environment":20},
+      "forecast_bytes":5242880})"));
   EXPECT_EQ(written[1],
             json::parse(R"({"event":"step","iteration":7,"iterations":10,"phase":"specular","loss":0.5,
       "terms":{"l1":0.25,"ssim":1.5},"psnr":21.5,"seconds":3.0,"rate":2.5,"surfels":{"main":100,"environment":20}})"));

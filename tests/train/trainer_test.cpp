@@ -252,15 +252,17 @@ TEST(Trainer, ThePerceptualTermIsToldFromWhereItStarts) {
 
 TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {
   TrainOptions options = preset("paper");
+  const MemorySetting run{options, Device::cpu, 480, 270};
   options.memory_budget = 1 << 20;
-  EXPECT_FALSE(surfel_caps(options, 480, 270).lowered);
-  EXPECT_EQ(surfel_caps(options, 480, 270).main, options.density.max_surfels);
+  EXPECT_FALSE(plan_memory(run).caps.lowered);
+  EXPECT_EQ(plan_memory(run).caps.main, options.density.max_surfels);
   options.memory_budget = 3000;
-  const SurfelCaps caps = surfel_caps(options, 480, 270);
-  EXPECT_TRUE(caps.lowered);
-  EXPECT_LE(forecast_bytes(options, caps.main, caps.environment, 480, 270), int64_t{3000} << 20);
+  const MemoryPlan plan = plan_memory(run);
+  EXPECT_TRUE(plan.caps.lowered);
+  EXPECT_GT(plan.caps.main, 10000);
+  EXPECT_LE(plan.forecast_bytes, int64_t{3000} << 20);
   options.memory_budget = 10;
-  EXPECT_THROW(surfel_caps(options, 480, 270), InputError);
+  EXPECT_THROW(plan_memory(run), InputError);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "base/kernel.h"
+#include "base/list_where.h"
 #include "base/sum_kernels.h"
 #include "ops/surface/surface_kernels.h"
 
@@ -17,7 +18,7 @@ template void cuda::for_each_index(const char*, int64_t, const surface::Reflecti
 template void cuda::sum_each_index<CameraSum<float>>(const char*, int64_t,
                                                      const surface::ReflectionRaysBackward<float>&,
                                                      const KeepCamera<float>&);
-template void cuda::for_each_index(const char*, int64_t, const surface::FlagTraced&);
-template void cuda::for_each_index(const char*, int64_t, const surface::ListTraced&);
+template void cuda::for_each_index(const char*, int64_t, const FlagWhere<surface::IsTraced>&);
+template void cuda::for_each_index(const char*, int64_t, const surface::ListedWeight&);
 
 }  // namespace traceflow

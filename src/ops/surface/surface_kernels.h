@@ -231,27 +231,17 @@ struct TraceWeight {
   }
 };
 
-// 1 for a traced pixel. The entry after the last pixel is 0.
-struct FlagTraced {
+struct IsTraced {
   TraceWeight weight;
-  int64_t pixels;
-  int32_t* flag;
-
-  TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = i < pixels && weight(i) != 0 ? 1 : 0; }
+  TRACEFLOW_HD bool operator()(int64_t pixel) const { return weight(pixel) != 0; }
 };
 
-// Puts every traced pixel at its place, which is the number of those before it.
-struct ListTraced {
+// The weights of the pixels that are listed.
+struct ListedWeight {
   TraceWeight weight;
-  const int32_t* place;  // one entry more than there are pixels
-  int32_t* pixel;
-  float* pixel_weight;
-
-  TRACEFLOW_HD void operator()(int64_t i) const {
-    if (place[i] == place[i + 1]) return;
-    pixel[place[i]] = static_cast<int32_t>(i);
-    pixel_weight[place[i]] = weight(i);
-  }
+  const int32_t* pixel;
+  float* listed;
+  TRACEFLOW_HD void operator()(int64_t k) const { listed[k] = weight(pixel[k]); }
 };
 
 // Puts a camera's gradient where the host fetches it.

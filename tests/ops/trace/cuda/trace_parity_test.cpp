@@ -191,9 +191,9 @@ TEST_F(TraceOnDevice, KeepsItsMemory) {
     build(surfels[k], options, *bvh);
     forward(surfels[k], *bvh, origins[k], directions[k], options, output, saved.get());
     backward(surfels[k], origins[k], directions[k], options, *saved, grads[k], gradient);
-    if (i == 2) free_bytes = traceflow::cuda::facts().free_bytes;
+    if (i == 2) free_bytes = memory::device_bytes();
     if (i > 2) {
-      EXPECT_EQ(traceflow::cuda::facts().free_bytes, free_bytes);
+      EXPECT_EQ(memory::device_bytes(), free_bytes);
     }
     expect_same({on(output, Device::cpu), on(gradient, Device::cpu), blended_hits(*saved)},
                 trace(k == 0 ? large : small, options));

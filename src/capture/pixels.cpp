@@ -1,0 +1,25 @@
+#include "capture/pixels.h"
+
+#include "base/parallel.h"
+#include "capture/image_cache.h"
+#include "capture/pixels_kernels.h"
+
+namespace traceflow {
+
+void widen(const ViewPixels& pixels, ViewImages& images) {
+  const Device device = pixels.colour.device();
+  images.colour.place(device).resize(pixels.colour.shape());
+  images.mask = pixels.mask;
+  images.normal_prior.place(device).resize(pixels.normal_prior.shape());
+  constexpr int64_t grain = 16384;
+  parallel_for(device, "capture: widen colours", images.colour.size(),
+               WidenColour{pixels.colour.data(), images.colour.data()}, grain);
+  parallel_for(device, "capture: widen normals", images.normal_prior.size() / 3,
+               WidenNormal{pixels.normal_prior.data(), images.normal_prior.data()}, grain);
+}
+
+std::shared_ptr<const ViewPixels> load_pixels(const Capture& capture, const View& view) {
+  return capture.images->load(view.id);
+}
+
+}  // namespace traceflow

@@ -1,0 +1,9 @@
+#include "base/kernel.h"
+#include "capture/pixels_kernels.h"
+
+namespace traceflow {
+
+template void cuda::for_each_index(const char*, int64_t, const WidenColour&);
+template void cuda::for_each_index(const char*, int64_t, const WidenNormal&);
+
+}  // namespace traceflow

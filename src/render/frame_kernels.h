@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "math/camera.h"
+
+// The renderer's own element-wise steps, for either device.
+namespace traceflow {
+
+// Row of the stored set that posed row i comes from. stored null: posed are all.
+struct StoredRow {
+  const int32_t* stored;
+  TRACEFLOW_HD int64_t operator()(int64_t i) const { return stored == nullptr ? i : int64_t{stored[i]}; }
+};
+
+struct LargestSquare {
+  float value = 0;
+  TRACEFLOW_HD LargestSquare& operator+=(const LargestSquare& other) {
+    if (other.value > value) value = other.value;
+    return *this;
+  }
+};
+
+// The square of the distance between a surfel's stored and posed position; 0 where that is no number.
+struct SquareOfMove {
+  StoredRow row;
+  const float *stored, *posed;
+
+  TRACEFLOW_HD LargestSquare operator()(int64_t i) const {
+    const Vec3<float> move = load3<float>(posed + 3 * i) - load3<float>(stored + 3 * row(i));
+    const float length2 = dot(move, move);
+    return {std::isfinite(length2) ? length2 : 0.0F};
+  }
+};
+struct KeepRoot {
+  float* kept;
+  TRACEFLOW_HD void operator()(const LargestSquare& largest) const { *kept = std::sqrt(largest.value); }
+};
+
+struct AddNumbers {
+  const float* from;
+  float* to;
+  TRACEFLOW_HD void operator()(int64_t i) const { to[i] += from[i]; }
+};
+
+// Density control's signals of the drawn surfels, at the places of the stored ones.
+struct PlaceSignal {
+  StoredRow row;
+  const float* posed_signal;
+  const uint8_t* posed_drawn;
+  float* signal;
+  uint8_t* visible;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const int64_t k = row(i);
+    signal[k] = posed_signal[i];
+    visible[k] = posed_drawn[i];
+  }
+};
+
+struct FlagNonZero {
+  const float* value;
+  uint8_t* flag;
+  TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = value[i] != 0 ? 1 : 0; }
+};
+
+// The view's pyramid: inward unit normals of its four sides, in camera axes, through the origin.
+struct ViewPyramid {
+  Vec3<float> left, right, top, bottom;
+
+  explicit ViewPyramid(const Camera<float>& c) {
+    const Vec3<float> low = c.ray_in_camera(0, 0);
+    const Vec3<float> high = c.ray_in_camera(static_cast<float>(c.width), static_cast<float>(c.height));
+    left = normalize(Vec3<float>(1, 0, -low.x));
+    right = normalize(Vec3<float>(-1, 0, high.x));
+    top = normalize(Vec3<float>(0, 1, -low.y));
+    bottom = normalize(Vec3<float>(0, -1, high.y));
+  }
+  TRACEFLOW_HD bool meets(const Vec3<float>& centre, float radius, float near_plane) const {
+    return centre.z + radius > near_plane && dot(left, centre) > -radius && dot(right, centre) > -radius &&
+           dot(top, centre) > -radius && dot(bottom, centre) > -radius;
+  }
+};
+
+// Whether a stored surfel can show (render/visibility.h).
+struct CanShow {
+  // A disk of full opacity ends at √(2 ln 255) = 3.33 standard deviations; the field may also widen it, by
+  // half as much again.
+  static constexpr float disk_radius = 5.0F;
+
+  Camera<float> camera;
+  ViewPyramid pyramid;
+  const float *position, *log_scale;
+  float near_plane, reach;
+
+  TRACEFLOW_HD bool operator()(int64_t i) const {
+    const Vec3<float> centre = camera.point_in_camera(load3<float>(position + 3 * i));
+    const float a = log_scale[2 * i], b = log_scale[2 * i + 1];
+    const float radius = reach + disk_radius * std::exp(a < b ? b : a);
+    return std::isfinite(radius) && pyramid.meets(centre, radius, near_plane);
+  }
+};
+
+}  // namespace traceflow

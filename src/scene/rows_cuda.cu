@@ -1,0 +1,8 @@
+#include "base/kernel.h"
+#include "scene/rows_kernels.h"
+
+namespace traceflow {
+
+template void cuda::for_each_index(const char*, int64_t, const TakeRow&);
+
+}  // namespace traceflow

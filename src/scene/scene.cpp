@@ -1,0 +1,14 @@
+#include "scene/scene.h"
+
+namespace traceflow {
+
+void Scene::move_to(Device device) {
+  const auto move = [&](auto& part) { part = part.on(device); };
+  move(main);
+  move(environment);
+  if (main_field) move(*main_field);
+  if (environment_field) move(*environment_field);
+  if (environment_map) move(*environment_map);
+}
+
+}  // namespace traceflow

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <unordered_map>
+
+#include "capture/pixels.h"
+
+namespace traceflow {
+
+// The photographs that training compares with, where the scene is.
+class Targets {
+ public:
+  // On the CUDA device the first views up to the limit stay there, small as the capture keeps them: views come
+  // in random order, so that dropping one for another would save nothing.
+  Targets(Device device, int64_t limit_bytes) : device_(device), limit_bytes_(limit_bytes) {}
+
+  // Stands until the next call.
+  const ViewImages& of(const Capture& capture, const View& view);
+
+ private:
+  const ViewPixels& on_device(const Capture& capture, const View& view);
+
+  Device device_;
+  int64_t limit_bytes_;
+  std::unordered_map<std::string, ViewPixels> resident_;
+  int64_t resident_bytes_ = 0;
+  ViewPixels passing_;
+  ViewImages images_;
+};
+
+}  // namespace traceflow
