@@ -156,15 +156,12 @@ TEST_F(LpipsOnDevice, HostilePixelsShowInTheValueAndGetNoGradient) {
 
 // The distance is finite, its gradient is not: only the gradient tells.
 TEST_F(LpipsOnDevice, AGradientThatIsNotFiniteIsLeftOut) {
-  Weights weights = narrow_lpips_weights(3);
-  for (float& v : weights.convolutions[0].weight.values()) v *= 1e-30F;
-  weights.convolutions[0].bias.zero();
   const Images images(18, 20, 2);
   for (const Device device : {Device::cpu, Device::cuda}) {
-    const Network network = network_of(weights).on(device);
+    const Network network = network_of(narrow_lpips_weights(3)).on(device);
     Tensor<float> gradient(images.a.shape(), device);
     const double value =
-        lpips_distance(network, images.a.on(device), images.b.on(device), Input::defined, 1e38, gradient);
+        lpips_distance(network, images.a.on(device), images.b.on(device), Input::defined, 1e300, gradient);
     EXPECT_TRUE(std::isfinite(value));
     expect_all(gradient, 0);
   }
