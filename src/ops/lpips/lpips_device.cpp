@@ -24,7 +24,8 @@ int64_t rounded_up(int64_t n, int64_t to) { return (n + to - 1) / to * to; }
 
 template <class T>
 T* sized(Tensor<T>& tensor, const Shape& shape) {
-  return tensor.place(Device::cuda).resize(shape), tensor.data();
+  tensor.place(Device::cuda).resize(shape);
+  return tensor.data();
 }
 
 // Elements, of the steps: four channels each.
