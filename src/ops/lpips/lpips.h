@@ -66,7 +66,7 @@ void distance(const Network& network, const Tensor<float>& image, const Tensor<f
 
 // Memory that the gradient of VGG-16's distance takes at most, in bytes: for each pixel of an image, and
 // whatever its size. The latter is the network and a block of gathered pixels.
-inline constexpr int64_t gradient_bytes_per_pixel = 1700;
+inline constexpr int64_t gradient_bytes_per_pixel = 1750;
 inline constexpr int64_t network_bytes = int64_t{128} << 20;
 
 // The plain truth in double precision.

@@ -79,29 +79,34 @@ struct Size {
   }
 };
 
-// f(patches, begin, end) for blocks of [0, pixels), with room for their neighbourhoods. Blocks are of one
-// size but for the last, so that few products are planned.
-template <class F>
-void for_blocks(int64_t pixels, int64_t inputs, Memory& memory, F&& f) {
+// Pixels are taken in blocks of `rows`, the last of which may be shorter.
+struct Blocks {
+  int64_t rows, count;
+};
+Blocks blocks_of(int64_t pixels, int64_t inputs) {
   constexpr int64_t quantum = 128;
-  const int64_t columns = 9 * inputs;
-  const int64_t pixel_bytes = columns * static_cast<int64_t>(sizeof(float));
+  const int64_t pixel_bytes = 9 * inputs * static_cast<int64_t>(sizeof(float));
   const int64_t most = std::max(patch_bytes / pixel_bytes / quantum, int64_t{1}) * quantum;
-  const int64_t blocks = (pixels + most - 1) / most;
-  const int64_t rows = rounded_up((pixels + blocks - 1) / blocks, quantum);
-  float* const patches = sized(memory.patches, {std::min(rows, pixels), columns});
-  for (int64_t begin = 0; begin < pixels; begin += rows) f(patches, begin, std::min(begin + rows, pixels));
+  const int64_t count = (pixels + most - 1) / most;
+  return {rounded_up((pixels + count - 1) / count, quantum), count};
 }
 
-// 3×3 convolution of both images with zeros outside them, then max(0, ·).
+// 3×3 convolution of both images with zeros outside them, then max(0, ·). A last block that is shorter is
+// computed as if it were not, behind whose end is what nobody reads: were it another product, which adds up
+// in another way, equal images would differ.
 void convolve(const Layer& layer, const Size& size, const Tensor<float>& x, Tensor<float>& y,
               Memory& memory) {
-  float* const to = sized(y, {2 * size.pixels(), layer.outputs});
-  for_blocks(2 * size.pixels(), layer.inputs, memory, [&](float* patches, int64_t begin, int64_t end) {
+  const int64_t pixels = 2 * size.pixels();
+  const Blocks blocks = blocks_of(pixels, layer.inputs);
+  float* const patches = sized(memory.patches, {blocks.rows, 9 * layer.inputs});
+  float* const to = sized(y, {blocks.count * blocks.rows, layer.outputs});
+  y.resize({pixels, layer.outputs});
+  for (int64_t begin = 0; begin < pixels; begin += blocks.rows) {
+    const int64_t end = std::min(begin + blocks.rows, pixels);
     parallel_for(Device::cuda, "lpips: gather", (end - begin) * 9 * layer.inputs / 4,
                  GatherPatches{fours(x.data()), size.extent(layer.inputs), static_cast<uint32_t>(begin),
                                fours(patches)});
-    ProductDescription product{.m = end - begin,
+    ProductDescription product{.m = blocks.rows,
                                .k = 9 * layer.inputs,
                                .n = layer.outputs,
                                .stride_a = 9 * layer.inputs,
@@ -115,14 +120,14 @@ void convolve(const Layer& layer, const Size& size, const Tensor<float>& x, Tens
         .a = patches, .b = layer.matrix, .c = to + begin * layer.outputs, .bias = layer.bias};
     if (traceflow::cuda::supported(product)) {
       multiply(product, at);
-      return;
+      continue;
     }
     product.bias = product.relu = false;
     multiply(product, at);
     parallel_for(Device::cuda, "lpips: bias and ReLU", (end - begin) * layer.outputs / 4,
                  AddBiasAndRelu{fours(to + begin * layer.outputs), fours(layer.bias),
                                 static_cast<uint32_t>(layer.outputs / 4)});
-  });
+  }
 }
 
 // dL/dx of one image from dL/dy, in which gates are closed already. gates: of the ReLU that made x; null
@@ -131,7 +136,10 @@ void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>
                        const Tensor<uint8_t>* gates, Tensor<float>& grad_x, Memory& memory) {
   const int64_t pixels = size.pixels(), reach = size.width + 1;
   grad_x.place(Device::cuda).reset({pixels, layer.inputs});
-  for_blocks(pixels, layer.inputs, memory, [&](float* grad_patches, int64_t begin, int64_t end) {
+  const Blocks blocks = blocks_of(pixels, layer.inputs);
+  float* const grad_patches = sized(memory.patches, {blocks.rows, 9 * layer.inputs});
+  for (int64_t begin = 0; begin < pixels; begin += blocks.rows) {
+    const int64_t end = std::min(begin + blocks.rows, pixels);
     multiply({.m = end - begin,
               .k = layer.outputs,
               .n = 9 * layer.inputs,
@@ -147,7 +155,7 @@ void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>
                  AddPatches{fours(grad_patches), begin, end, first, size.extent(layer.inputs),
                             gates == nullptr ? nullptr : reinterpret_cast<const FourBytes*>(gates->data()),
                             fours(grad_x.data())});
-  });
+  }
 }
 
 // Both images at half the size; keeps the first one's places where they are wanted.

@@ -110,9 +110,12 @@ TEST_F(LpipsOnDevice, CallsOfOtherSizesLeaveNothingBehind) {
 TEST_F(LpipsOnDevice, EqualImagesHaveNoDistanceAndNoGradient) {
   Images images(16, 19, 12);
   images.b = images.a;
-  const Outcome o = run(Device::cuda, narrow_lpips_weights(5), images, Input::defined);
-  EXPECT_EQ(o.value, 0);
-  expect_all(o.gradient, 0);
+  for (const int64_t bytes : {device::patch_bytes, int64_t{1}}) {
+    device::patch_bytes = bytes;
+    const Outcome o = run(Device::cuda, narrow_lpips_weights(5), images, Input::defined);
+    EXPECT_EQ(o.value, 0);
+    expect_all(o.gradient, 0);
+  }
 }
 
 // Constant images tie in every halving: the first of four has the gradient.
