@@ -73,9 +73,8 @@ void evaluate_objective(const Frame& frame, const ViewImages& target, const Loss
                      slot(LossMeans::distortion, options.distortion));
   }
   if (perceptual != nullptr) {
-    const double distance = lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined,
-                                            options.lpips, gradient.colour);
-    loss::put({distance, 1}, slot(LossMeans::lpips, options.lpips));
+    lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined, options.lpips,
+                    gradient.colour, slot(LossMeans::lpips, options.lpips));
   }
 }
 

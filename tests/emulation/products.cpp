@@ -2,12 +2,12 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/products.h"
 #include "emulation/device.h"
 #include "math/bf16.h"
-#include "ops/field/products_cuda.h"
 
 // Stands in for cuBLASLt: the same products in plain loops.
-namespace traceflow::field::cuda {
+namespace traceflow::cuda {
 
 namespace {
 
@@ -72,7 +72,10 @@ void multiply(const ProductDescription& p, const ProductAddresses& at) {
        {at.a, at.b, static_cast<const void*>(at.c), at.bias, static_cast<const void*>(at.mask)}) {
     require(reinterpret_cast<uintptr_t>(address) % 16 == 0, "addresses are aligned");
   }
-  const traceflow::emulation::DeviceAccess access;
+  const int64_t operands = p.operands == Number::fp32 ? 4 : 2, result = p.result == Number::fp32 ? 4 : 2;
+  require(p.stride_a * operands % 16 == 0 && p.stride_b * operands % 16 == 0 && p.stride_c * result % 16 == 0,
+          "rows are aligned");
+  const emulation::DeviceAccess access;
   std::vector<float> row(static_cast<size_t>(p.n));
   for (int64_t batch = 0; batch < p.batches; ++batch) {
     const auto a = dense(p.operands, at.a, batch * p.batch_a, p.m, p.k, p.stride_a, p.transposed_a);
@@ -89,4 +92,4 @@ void multiply(const ProductDescription& p, const ProductAddresses& at) {
   }
 }
 
-}  // namespace traceflow::field::cuda
+}  // namespace traceflow::cuda

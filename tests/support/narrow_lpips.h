@@ -30,6 +30,15 @@ inline lpips::Weights narrow_lpips_weights(uint64_t seed) {
   return weights;
 }
 
+// The distance at once, and its gradient added.
+inline double lpips_distance(const lpips::Network& network, const Tensor<float>& image,
+                             const Tensor<float>& target, lpips::Input input, double weight,
+                             Tensor<float>& grad_image) {
+  return loss::value_of(image.device(), [&](const loss::MeanSlot& value) {
+    lpips::distance(network, image, target, input, weight, grad_image, value);
+  });
+}
+
 // As scripts/export_lpips.py writes them.
 inline Safetensors lpips_file(const lpips::Weights& weights) {
   constexpr int places[] = {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28};

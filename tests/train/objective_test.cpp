@@ -63,8 +63,8 @@ TEST(Objective, WithoutItsNetworkTheImageHasNoPerceptualTerm) {
   EXPECT_NEAR(a.total - b.total, f.options.lpips * a.lpips, 1e-12);
   // What the network adds to the gradient is the weighted gradient of its distance.
   Tensor<float> expected = without.colour;
-  lpips::distance(f.network, f.frame.colour, f.target.colour, lpips::Input::defined, f.options.lpips,
-                  expected);
+  testing::lpips_distance(f.network, f.frame.colour, f.target.colour, lpips::Input::defined, f.options.lpips,
+                          expected);
   EXPECT_NE(std::memcmp(with.colour.data(), without.colour.data(), with.colour.values().size_bytes()), 0);
   EXPECT_EQ(std::memcmp(with.colour.data(), expected.data(), with.colour.values().size_bytes()), 0);
 }

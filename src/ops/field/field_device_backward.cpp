@@ -67,23 +67,23 @@ void add_weight_gradient(const Pass& pass, int layer, const Segment& segment, co
   const int64_t slot_rows = segment.rows / pass.sums.slots;
   const int64_t stride = layer == layout.depth ? layout.width : layout.input_stride(layer);
   const std::byte* const input = pass.activations.input(layout, layer, segment.memory);
-  cuda::multiply({.m = outputs,
-                  .k = slot_rows,
-                  .n = layout.gradient_columns(layer),
-                  .transposed_a = true,
-                  .stride_a = outputs,
-                  .stride_b = stride,
-                  .stride_c = layout.gradient_columns(layer),
-                  .operands = layout.hidden,
-                  .result = Number::fp32,
-                  .accumulate = true,
-                  .batches = pass.sums.slots,
-                  .batch_a = slot_rows * outputs,
-                  .batch_b = slot_rows * stride,
-                  .batch_c = pass.sums.slot_size},
-                 {.a = gradient,
-                  .b = input + layout.gradient_column(layer) * layout.number_bytes,
-                  .c = pass.values + pass.sums.weight[layer]});
+  traceflow::cuda::multiply({.m = outputs,
+                             .k = slot_rows,
+                             .n = layout.gradient_columns(layer),
+                             .transposed_a = true,
+                             .stride_a = outputs,
+                             .stride_b = stride,
+                             .stride_c = layout.gradient_columns(layer),
+                             .operands = layout.hidden,
+                             .result = Number::fp32,
+                             .accumulate = true,
+                             .batches = pass.sums.slots,
+                             .batch_a = slot_rows * outputs,
+                             .batch_b = slot_rows * stride,
+                             .batch_c = pass.sums.slot_size},
+                            {.a = gradient,
+                             .b = input + layout.gradient_column(layer) * layout.number_bytes,
+                             .c = pass.values + pass.sums.weight[layer]});
 }
 
 // Adds the columns' sums of a gradient to those of a layer's bias.

@@ -4,11 +4,11 @@
 #include <memory>
 #include <tuple>
 
+#include "base/number.h"
+
 // Matrix products on one thread, by oneDNN. All matrices are dense and row-major, but for a B that is used
 // often: it can be packed into the order in which the product reads it.
 namespace traceflow::field {
-
-enum class Number { fp32, bf16 };
 
 // What a product computes: C = A·B, then the parts that are asked for, in this order. A is m×k, or stored k×m
 // and read transposed; B is k×n; C is m×n. Sums are fp32.

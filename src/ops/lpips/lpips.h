@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/tensor.h"
+#include "ops/loss/mean.h"
 
 // The perceptual distance LPIPS with the VGG-16 network: a figure of merit (method §8) and a term of the
 // training loss (method §7.4).
@@ -32,7 +33,7 @@ inline constexpr int min_side = 16;
 // file.
 Weights read_weights(const std::filesystem::path& path);
 
-// The same parameters laid out for the fast path.
+// The same parameters laid out for the fast path. All tensors are on one device.
 struct Network {
   struct Convolution {
     Tensor<float> matrix;  // (3·3·in)×out, rows in the order of a pixel's 3×3 neighbourhood
@@ -40,6 +41,10 @@ struct Network {
   };
   std::vector<Convolution> convolutions;
   std::vector<Tensor<float>> linear;
+
+  Device device() const;
+  // The same network on a device.
+  Network on(Device device) const;
 };
 Network network_of(const Weights& weights);
 
@@ -48,20 +53,21 @@ Network network_of(const Weights& weights);
 enum class Input { defined, published };
 
 // Distance of two images, H×W×3 in [0, 1], both sides at least min_side; not a number where a pixel is not
-// finite. The same bytes at any thread count.
+// finite. Runs where the images are, which the network must be too. The same bytes every time and at any
+// thread count. The host waits for it.
 double distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input);
 
-// The same, and ADDS weight · ddistance/dimage to grad_image (H×W×3); target and network are constants. Where
-// the largest of a halving's four pixels is not unique, the first has the gradient. A distance or a gradient
-// that is not finite leaves grad_image as it was: the network's sight is too wide to say which pixels it
-// spoilt.
-double distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
-                double weight, Tensor<float>& grad_image);
+// Leaves the same in a slot, for which nobody waits, and ADDS weight · ddistance/dimage to grad_image
+// (H×W×3); target and network are constants. Where the largest of a halving's four pixels is not unique, the
+// first has the gradient. A distance or a gradient that is not finite leaves grad_image as it was: the
+// network's sight is too wide to say which pixels it spoilt.
+void distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
+              double weight, Tensor<float>& grad_image, const loss::MeanSlot& value);
 
-// Memory that the gradient of VGG-16's distance takes for each pixel of an image at most, in bytes, and the
-// network itself.
-inline constexpr int64_t gradient_bytes_per_pixel = 1600;
-inline constexpr int64_t network_bytes = int64_t{64} << 20;
+// Memory that the gradient of VGG-16's distance takes at most, in bytes: for each pixel of an image, and
+// whatever its size. The latter is the network and a block of gathered pixels.
+inline constexpr int64_t gradient_bytes_per_pixel = 1750;
+inline constexpr int64_t network_bytes = int64_t{128} << 20;
 
 // The plain truth in double precision.
 double distance_reference(const BasicWeights<double>& weights, const Tensor<double>& image,

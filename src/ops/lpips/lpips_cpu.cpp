@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "ops/lpips/lpips_device.h"
 #include "ops/lpips/lpips_kernels.h"
 #include "ops/lpips/lpips_scaling.h"
 
@@ -17,11 +18,13 @@ struct Trail {
   std::vector<Tensor<float>> grad_features;  // dL/d(a stage's last features) by its own share of the distance
 };
 
-void check_images(const Tensor<float>& image, const Tensor<float>& target) {
+void check_images(const Network& network, const Tensor<float>& image, const Tensor<float>& target) {
   require(image.shape() == target.shape() && image.shape().rank() == 3 && image.dim(2) == 3,
           "both images are H×W×3", image.shape().to_string() + " and " + target.shape().to_string());
   require(std::min(image.dim(0), image.dim(1)) >= min_side, "an image for LPIPS has 16 pixels a side",
           image.shape().to_string());
+  require(network.device() == image.device() && target.device() == image.device(),
+          "the network and both images are on one device");
 }
 
 bool all_finite(const Tensor<float>& x) {
@@ -37,7 +40,6 @@ Tensor<float> scaled_input(const Tensor<float>& image, Input input) {
 
 double forward(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
                double weight, Trail* trail) {
-  check_images(image, target);
   // An infinity could hide behind a gate.
   if (!all_finite(image) || !all_finite(target)) return std::numeric_limits<double>::quiet_NaN();
   Tensor<float> a = scaled_input(image, input), b = scaled_input(target, input);
@@ -79,43 +81,33 @@ Tensor<float> backward(const Network& network, Trail& trail) {
 
 }  // namespace
 
-Network network_of(const Weights& weights) {
-  Network network;
-  for (const Weights::Convolution& convolution : weights.convolutions) {
-    const int64_t outputs = convolution.weight.dim(0), inputs = convolution.weight.dim(1);
-    Tensor<float> matrix;
-    matrix.resize({9 * inputs, outputs});
-    for (int64_t o = 0; o < outputs; ++o) {
-      for (int64_t c = 0; c < inputs; ++c) {
-        for (int64_t k = 0; k < 9; ++k) {
-          matrix(k * inputs + c, o) = convolution.weight[(o * inputs + c) * 9 + k];
-        }
-      }
-    }
-    network.convolutions.push_back({std::move(matrix), convolution.bias});
-  }
-  network.linear = weights.linear;
-  return network;
-}
-
 double distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target,
                 Input input) {
-  return forward(network, image, target, input, 0, nullptr);
+  check_images(network, image, target);
+  if (image.device() == Device::cpu) return forward(network, image, target, input, 0, nullptr);
+  return loss::value_of(Device::cuda, [&](const loss::MeanSlot& value) {
+    device::distance(network, image, target, input, value.on(Device::cuda));
+  });
 }
 
-double distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
-                double weight, Tensor<float>& grad_image) {
-  require(grad_image.shape() == image.shape(), "the gradient has the image's shape",
-          grad_image.shape().to_string());
+void distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
+              double weight, Tensor<float>& grad_image, const loss::MeanSlot& value) {
+  check_images(network, image, target);
+  require(grad_image.shape() == image.shape() && grad_image.device() == image.device(),
+          "the gradient has the image's shape and device", grad_image.shape().to_string());
+  loss::Mean* const mean = value.on(image.device());
+  if (image.device() == Device::cuda) {
+    device::distance(network, image, target, input, weight, grad_image, mean);
+    return;
+  }
   Trail trail;
-  const double value = forward(network, image, target, input, weight, &trail);
-  if (!std::isfinite(value)) return value;
+  *mean = {forward(network, image, target, input, weight, &trail), 1};
+  if (!std::isfinite(mean->value)) return;
   const Tensor<float> grad = backward(network, trail);
-  if (!all_finite(grad)) return value;
+  if (!all_finite(grad)) return;
   for (int64_t i = 0; i < grad.size(); ++i) {
     grad_image[i] += static_cast<float>(grad[i] * scale_channel_slope(i % 3, input));
   }
-  return value;
 }
 
 }  // namespace traceflow::lpips

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
-#include "ops/lpips/lpips_scaling.h"
+#include "ops/lpips/lpips_directions.h"
 
 namespace traceflow::lpips {
 
@@ -65,35 +65,35 @@ void check(dnnl_status_t status) {
   require(status == dnnl_success, "the matrix product runs", std::to_string(static_cast<int>(status)));
 }
 
-double length_of(const float* features, int64_t channels) {
+double squares_of(const float* features, int64_t channels) {
   double sum = 0;
   for (int64_t c = 0; c < channels; ++c) sum += static_cast<double>(features[c]) * features[c];
-  return std::sqrt(sum);
+  return sum;
 }
 
-// Both images' features at one pixel, divided by their lengths.
-struct Directions {
+// Both images' features at one pixel.
+struct Pixel {
   const float* a;
   const float* b;
   const float* linear;
   int64_t channels;
-  double length_a = length_of(a, channels), length_b = length_of(b, channels);
-  double inverse_a = 1 / (length_a + length_epsilon), inverse_b = 1 / (length_b + length_epsilon);
+  Directions directions{squares_of(a, channels), squares_of(b, channels)};
 
-  double difference(int64_t c) const { return a[c] * inverse_a - b[c] * inverse_b; }
   double distance() const {
     double sum = 0;
-    for (int64_t c = 0; c < channels; ++c) sum += linear[c] * difference(c) * difference(c);
+    for (int64_t c = 0; c < channels; ++c) {
+      const double difference = directions.difference(a[c], b[c]);
+      sum += linear[c] * difference * difference;
+    }
     return sum;
   }
-  // grad = scale · ddistance/da. Features of no length have closed gates and need none.
+  // grad = scale · ddistance/da.
   void gradient(double scale, float* grad) const {
     double along = 0;
-    for (int64_t c = 0; c < channels; ++c) along += linear[c] * difference(c) * a[c];
-    const double bend = length_a > 0 ? along * inverse_a / length_a : 0;
-    const double outer = length_a > 0 ? 2 * scale * inverse_a : 0;
+    for (int64_t c = 0; c < channels; ++c) along += linear[c] * directions.difference(a[c], b[c]) * a[c];
+    const Bend bend(directions, along, scale);
     for (int64_t c = 0; c < channels; ++c) {
-      grad[c] = static_cast<float>(outer * (linear[c] * difference(c) - bend * a[c]));
+      grad[c] = bend.gradient(linear[c], directions.difference(a[c], b[c]), a[c]);
     }
   }
 };
@@ -206,7 +206,7 @@ double stage_distance(const Tensor<float>& a, const Tensor<float>& b, const Tens
   const double sum = ordered_sum<double>(
       "lpips: compare", pixels,
       [&](int64_t p) {
-        const Directions at_pixel{a.data() + p * channels, b.data() + p * channels, linear.data(), channels};
+        const Pixel at_pixel{a.data() + p * channels, b.data() + p * channels, linear.data(), channels};
         if (grad_a != nullptr) at_pixel.gradient(weight * share, grad_a->data() + p * channels);
         return at_pixel.distance();
       },

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "ops/lpips/lpips.h"
+#include "ops/lpips/lpips_directions.h"
 #include "ops/lpips/lpips_scaling.h"
 
 namespace traceflow::lpips {

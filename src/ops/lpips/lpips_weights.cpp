@@ -66,4 +66,34 @@ Weights read_weights(const std::filesystem::path& path) {
   return weights;
 }
 
+Device Network::device() const { return convolutions.at(0).matrix.device(); }
+
+Network Network::on(Device device) const {
+  Network there;
+  for (const Convolution& c : convolutions) {
+    there.convolutions.push_back({c.matrix.on(device), c.bias.on(device)});
+  }
+  for (const Tensor<float>& l : linear) there.linear.push_back(l.on(device));
+  return there;
+}
+
+Network network_of(const Weights& weights) {
+  Network network;
+  for (const Weights::Convolution& convolution : weights.convolutions) {
+    const int64_t outputs = convolution.weight.dim(0), inputs = convolution.weight.dim(1);
+    Tensor<float> matrix;
+    matrix.resize({9 * inputs, outputs});
+    for (int64_t o = 0; o < outputs; ++o) {
+      for (int64_t c = 0; c < inputs; ++c) {
+        for (int64_t k = 0; k < 9; ++k) {
+          matrix(k * inputs + c, o) = convolution.weight[(o * inputs + c) * 9 + k];
+        }
+      }
+    }
+    network.convolutions.push_back({std::move(matrix), convolution.bias});
+  }
+  network.linear = weights.linear;
+  return network;
+}
+
 }  // namespace traceflow::lpips

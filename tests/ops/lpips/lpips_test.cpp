@@ -17,6 +17,7 @@ using traceflow::testing::all_finite;
 using traceflow::testing::central_differences;
 using traceflow::testing::expect_close;
 using traceflow::testing::expect_same_bytes_at_any_thread_count;
+using traceflow::testing::lpips_distance;
 using traceflow::testing::lpips_file;
 using traceflow::testing::narrow_lpips_weights;
 
@@ -120,7 +121,7 @@ TEST(Lpips, FastGradientMatchesTheReference) {
     for (const Input input : {Input::defined, Input::published}) {
       Tensor<float> fast(images.a.shape());
       Tensor<double> plain(images.a.shape());
-      const double value = distance(network_of(weights), images.a, images.b, input, 0.7, fast);
+      const double value = lpips_distance(network_of(weights), images.a, images.b, input, 0.7, fast);
       distance_reference(in_double(weights), convert<double>(images.a), convert<double>(images.b), input, 0.7,
                          plain);
       EXPECT_EQ(value, distance(network_of(weights), images.a, images.b, input));
@@ -133,9 +134,9 @@ TEST(Lpips, AddsToTheGradient) {
   const Images images(20, 17, 11);
   const Network network = network_of(narrow_lpips_weights(5));
   Tensor<float> once(images.a.shape());
-  distance(network, images.a, images.b, Input::defined, 1, once);
+  lpips_distance(network, images.a, images.b, Input::defined, 1, once);
   Tensor<float> twice = once;
-  distance(network, images.a, images.b, Input::defined, 1, twice);
+  lpips_distance(network, images.a, images.b, Input::defined, 1, twice);
   for (int64_t i = 0; i < twice.size(); ++i) EXPECT_FLOAT_EQ(twice[i], 2 * once[i]);
 }
 
@@ -143,8 +144,9 @@ TEST(Lpips, AddsToTheGradient) {
 TEST(Lpips, TheGradientOfEqualImagesIsZero) {
   const Images images(16, 16, 12);
   Tensor<float> gradient(images.a.shape());
-  EXPECT_EQ(distance(network_of(narrow_lpips_weights(5)), images.a, images.a, Input::defined, 1, gradient),
-            0);
+  EXPECT_EQ(
+      lpips_distance(network_of(narrow_lpips_weights(5)), images.a, images.a, Input::defined, 1, gradient),
+      0);
   for (const float v : gradient.values()) EXPECT_EQ(v, 0);
 }
 
@@ -154,7 +156,7 @@ TEST(Lpips, SameBytesAtAnyThreadCount) {
   expect_same_bytes_at_any_thread_count([&] {
     Tensor<double> value(Shape{1});
     Tensor<float> gradient(images.a.shape());
-    value[0] = distance(network, images.a, images.b, Input::defined, 1, gradient);
+    value[0] = lpips_distance(network, images.a, images.b, Input::defined, 1, gradient);
     return std::vector{value, convert<double>(gradient)};
   });
 }
@@ -168,7 +170,7 @@ TEST(Lpips, HostilePixelsShowInTheValueAndGetNoGradient) {
       (in_target ? images.b : images.a)(9, 3, 1) = bad;
       Tensor<float> gradient(images.a.shape());
       gradient.fill(0.5F);
-      EXPECT_TRUE(std::isnan(distance(network, images.a, images.b, Input::defined, 1, gradient)));
+      EXPECT_TRUE(std::isnan(lpips_distance(network, images.a, images.b, Input::defined, 1, gradient)));
       for (const float v : gradient.values()) EXPECT_EQ(v, 0.5F);
     }
   }
@@ -176,7 +178,7 @@ TEST(Lpips, HostilePixelsShowInTheValueAndGetNoGradient) {
     Images images(18, 20, 2);
     images.a(9, 3, 1) = large;
     Tensor<float> gradient(images.a.shape());
-    distance(network, images.a, images.b, Input::defined, 1, gradient);
+    lpips_distance(network, images.a, images.b, Input::defined, 1, gradient);
     EXPECT_TRUE(all_finite(gradient)) << large;
   }
 }
@@ -190,7 +192,7 @@ TEST(Lpips, FeaturesOfNoLengthAreEqualAndHaveNoGradient) {
     convolution.bias.zero();
   }
   Tensor<float> gradient(images.a.shape());
-  EXPECT_EQ(distance(network_of(weights), images.a, images.b, Input::defined, 1, gradient), 0);
+  EXPECT_EQ(lpips_distance(network_of(weights), images.a, images.b, Input::defined, 1, gradient), 0);
   for (const float v : gradient.values()) EXPECT_EQ(v, 0);
 }
 
@@ -202,7 +204,7 @@ TEST(Lpips, ImagesThatDoNotFitAreRefused) {
   EXPECT_THROW(distance(network, narrow, narrow, Input::defined), InternalError);
   EXPECT_THROW(distance(network, grey, grey, Input::defined), InternalError);
   EXPECT_THROW(distance(network, {}, {}, Input::defined), InternalError);
-  EXPECT_THROW(distance(network, image, image, Input::defined, 1, gradient), InternalError);
+  EXPECT_THROW(lpips_distance(network, image, image, Input::defined, 1, gradient), InternalError);
 }
 
 class LpipsWeights : public ::testing::Test {

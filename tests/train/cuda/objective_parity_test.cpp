@@ -1,6 +1,7 @@
 #include <limits>
 
 #include "support/device.h"
+#include "support/narrow_lpips.h"
 #include "train/objective.h"
 #include "train/optimiser.h"
 
@@ -30,9 +31,11 @@ Outcome evaluate(Device device, bool normal_losses) {
   target.normal_prior = noise(-1);
   LossOptions options;
   options.distortion = 3;
+  options.lpips = 0.7F;
+  const lpips::Network perceptual = lpips::network_of(narrow_lpips_weights(2)).on(device);
   Outcome o;
   LossMeans means;
-  evaluate_objective(frame, target, options, normal_losses, o.gradient, means);
+  evaluate_objective(frame, target, options, normal_losses, o.gradient, means, &perceptual);
   o.terms = means.read();
   return o;
 }
@@ -43,7 +46,7 @@ TEST_F(TrainOnDevice, TheObjectiveAgreesWithTheCpu) {
                   found = evaluate(Device::cuda, normal_losses);
     for (double LossTerms::*term :
          {&LossTerms::total, &LossTerms::l1, &LossTerms::ssim, &LossTerms::normal, &LossTerms::normal_prior,
-          &LossTerms::distortion, &LossTerms::rigidity, &LossTerms::psnr}) {
+          &LossTerms::distortion, &LossTerms::lpips, &LossTerms::rigidity, &LossTerms::psnr}) {
       EXPECT_NEAR(found.terms.*term, expected.terms.*term, 1e-5);
     }
     expect_close_on_host(found.gradient.colour, expected.gradient.colour, 1e-5, "colour");

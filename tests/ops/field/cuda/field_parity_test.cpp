@@ -56,7 +56,7 @@ std::ostream& operator<<(std::ostream& out, const Case& c) {
 class FieldOnDevice : public OnDevice {
  protected:
   void TearDown() override {
-    if (!IsSkipped()) field::cuda::allow_epilogues(true);
+    if (!IsSkipped()) cuda::allow_epilogues(true);
     field::device::segment_values = kept_segment_values_;
   }
 
@@ -193,7 +193,7 @@ TEST_F(FieldOnDevice, AgreesWithoutFusedEpilogues) {
   Tensor<float> grad_output = random_gradient(200, 10);
   keep_away_from_kinks(field, points, test_time, grad_output);
   const Pass expected = run(Device::cpu, field, points, grad_output, Precision::fp32);
-  field::cuda::allow_epilogues(false);
+  cuda::allow_epilogues(false);
   const Pass fp32 = run(Device::cuda, field, points, grad_output, Precision::fp32);
   expect_close(fp32.output, expected.output, 5e-6, "output");
   expect_fields_close(fp32.gradient, expected.gradient, 5e-6, 5e-6);

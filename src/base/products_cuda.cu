@@ -1,4 +1,4 @@
-#include "ops/field/products_cuda.h"
+#include "base/products.h"
 
 #include <cublasLt.h>
 
@@ -10,7 +10,7 @@
 #include "base/kernel.h"
 #include "base/tensor.h"
 
-namespace traceflow::field::cuda {
+namespace traceflow::cuda {
 
 namespace {
 
@@ -129,7 +129,7 @@ void Plan::run(const ProductDescription& p, const ProductAddresses& at, cublasLt
   point(p, at.bias, at.mask);
   const float one = 1, before = p.accumulate ? 1.0F : 0.0F;
   check(cublasLtMatmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
-                       workspace, workspace_bytes, traceflow::cuda::stream()),
+                       workspace, workspace_bytes, stream()),
         "a matrix product on the CUDA device");
 }
 
@@ -183,4 +183,4 @@ void multiply(const ProductDescription& product, const ProductAddresses& at) {
 }
 void allow_epilogues(bool allowed) { Library::instance().allows_epilogues = allowed; }
 
-}  // namespace traceflow::field::cuda
+}  // namespace traceflow::cuda

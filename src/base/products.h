@@ -4,10 +4,10 @@
 #include <tuple>
 
 #include "base/device.h"
-#include "ops/field/products.h"
+#include "base/number.h"
 
 // Matrix products on the CUDA device, by cuBLASLt. All matrices are row-major.
-namespace traceflow::field::cuda {
+namespace traceflow::cuda {
 
 // One bit for each number of C: whether it was greater than 0.
 enum class Mask {
@@ -59,4 +59,4 @@ TRACEFLOW_WITH_CUDA void multiply(const ProductDescription& product, const Produ
 // for them.
 TRACEFLOW_WITH_CUDA void allow_epilogues(bool allowed);
 
-}  // namespace traceflow::field::cuda
+}  // namespace traceflow::cuda
