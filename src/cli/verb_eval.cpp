@@ -52,6 +52,7 @@ void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
   std::optional<lpips::Network> network = read_lpips(a.lpips);
   const Device device = devices.choose();
   run.subject.scene.move_to(device);
+  if (network) network = network->on(device);
 
   const std::filesystem::path folder = std::filesystem::path(a.run) / "eval" / a.split;
   std::filesystem::create_directories(folder);

@@ -53,6 +53,10 @@ void check_bonds(const Neighbours& bonds, int64_t surfels) {
 
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
 
+std::optional<lpips::Network> network_on(Device device, std::optional<lpips::Network> network) {
+  return network ? std::optional(network->on(device)) : std::nullopt;
+}
+
 Scene scene_on(Device device, Scene scene) {
   scene.move_to(device);
   return scene;
@@ -85,7 +89,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       capture_(std::move(capture)),
       run_{std::move(run)},
       schedule_(options),
-      perceptual_(perceptual_network(options.loss, capture_)),
+      perceptual_(network_on(device, perceptual_network(options.loss, capture_))),
       random_(seeded(options.seed)),
       memory_(plan_memory(
           {options_, device, capture_.train.at(0).camera.width, capture_.train.at(0).camera.height})),
@@ -249,14 +253,13 @@ events::Finished Trainer::run(const std::atomic<bool>& stop) {
     if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
       stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
     }
-    const Random random = random_;
-    const ViewOrder views = views_;
+    const Draws before_step{random_, views_, iteration_};
     LossTerms terms;
     try {
       terms = step();
     } catch (const std::bad_alloc& error) {
       seconds_ = before + seconds_since(start);
-      save_before(random, views);
+      save_after_failure(before_step);
       return finish(events::Ending::out_of_memory, error.what(), seconds_);
     }
     const std::string trouble = health_.check(terms, non_finite_);
@@ -317,9 +320,11 @@ void Trainer::save() {
   stream_.emit(events::Saved{iteration_, run_.checkpoint(), seconds_since(start)});
 }
 
-void Trainer::save_before(const Random& random, const ViewOrder& views) {
-  random_ = random;
-  views_ = views;
+void Trainer::save_after_failure(const Draws& before_step) {
+  if (iteration_ == before_step.iteration) {
+    random_ = before_step.random;
+    views_ = before_step.views;
+  }
   // What the next frame would need is free for the copies that saving makes.
   renderer_ = Renderer(options_.render, memory_.kept);
   gradient_ = {};

@@ -70,8 +70,15 @@ class Trainer {
   void control_density(int done);
   SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
   void save();
-  // Saves what stands after a step that ran out of memory, whose iteration did not happen.
-  void save_before(const Random& random, const ViewOrder& views);
+  // What a step draws from.
+  struct Draws {
+    Random random;
+    ViewOrder views;
+    int iteration;
+  };
+  // Saves what stands after a step that ran out of memory: an iteration that did not come to its end draws
+  // the same again.
+  void save_after_failure(const Draws& before_step);
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
   events::Step step_event(const LossTerms& terms, double seconds);

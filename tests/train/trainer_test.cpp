@@ -2,86 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
-#include <fstream>
-
 #include "base/parallel.h"
-#include "capture/synth.h"
-#include "scene/scene_file.h"
 #include "support/narrow_lpips.h"
 #include "support/temp_folder.h"
+#include "train/small_run.h"
 
 namespace traceflow {
 namespace {
-
-namespace fs = std::filesystem;
-
-// A capture small enough that a run of forty iterations takes a second; made once for all tests.
-const fs::path& capture_folder() {
-  static const fs::path folder = [] {
-    fs::path path = fs::path(::testing::TempDir()) / ("trainer_capture_" + std::to_string(::getpid()));
-    SynthOptions options;
-    options.frames = 5;
-    options.width = 40;
-    options.height = 24;
-    options.samples = 2;
-    options.points = 300;
-    options.test_every = 2;
-    write_synthetic_capture(options, path);
-    return path;
-  }();
-  return folder;
-}
-
-TrainOptions small_run(int iterations) {
-  TrainOptions o = preset("demo");
-  o.iterations = iterations;
-  o.schedule.length = 40;
-  o.schedule.deform_from = 4;
-  o.schedule.normal_from = 6;
-  o.schedule.specular_from = 10;
-  o.schedule.joint_from = 16;
-  o.schedule.sh_every = 8;
-  o.schedule.time_jitter_until = 20;
-  o.schedule.all_times_from = 24;
-  o.density.from = 4;
-  o.density.every = 4;
-  o.density.until = 36;
-  o.density.gradient_threshold = 1e-6F;
-  o.density.max_surfels = 330;
-  o.environment_density.from = 12;
-  o.environment_density.every = 6;
-  o.environment_density.until = 36;
-  o.environment_density.gradient_threshold = 1e-8F;
-  o.initial.environment_cells = 5;
-  o.initial.environment_per_cell = 2;
-  o.environment_density.max_surfels = 260;
-  o.deform.network.depth = 3;
-  o.deform.network.width = 16;
-  o.deform.network.skip = 2;
-  o.deform.environment_network = o.deform.network;
-  o.save_every = 1000;
-  return o;
-}
-
-Trainer make_trainer(const TrainOptions& options, const std::string& name) {
-  const fs::path run = fs::path(::testing::TempDir()) / (name + "_" + std::to_string(::getpid()));
-  fs::remove_all(run);
-  return Trainer(options, load_capture(capture_folder(), options.capture), run);
-}
-
-// The scene's bytes, as a checkpoint has them.
-std::string scene_bytes(const Scene& scene) {
-  Safetensors file;
-  put_scene(scene, file);
-  const fs::path path = fs::path(::testing::TempDir()) / ("scene_" + std::to_string(::getpid()));
-  file.write(path);
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-const std::atomic<bool> never{false};
 
 TEST(Trainer, LearnsTheCapture) {
   TrainOptions options = small_run(300);

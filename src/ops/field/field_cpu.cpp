@@ -23,7 +23,7 @@ void reserve(const Layout& layout, int64_t points, Precision precision, Saved& s
   const int64_t block_bytes = layout.depth * layout.hidden_bytes(layout.block_rows);
   saved.precision = precision;
   saved.kept_blocks = std::min(layout.blocks(points), saved.memory_limit / block_bytes);
-  saved.activations.resize({saved.kept_blocks * block_bytes});
+  saved.activations.place(Device::cpu).resize({saved.kept_blocks * block_bytes});
 }
 
 void forward_block(const Layout& layout, const ForwardWeights& weights, const float* points, int64_t count,
@@ -65,7 +65,7 @@ void forward(const Field& field, const Tensor<float>& points, float time, Precis
   const Precision used = bf16_is_fast() ? precision : Precision::fp32;
   const Layout layout(field, used);
   const int64_t count = points.empty() ? 0 : points.dim(0);
-  output.resize({count, layout.outputs});
+  output.place(Device::cpu).resize({count, layout.outputs});
   if (saved != nullptr) reserve(layout, count, used, *saved);
   if (count == 0) return;
 

@@ -274,10 +274,10 @@ void blend(const Options& options, Output& output, Saved& saved) {
   const Shape vectors{saved.height, saved.width, 3};
   for (auto* tensor :
        {&output.alpha, &output.tint, &output.depth, &output.median_depth, &output.distortion}) {
-    tensor->resize(plane);
+    tensor->place(Device::cpu).resize(plane);
   }
-  output.colour.resize(vectors);
-  output.normal.resize(vectors);
+  output.colour.place(Device::cpu).resize(vectors);
+  output.normal.place(Device::cpu).resize(vectors);
   saved.touched.resize({saved.entries.size()});
   saved.blocks.resize({saved.tiles() * blocks_per_tile});
   const KernelOptions kernel_options(options);

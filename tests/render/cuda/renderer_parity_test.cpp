@@ -79,7 +79,8 @@ TEST_F(RendererOnDevice, AViewOfNothingIsTheBackground) {
   SceneGradient gradient;
   gradient.reset(placed);
   renderer.backward(placed, f.request, Trainable{}, grad_frame, gradient);
-  for (const float v : gradient.main.position.on(Device::cpu).values()) ASSERT_EQ(v, 0);
+  const Tensor<float> position = gradient.main.position.on(Device::cpu);
+  for (const float v : position.values()) ASSERT_EQ(v, 0);
 }
 
 TEST_F(RendererOnDevice, SignalsOfDensityControlAgreeWithTheCpu) {

@@ -1,0 +1,132 @@
+#include "support/device.h"
+#include "train/small_run.h"
+
+namespace traceflow {
+namespace {
+
+class TrainerOnDevice : public traceflow::testing::OnDevice {
+ protected:
+  void TearDown() override {
+    cuda::set_deterministic(false);
+    memory::set_device_budget(std::numeric_limits<size_t>::max());
+  }
+};
+
+std::vector<double> losses(Trainer& trainer, int iterations) {
+  std::vector<double> curve;
+  for (int i = 0; i < iterations; ++i) curve.push_back(trainer.step().total);
+  return curve;
+}
+
+double mean_of(const std::vector<double>& curve, size_t begin, size_t end) {
+  double sum = 0;
+  for (size_t i = begin; i < end; ++i) sum += curve[i];
+  return sum / static_cast<double>(end - begin);
+}
+
+// Adam divides by the root of the second moment, so that a gradient near zero turns rounding into a step of
+// full length: two runs part slowly and then stay as far from each other as two seeds of one run. First
+// iterations are compared one by one; all of them by means over 20, each of which sees every view several
+// times.
+TEST_F(TrainerOnDevice, TwoHundredIterationsFollowTheCpusCurve) {
+  TrainOptions options = small_run(200);
+  options.schedule.length = 200;
+  options.schedule.deform_from = 10;
+  options.schedule.normal_from = 20;
+  options.schedule.specular_from = 40;
+  options.schedule.joint_from = 60;
+  Trainer on_cpu = make_trainer(options, "curve_cpu"),
+          on_cuda = make_trainer(options, "curve_cuda", Device::cuda);
+  const std::vector<double> expected = losses(on_cpu, 200), found = losses(on_cuda, 200);
+  for (size_t i = 0; i < 10; ++i) EXPECT_NEAR(found[i], expected[i], 1e-3 * expected[i]) << i;
+  for (size_t i = 0; i < 200; i += 20) {
+    EXPECT_NEAR(mean_of(found, i, i + 20), mean_of(expected, i, i + 20), 0.05 * mean_of(expected, i, i + 20))
+        << "from " << i;
+  }
+  EXPECT_LT(mean_of(found, 180, 200), 0.8 * mean_of(found, 0, 20));
+  EXPECT_NEAR(static_cast<double>(on_cuda.scene().main.count()),
+              static_cast<double>(on_cpu.scene().main.count()),
+              0.1 * static_cast<double>(on_cpu.scene().main.count()));
+}
+
+TEST_F(TrainerOnDevice, SumsInAFixedOrderGiveTheSameBytesAlsoWhenInterrupted) {
+  cuda::set_deterministic(true);
+  const TrainOptions options = small_run(40);
+  Trainer whole = make_trainer(options, "whole_cuda", Device::cuda);
+  EXPECT_EQ(whole.run(never).ending, events::Ending::completed);
+
+  Trainer first = make_trainer(options, "parts_cuda", Device::cuda);
+  std::atomic<bool> stop{false};
+  first.stream().listen([&](const events::Event& event) {
+    const auto* step = std::get_if<events::Step>(&event);
+    if (step != nullptr && step->iteration == 23) stop = true;
+  });
+  EXPECT_EQ(first.run(stop).ending, events::Ending::interrupted);
+  const fs::path run = fs::path(::testing::TempDir()) / ("parts_cuda_" + std::to_string(::getpid()));
+  Trainer second(options, load_capture(capture_folder(), options.capture), run, Device::cuda);
+  second.resume();
+  EXPECT_EQ(second.run(never).ending, events::Ending::completed);
+  EXPECT_EQ(scene_bytes(second.scene()), scene_bytes(whole.scene()));
+}
+
+TEST_F(TrainerOnDevice, ARunGoesOnOnTheOtherDevice) {
+  const TrainOptions options = small_run(40);
+  for (const Device from : {Device::cpu, Device::cuda}) {
+    const Device to = from == Device::cpu ? Device::cuda : Device::cpu;
+    Trainer first = make_trainer(options, "moves", from);
+    std::atomic<bool> stop{false};
+    first.stream().listen([&](const events::Event& event) {
+      const auto* step = std::get_if<events::Step>(&event);
+      if (step != nullptr && step->iteration == 20) stop = true;
+    });
+    first.run(stop);
+    const fs::path run = fs::path(::testing::TempDir()) / ("moves_" + std::to_string(::getpid()));
+    Trainer second(options, load_capture(capture_folder(), options.capture), run, to);
+    second.resume();
+    EXPECT_EQ(scene_bytes(second.scene()), scene_bytes(first.scene()));
+    EXPECT_EQ(second.scene().device(), to);
+    EXPECT_EQ(second.run(never).ending, events::Ending::completed);
+  }
+}
+
+// The budget ends at another point of an iteration each time; wherever that is, what was learnt is saved, and
+// a run with more memory goes on from there.
+TEST_F(TrainerOnDevice, RunningOutOfMemoryEndsInASavedState) {
+  const TrainOptions options = small_run(30);
+  for (const size_t more : {size_t{0}, size_t{20000}, size_t{60000}, size_t{200000}}) {
+    Trainer trainer = make_trainer(options, "memory", Device::cuda);
+    trainer.stream().listen([&](const events::Event& event) {
+      const auto* step = std::get_if<events::Step>(&event);
+      if (step != nullptr && step->iteration == 9) memory::set_device_budget(memory::device_bytes() + more);
+    });
+    const events::Finished end = trainer.run(never);
+    ASSERT_EQ(end.ending, events::Ending::out_of_memory) << more;
+    EXPECT_EQ(end.reason.find("out of device memory"), 0U) << end.reason;
+    EXPECT_GE(end.iteration, 9);
+    memory::set_device_budget(std::numeric_limits<size_t>::max());
+    const fs::path run = fs::path(::testing::TempDir()) / ("memory_" + std::to_string(::getpid()));
+    Trainer resumed(options, load_capture(capture_folder(), options.capture), run, Device::cuda);
+    resumed.resume();
+    EXPECT_EQ(resumed.iteration(), end.iteration);
+    EXPECT_EQ(scene_bytes(resumed.scene()), scene_bytes(trainer.scene()));
+    EXPECT_EQ(resumed.run(never).ending, events::Ending::completed);
+  }
+}
+
+TEST_F(TrainerOnDevice, TheForecastCoversWhatARunTakes) {
+  const TrainOptions options = small_run(40);
+  const size_t before = memory::device_bytes();
+  int64_t forecast = 0;
+  size_t most = 0;
+  Trainer trainer = make_trainer(options, "forecast", Device::cuda);
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* started = std::get_if<events::Started>(&event)) forecast = started->forecast_bytes;
+    most = std::max(most, memory::device_bytes());
+  });
+  EXPECT_EQ(trainer.run(never).ending, events::Ending::completed);
+  EXPECT_GT(most, before);
+  EXPECT_LE(static_cast<int64_t>(most - before), forecast);
+}
+
+}  // namespace
+}  // namespace traceflow
