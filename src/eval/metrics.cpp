@@ -27,9 +27,17 @@ std::optional<double> mean_of(const Sum& sum) {
   return sum.total / static_cast<double>(sum.count);
 }
 
+// Empty tensors lie anywhere.
+template <class T>
+void require_beside(const Tensor<float>& picture, const Tensor<T>& other) {
+  require(other.empty() || other.device() == picture.device(), "a figure's pictures lie on one device");
+}
+
 Sum squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& mask) {
   require(image.shape() == target.shape(), "image and target have one shape",
           image.shape().to_string() + " and " + target.shape().to_string());
+  require_beside(image, target);
+  require_beside(image, mask);
   return sum_of(image.device(), "metrics: psnr", image.size() / 3,
                 SquaredError{image.data(), target.data(), address(mask)});
 }
@@ -68,6 +76,8 @@ std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<f
   if (truth.empty()) return std::nullopt;
   require(normal.shape() == truth.shape(), "normals and truth have one shape",
           normal.shape().to_string() + " and " + truth.shape().to_string());
+  require_beside(normal, truth);
+  require_beside(normal, mask);
   return mean_of(sum_of(normal.device(), "metrics: normals", truth.size() / 3,
                         NormalError{normal.data(), truth.data(), address(mask)}));
 }

@@ -136,6 +136,15 @@ TEST_F(MetricsOnDevice, OfImagesAsTheyAreAgreeToo) {
   EXPECT_FALSE(psnr(c.colour.on(Device::cuda), c.true_colour.on(Device::cuda), {}));
 }
 
+TEST_F(MetricsOnDevice, PicturesApartAreRefused) {
+  const Case c = random_case(4, 5);
+  const Tensor<float> there = c.colour.on(Device::cuda), normal_there = c.normal.on(Device::cuda);
+  EXPECT_THROW(psnr(there, c.true_colour, {}), InternalError);
+  EXPECT_THROW(psnr(there, there, c.mask), InternalError);
+  EXPECT_THROW(normal_mae_deg(normal_there, c.true_normal, {}), InternalError);
+  EXPECT_THROW(normal_mae_deg(normal_there, normal_there, c.mask), InternalError);
+}
+
 // The layers of a frame on the device reach the host.
 TEST_F(MetricsOnDevice, LayersOfAFrameComeToTheHost) {
   Random random(2);
