@@ -4,8 +4,8 @@
 #include "on_device.h"
 #include "ops/field/products_cuda.h"
 
-// What the CUDA device can do, measured: copies within its memory, and matrix products. The floors of the
-// other benchmarks' calls rest on it (scripts/floors).
+// What the CUDA device can do, measured: copies within its memory, matrix products, and how soon one small
+// piece of work follows another. The floors of the other benchmarks' calls rest on it (scripts/floors).
 namespace traceflow {
 namespace {
 
@@ -21,6 +21,13 @@ void copy_on_device(benchmark::State& state) {
   state.counters["bytes/s"] = benchmark::Counter(moved, benchmark::Counter::kIsIterationInvariantRate);
 }
 BENCHMARK(copy_on_device)->Apply(bench::by_the_clock)->ArgName("MiB")->Arg(1024);
+
+void start_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  Tensor<float> one({1}, Device::cuda);
+  bench::time_on_device(state, {bench::bytes(one), 0}, [&] { one.zero(); });
+}
+BENCHMARK(start_on_device)->Apply(bench::by_the_clock);
 
 // The one place that knows the product's name. C = A·Bᵀ, as layers have it.
 void multiply(int64_t m, int64_t n, int64_t k, field::Number number, const Tensor<std::byte>& a,
