@@ -6,36 +6,15 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "field_work.h"
+#include "on_device.h"
 #include "peak.h"
 
-// The residual field's network, forward and backward, on one core, beside what that core's multiply-add units
-// can do: `of_peak` is the ratio of the two, both measured here in CPU time.
+// The residual field's network, forward and backward. On one core, beside what that core's multiply-add units
+// can do: `of_peak` is the ratio of the two, both measured here in CPU time. And on the CUDA device.
 namespace {
 
 using namespace traceflow;
-
-// Floating-point operations that one point needs: a multiplication and an addition for every weight of the
-// point's encoding and of the hidden values in every layer, once forward and, but for layer 0's and the
-// skip's encoding (no gradient by the input), twice backward. Padding, the time's part and ReLU do not count.
-double useful_operations(const Field& field) {
-  const NetworkOptions& shape = field.shape;
-  const double encoding = 3 + 6 * shape.position_frequencies;
-  double forward = field.outputs() * shape.width, by_input = forward;
-  for (int layer = 0; layer < shape.depth; ++layer) {
-    const double hidden = layer == 0 ? 0 : shape.width;
-    const double seen = layer == 0 || layer == shape.skip ? encoding : 0;
-    forward += (hidden + seen) * shape.width;
-    by_input += hidden * shape.width;
-  }
-  return 2 * (2 * forward + by_input);
-}
-
-Field trained_field(int width) {
-  Random random(1);
-  Field field = make_field({.width = width}, residual::main_outputs, random);
-  for (float& w : field.head_weight.values()) w = static_cast<float>(random.uniform(-0.1, 0.1));
-  return field;
-}
 
 Tensor<float> random_rows(int64_t count, int64_t columns) {
   Random random(2);
@@ -52,7 +31,7 @@ void field_forward_backward(benchmark::State& state) {
   }
   set_threads(1);
   const int64_t points_count = state.range(2);
-  const Field field = trained_field(static_cast<int>(state.range(0)));
+  const Field field = bench::trained_field(static_cast<int>(state.range(0)));
   const Tensor<float> points = random_rows(points_count, 3);
   const Tensor<float> grad_output = random_rows(points_count, field.outputs());
   Field grad_field = zeros_like<float>(field);
@@ -72,7 +51,9 @@ void field_forward_backward(benchmark::State& state) {
     pass();
     seconds = std::min(seconds, bench::cpu_seconds() - start);
   }
-  const double rate = useful_operations(field) * static_cast<double>(points_count) / seconds * 1e-9;
+  const bench::FieldOperations operations(field);
+  const double rate =
+      (operations.forward + operations.backward) * static_cast<double>(points_count) / seconds * 1e-9;
   state.counters["GFLOP/s"] = rate;
   state.counters["peak"] = peak;
   state.counters["of_peak"] = rate / peak;
@@ -86,5 +67,67 @@ BENCHMARK(field_forward_backward)
     ->Args({256, 32, 2000, 512})
     ->Unit(benchmark::kMillisecond)
     ->MinTime(1);
+
+// The paper's network on the CUDA device. Arguments: bits of the hidden layers' products, points.
+class OnDevice {
+ public:
+  explicit OnDevice(const benchmark::State& state)
+      : bits_(static_cast<int>(state.range(0))),
+        points_(random_rows(state.range(1), 3).on(Device::cuda)),
+        grad_output_(random_rows(state.range(1), field_.outputs()).on(Device::cuda)) {
+    saved_.memory_limit = int64_t{8} << 30;  // all of it is kept
+    forward(&saved_);
+  }
+  void forward(field::Saved* saved) {
+    const auto precision = bits_ == 16 ? field::Precision::bf16 : field::Precision::fp32;
+    field::forward(field_, points_, 0.5F, precision, output_, saved);
+  }
+  void backward() { field::backward(field_, points_, 0.5F, saved_, grad_output_, grad_field_); }
+  field::Saved* saved() { return &saved_; }
+
+  bench::Floor forward_floor() const {
+    return {bench::bytes(points_, output_) + bench::bytes(field_), count() * operations_.forward, bits_};
+  }
+  bench::Floor backward_floor() const {
+    return {bench::bytes(points_, grad_output_) + 3 * bench::bytes(field_), count() * operations_.backward,
+            bits_};
+  }
+
+ private:
+  double count() const { return static_cast<double>(points_.dim(0)); }
+
+  int bits_;
+  Field field_ = bench::trained_field(NetworkOptions{}.width).on(Device::cuda);
+  bench::FieldOperations operations_{field_};
+  Field grad_field_ = zeros_like<float>(field_);
+  Tensor<float> points_, grad_output_, output_;
+  field::Saved saved_;
+};
+
+void field_forward_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice d(state);
+  bench::time_on_device(state, d.forward_floor(), [&] { d.forward(nullptr); });
+}
+
+void field_forward_saved_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice d(state);
+  bench::time_on_device(state, d.forward_floor(), [&] { d.forward(d.saved()); });
+}
+
+void field_backward_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice d(state);
+  bench::time_on_device(state, d.backward_floor(), [&] { d.backward(); });
+}
+
+void sizes_on_device(benchmark::internal::Benchmark* b) {
+  bench::by_the_clock(b);
+  b->ArgNames({"bits", "points"})->ArgsProduct({{16, 32}, {bench::main_surfels, bench::environment_surfels}});
+}
+BENCHMARK(field_forward_on_device)->Apply(sizes_on_device);
+BENCHMARK(field_forward_saved_on_device)->Apply(sizes_on_device);
+BENCHMARK(field_backward_on_device)->Apply(sizes_on_device);
 
 }  // namespace

@@ -10,13 +10,14 @@
 #include "base/random.h"
 #include "math/rotation.h"
 #include "math/spherical_harmonics.h"
+#include "on_device.h"
 #include "ops/raster/raster.h"
 
-// How fast the rasteriser is on one core. The scene is like a trained capture: surfels that lie on the walls
-// of a room and on a ball in its middle, seen from inside the room; their size falls with their count, so
-// that they cover the surfaces about as often at any count. Rates are of pairs of a pixel and a surfel:
-// `evaluated` are those whose Gaussian is computed, `listed` those that a rasteriser without the cull per
-// block of pixels would have to compute.
+// How fast the rasteriser is on one core, and on the CUDA device. The scene is like a trained capture:
+// surfels that lie on the walls of a room and on a ball in its middle, seen from inside the room; their size
+// falls with their count, so that they cover the surfaces about as often at any count. Rates are of pairs of
+// a pixel and a surfel: `evaluated` are those whose Gaussian is computed, `listed` those that a rasteriser
+// without the cull per block of pixels would have to compute.
 namespace traceflow::raster {
 namespace {
 
@@ -138,6 +139,75 @@ void sizes(benchmark::internal::Benchmark* b) {
 }
 BENCHMARK(forward_one_core)->Apply(sizes);
 BENCHMARK(backward_one_core)->Apply(sizes);
+
+// The same on the CUDA device.
+class OnDevice {
+ public:
+  explicit OnDevice(SortOrder sort) {
+    Frame frame = make_frame(bench::main_surfels, bench::frame_width);
+    options_.sort = sort;
+    camera_ = frame.camera;
+    surfels_ = frame.surfels.on(Device::cuda);
+    auto& g = frame.gradient;
+    for (auto* t : {&g.alpha, &g.tint, &g.depth, &g.colour, &g.normal}) *t = t->on(Device::cuda);
+    grad_ = std::move(frame.gradient);
+    gradient_.wants_camera = false;
+    forward(saved_.get());
+    backward();
+  }
+  void forward(Saved* saved) { raster::forward(surfels_, camera_, options_, output_, saved); }
+  void backward() { raster::backward(surfels_, camera_, options_, *saved_, grad_, gradient_); }
+  Saved* saved() { return saved_.get(); }
+
+  // A pair of a pixel and a surfel, by the formulas of math/: the footprint 20, its weight 10, eight blended
+  // numbers 16; backward the derivatives of all of them.
+  bench::Floor forward_floor() const {
+    return {bench::bytes(surfels_) + bench::bytes(output_.colour, output_.alpha, output_.tint, output_.normal,
+                                                  output_.depth, output_.median_depth, output_.distortion),
+            46 * pairs()};
+  }
+  bench::Floor backward_floor() const {
+    return {bench::bytes(surfels_) +
+                bench::bytes(grad_.colour, grad_.alpha, grad_.tint, grad_.normal, grad_.depth) +
+                bench::bytes(gradient_.surfels) + bench::bytes(gradient_.screen_gradient),
+            150 * pairs()};
+  }
+  double pairs() const { return static_cast<double>(work(*saved_).evaluated); }
+
+ private:
+  PosedSurfels surfels_;
+  Camera<float> camera_;
+  Options options_;
+  OutputGradient grad_;
+  InputGradient gradient_;
+  Output output_;
+  SavedPtr saved_ = make_saved();
+};
+
+void raster_forward_on_device(benchmark::State& state, SortOrder sort) {
+  if (bench::no_device(state)) return;
+  OnDevice d(sort);
+  bench::time_on_device(state, d.forward_floor(), [&] { d.forward(nullptr); });
+}
+
+void raster_forward_saved_on_device(benchmark::State& state, SortOrder sort) {
+  if (bench::no_device(state)) return;
+  OnDevice d(sort);
+  bench::time_on_device(state, d.forward_floor(), [&] { d.forward(d.saved()); });
+  state.counters["pairs_per_pixel"] = d.pairs() / static_cast<double>(bench::frame_pixels);
+}
+
+void raster_backward_on_device(benchmark::State& state, SortOrder sort) {
+  if (bench::no_device(state)) return;
+  OnDevice d(sort);
+  bench::time_on_device(state, d.backward_floor(), [&] { d.backward(); });
+}
+
+BENCHMARK_CAPTURE(raster_forward_on_device, centre, SortOrder::centre)->Apply(bench::by_the_clock);
+BENCHMARK_CAPTURE(raster_forward_saved_on_device, centre, SortOrder::centre)->Apply(bench::by_the_clock);
+BENCHMARK_CAPTURE(raster_backward_on_device, centre, SortOrder::centre)->Apply(bench::by_the_clock);
+BENCHMARK_CAPTURE(raster_forward_saved_on_device, hit, SortOrder::hit)->Apply(bench::by_the_clock);
+BENCHMARK_CAPTURE(raster_backward_on_device, hit, SortOrder::hit)->Apply(bench::by_the_clock);
 
 }  // namespace
 }  // namespace traceflow::raster

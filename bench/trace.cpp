@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "math/spherical_harmonics.h"
+#include "on_device.h"
 #include "ops/trace/trace.h"
 #if defined(TRACEFLOW_EMBREE)
 #include "trace_embree.h"
@@ -12,22 +13,26 @@
 
 // The tracer on 100,000 surfels in a shell around a mirror ball, seen by the rays that the ball reflects into
 // a camera. On the CPU: one thread, CPU time, and where Embree is, it runs in the same program on the same
-// surfels and rays. On the CUDA device, where one answers: the time until all work is done.
+// surfels and rays. On the CUDA device, where one answers: the time until all work is done; and the same for
+// a frame whose pixels all reflect an environment of 75,000 surfels, with what it cannot do without.
 namespace traceflow {
 namespace {
-
-constexpr int64_t surfel_count = 100000;
 
 struct Setting {
   int sh_degree;
   double opacity_min, opacity_max;
+  int64_t surfels = 100000;
+  double scale = 0.092;
 };
 constexpr Setting faint{3, 0.05, 0.5};       // rays cross the whole shell
 constexpr Setting faint_flat{0, 0.05, 0.5};  // the same without SH
 constexpr Setting opaque{3, 0.3, 0.99};      // rays end early
+// About 24 blended hits a ray.
+constexpr Setting environment{3, 0.05, 0.5, bench::environment_surfels, 0.106};
 
 PosedSurfels make_shell(const Setting& setting) {
   Random random(1);
+  const int64_t surfel_count = setting.surfels;
   PosedSurfels s;
   s.position.resize({surfel_count, 3});
   s.scale.resize({surfel_count, 2});
@@ -37,7 +42,8 @@ PosedSurfels make_shell(const Setting& setting) {
   for (int64_t i = 0; i < surfel_count; ++i) {
     const Vec3<double> out = glm::normalize(Vec3<double>(random.normal(), random.normal(), random.normal()));
     store3(s.position.row(i), random.uniform(5, 8) * out);
-    for (int k = 0; k < 2; ++k) s.scale(i, k) = static_cast<float>(0.092 * std::exp(0.3 * random.normal()));
+    for (int k = 0; k < 2; ++k)
+      s.scale(i, k) = static_cast<float>(setting.scale * std::exp(0.3 * random.normal()));
     for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(random.normal());
     s.opacity[i] = static_cast<float>(random.uniform(setting.opacity_min, setting.opacity_max));
     for (int64_t k = 0; k < s.sh.row_size(); ++k) s.sh.row(i)[k] = static_cast<float>(0.1 * random.normal());
@@ -50,13 +56,14 @@ struct Rays {
 };
 
 // A camera at z = -4 looks at a ball of radius 1 whose surface is a little uneven; pixels in rows, as a
-// renderer has them.
-Rays reflect_off_ball(int size, double unevenness) {
+// renderer has them. The picture reaches as far as `half_width` from the ball's middle.
+Rays reflect_off_ball(int width, int height, double half_width, double unevenness) {
   Random random(2);
   std::vector<Vec3<double>> origins, directions;
-  for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x) {
-      const double px = 2 * (x + 0.5) / size - 1, py = 2 * (y + 0.5) / size - 1;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double px = half_width * (2 * (x + 0.5) / width - 1),
+                   py = half_width * (2 * (y + 0.5) / height - 1);
       if (px * px + py * py > 0.9) continue;
       const Vec3<double> point(px, py, -std::sqrt(1 - px * px - py * py));
       const Vec3<double> noise(random.normal(), random.normal(), random.normal());
@@ -74,6 +81,8 @@ Rays reflect_off_ball(int size, double unevenness) {
   }
   return rays;
 }
+
+Rays reflect_off_ball(int size, double unevenness) { return reflect_off_ball(size, size, 1, unevenness); }
 
 #if defined(TRACEFLOW_EMBREE)
 double cpu_seconds() {
@@ -199,10 +208,8 @@ BENCHMARK(build)->Unit(benchmark::kMillisecond)->Arg(1)->Arg(2)->MeasureProcessC
 // The same on the CUDA device; the argument is the picture's width, 1024 being 740,000 rays.
 class OnDevice {
  public:
-  OnDevice(const Setting& setting, double unevenness, int size) {
-    const PosedSurfels surfels = make_shell(setting);
-    const Rays rays = reflect_off_ball(size, unevenness);
-    surfels_ = surfels.on(Device::cuda);
+  OnDevice(const Setting& setting, const Rays& rays) {
+    surfels_ = make_shell(setting).on(Device::cuda);
     origins_ = rays.origins.on(Device::cuda);
     directions_ = rays.directions.on(Device::cuda);
     build();
@@ -216,12 +223,30 @@ class OnDevice {
   }
   void backward() { trace::backward(surfels_, origins_, directions_, {}, *saved_, grad_, gradient_); }
   int64_t rays() const { return origins_.dim(0); }
-  double hits_per_ray() const {
-    return static_cast<double>(trace::blended_hits(*saved_)) / static_cast<double>(rays());
-  }
+  double hits_per_ray() const { return hits() / static_cast<double>(rays()); }
   trace::Saved* saved() { return saved_.get(); }
 
+  // A disk's box and its place in the tree.
+  bench::Floor build_floor() const {
+    return {bench::bytes(surfels_.position, surfels_.scale, surfels_.rotation, surfels_.opacity), 0};
+  }
+  // A blended hit, by the formulas of math/: its place in the plane 30, its weight 10, its colour 96 and what
+  // is blended 10; backward the derivatives of all of them. Walks through the tree do not count.
+  bench::Floor forward_floor() const {
+    return {bench::bytes(surfels_) +
+                bench::bytes(origins_, directions_, output_.colour, output_.alpha, output_.distance),
+            146 * hits()};
+  }
+  bench::Floor backward_floor() const {
+    return {bench::bytes(surfels_) + bench::bytes(gradient_.surfels) +
+                bench::bytes(origins_, directions_, grad_.colour, grad_.alpha, grad_.distance) +
+                bench::bytes(gradient_.origins, gradient_.directions, gradient_.position_gradient),
+            400 * hits()};
+  }
+
  private:
+  double hits() const { return static_cast<double>(trace::blended_hits(*saved_)); }
+
   PosedSurfels surfels_;
   Tensor<float> origins_, directions_;
   trace::BvhPtr bvh_ = trace::make_bvh();
@@ -233,7 +258,7 @@ class OnDevice {
 
 template <class Step>
 void on_device(benchmark::State& state, const Setting& setting, double unevenness, Step&& step) {
-  OnDevice tracer(setting, unevenness, static_cast<int>(state.range(0)));
+  OnDevice tracer(setting, reflect_off_ball(static_cast<int>(state.range(0)), unevenness));
   for (auto _ : state) {
     step(tracer);
     cuda::synchronise();
@@ -275,6 +300,44 @@ void register_on_device(const std::string& name, const Step& step) {
   });
   return true;
 }();
+
+// A frame's pixels, all of which reflect.
+OnDevice frame_on_device() {
+  return {environment, reflect_off_ball(bench::frame_width, bench::frame_height, 0.67, 0)};
+}
+
+void trace_build_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice tracer = frame_on_device();
+  bench::time_on_device(state, tracer.build_floor(), [&] { tracer.build(); });
+}
+
+void trace_forward_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice tracer = frame_on_device();
+  bench::time_on_device(state, tracer.forward_floor(), [&] { tracer.forward(nullptr); });
+  state.counters["hits_per_ray"] = tracer.hits_per_ray();
+}
+
+void trace_forward_saved_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice tracer = frame_on_device();
+  bench::time_on_device(state, tracer.forward_floor(), [&] { tracer.forward(tracer.saved()); });
+}
+
+void trace_backward_on_device(benchmark::State& state, bool in_order) {
+  if (bench::no_device(state)) return;
+  OnDevice tracer = frame_on_device();
+  cuda::set_deterministic(in_order);
+  bench::time_on_device(state, tracer.backward_floor(), [&] { tracer.backward(); });
+  cuda::set_deterministic(false);
+}
+
+BENCHMARK(trace_build_on_device)->Apply(bench::by_the_clock);
+BENCHMARK(trace_forward_on_device)->Apply(bench::by_the_clock);
+BENCHMARK(trace_forward_saved_on_device)->Apply(bench::by_the_clock);
+BENCHMARK_CAPTURE(trace_backward_on_device, free, false)->Apply(bench::by_the_clock);
+BENCHMARK_CAPTURE(trace_backward_on_device, in_order, true)->Apply(bench::by_the_clock);
 
 }  // namespace
 }  // namespace traceflow

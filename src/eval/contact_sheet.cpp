@@ -60,8 +60,9 @@ Tensor<float> difference(const Tensor<float>& a, const Tensor<float>& b) {
 void ContactSheet::add(const Tensor<float>& photograph, const Frame& frame) {
   require(photograph.shape() == frame.colour.shape(), "photograph and render have one shape",
           photograph.shape().to_string() + " and " + frame.colour.shape().to_string());
-  std::vector<Tensor<uint8_t>> row = {to_8bit(photograph), to_8bit(frame.colour),
-                                      to_8bit(difference(photograph, frame.colour))};
+  const Tensor<float> render = layer_values(frame, Layer::rgb, 1);
+  std::vector<Tensor<uint8_t>> row = {to_8bit(photograph), to_8bit(render),
+                                      to_8bit(difference(photograph, render))};
   for (const Layer layer : shown_layers)
     row.push_back(in_colour(painter_.paint(layer, layer_values(frame, layer, 1))));
   for (Tensor<uint8_t>& cell : row) cell = shrink(cell, cell_width_);

@@ -13,6 +13,7 @@ class ContactSheet {
   // cell_width: columns of one picture, pixels.
   explicit ContactSheet(int64_t cell_width) : cell_width_(cell_width) {}
 
+  // photograph: on the host; the frame is on any device.
   void add(const Tensor<float>& photograph, const Frame& frame);
   // Written atomically. There must be a row.
   void write(const std::filesystem::path& path) const;

@@ -7,11 +7,9 @@ namespace traceflow::eval {
 
 namespace {
 
-Tensor<float> divided(const Tensor<float>& depth, double scale) {
-  Tensor<float> result(depth.shape());
-  std::transform(depth.data(), depth.data() + depth.size(), result.data(),
-                 [&](float z) { return static_cast<float>(z / scale); });
-  return result;
+Tensor<float> divided(Tensor<float> depth, double scale) {
+  for (float& z : depth.values()) z = static_cast<float>(z / scale);
+  return depth;
 }
 
 }  // namespace
@@ -40,23 +38,23 @@ std::vector<Layer> parse_layers(const std::string& list) {
 Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
   switch (layer) {
     case Layer::rgb:
-      return frame.colour;
+      return frame.colour.on(Device::cpu);
     case Layer::diffuse:
-      return frame.raster.colour;
+      return frame.raster.colour.on(Device::cpu);
     case Layer::specular:
-      return frame.specular_image();
+      return frame.specular_image().on(Device::cpu);
     case Layer::tint:
-      return frame.raster.tint;
+      return frame.raster.tint.on(Device::cpu);
     case Layer::alpha:
-      return frame.raster.alpha;
+      return frame.raster.alpha.on(Device::cpu);
     case Layer::normal:
-      return frame.raster.normal;
+      return frame.raster.normal.on(Device::cpu);
     case Layer::depth:
-      return divided(frame.raster.depth, scale);
+      return divided(frame.raster.depth.on(Device::cpu), scale);
     case Layer::median_depth:
-      return divided(frame.raster.median_depth, scale);
+      return divided(frame.raster.median_depth.on(Device::cpu), scale);
     case Layer::distortion:
-      return frame.raster.distortion;
+      return frame.raster.distortion.on(Device::cpu);
   }
   return {};
 }

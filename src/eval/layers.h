@@ -19,7 +19,7 @@ std::vector<Layer> parse_layers(const std::string& list);
 
 // The layer's numbers, H×W or H×W×3: colours; α_spec; alpha; normals in world axes as blended, not
 // renormalised; depths along the camera's z in units of 1/`scale` scene units, so that the capture's scale
-// gives the capture's units.
+// gives the capture's units. On the host, wherever the frame is.
 Tensor<float> layer_values(const Frame& frame, Layer layer, double scale);
 
 }  // namespace traceflow::eval

@@ -2,57 +2,73 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
-#include "base/parallel.h"
-#include "files/png.h"
-#include "math/types.h"
+#include "base/sums.h"
+#include "eval/metrics_kernels.h"
 #include "ops/loss/loss.h"
 
 namespace traceflow::eval {
 
 namespace {
 
-struct Sum {
-  double total = 0;
-  int64_t count = 0;
-  Sum& operator+=(const Sum& other) {
-    total += other.total;
-    count += other.count;
-    return *this;
-  }
-  std::optional<double> mean() const {
-    if (count == 0) return std::nullopt;
-    return total / static_cast<double>(count);
-  }
-};
+const uint8_t* address(const Tensor<uint8_t>& mask) { return mask.empty() ? nullptr : mask.data(); }
 
-bool counts(const Tensor<uint8_t>& mask, int64_t pixel) { return mask.empty() || mask[pixel] != 0; }
+// The sum of f(pixel), which the host waits for.
+template <class F>
+Sum sum_of(Device device, const char* description, int64_t pixels, const F& f) {
+  Tensor<Sum> kept({1}, device);
+  ordered_sum<Sum>(device, description, pixels, f, KeepSum{kept.data()}, pixels_per_sum);
+  return kept.on(Device::cpu)[0];
+}
 
-double angle_deg(const Vec3<double>& normal, const Vec3<double>& truth) {
-  const double length = std::sqrt(dot(normal, normal) * dot(truth, truth));
-  if (!(length > 0) || !std::isfinite(length)) return 90;
-  // atan2 of sine and cosine keeps small angles exact where acos of a rounded cosine does not.
-  const Vec3<double> sine = cross(normal, truth);
-  return std::atan2(std::sqrt(dot(sine, sine)), dot(normal, truth)) * 180 / std::numbers::pi;
+std::optional<double> mean_of(const Sum& sum) {
+  if (sum.count == 0) return std::nullopt;
+  return sum.total / static_cast<double>(sum.count);
+}
+
+// Empty tensors lie anywhere.
+template <class T>
+void require_beside(const Tensor<float>& picture, const Tensor<T>& other) {
+  require(other.empty() || other.device() == picture.device(), "a figure's pictures lie on one device");
+}
+
+Sum squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& mask) {
+  require(image.shape() == target.shape(), "image and target have one shape",
+          image.shape().to_string() + " and " + target.shape().to_string());
+  require_beside(image, target);
+  require_beside(image, mask);
+  return sum_of(image.device(), "metrics: psnr", image.size() / 3,
+                SquaredError{image.data(), target.data(), address(mask)});
+}
+
+std::optional<double> psnr_of(const Sum& squared_error) {
+  const std::optional<double> error = mean_of(squared_error);
+  if (!error || !(*error > 0) || !std::isfinite(*error)) return std::nullopt;
+  return -10 * std::log10(*error);
+}
+
+// A tensor on a device: itself where it is there, else a copy in `room`.
+template <class T>
+const Tensor<T>& brought(const Tensor<T>& tensor, Device device, Tensor<T>& room) {
+  if (tensor.empty() || tensor.device() == device) return tensor;
+  room = tensor.on(device);
+  return room;
+}
+
+Tensor<float> rounded(const Tensor<float>& image) {
+  Tensor<float> result;
+  result.place(image.device()).resize(image.shape());
+  parallel_for(image.device(), "metrics: round to 8 bit", image.size(),
+               RoundTo8Bit{image.data(), result.data()});
+  return result;
 }
 
 }  // namespace
 
 std::optional<double> psnr(const Tensor<float>& image, const Tensor<float>& target,
                            const Tensor<uint8_t>& mask) {
-  require(image.shape() == target.shape(), "image and target have one shape",
-          image.shape().to_string() + " and " + target.shape().to_string());
-  const Sum sum = ordered_sum<Sum>("metrics: psnr", image.size() / 3, [&](int64_t p) {
-    if (!counts(mask, p)) return Sum{};
-    const Vec3<double> difference =
-        load3<double>(image.data() + 3 * p) - load3<double>(target.data() + 3 * p);
-    return Sum{dot(difference, difference), 3};
-  });
-  const std::optional<double> error = sum.mean();
-  if (!error || !(*error > 0) || !std::isfinite(*error)) return std::nullopt;
-  return -10 * std::log10(*error);
+  return psnr_of(squared_error(image, target, mask));
 }
 
 std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<float>& truth,
@@ -60,19 +76,22 @@ std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<f
   if (truth.empty()) return std::nullopt;
   require(normal.shape() == truth.shape(), "normals and truth have one shape",
           normal.shape().to_string() + " and " + truth.shape().to_string());
-  return ordered_sum<Sum>("metrics: normals", truth.size() / 3,
-                          [&](int64_t p) {
-                            const auto expected = load3<double>(truth.data() + 3 * p);
-                            if (!counts(mask, p) || !(dot(expected, expected) > 0)) return Sum{};
-                            return Sum{angle_deg(load3<double>(normal.data() + 3 * p), expected), 1};
-                          })
-      .mean();
+  require_beside(normal, truth);
+  require_beside(normal, mask);
+  return mean_of(sum_of(normal.device(), "metrics: normals", truth.size() / 3,
+                        NormalError{normal.data(), truth.data(), address(mask)}));
 }
 
 Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
                 const lpips::Network* network) {
-  const Tensor<float> image = from_8bit(to_8bit(colour));
-  const Tensor<float> target = from_8bit(to_8bit(truth.colour));
+  const Device device = colour.device();
+  Tensor<float> colour_room, normal_room, true_normal_room;
+  Tensor<uint8_t> mask_room;
+  const Tensor<float> image = rounded(colour);
+  const Tensor<float> target = rounded(brought(truth.colour, device, colour_room));
+  const Tensor<float>& normals = brought(normal, device, normal_room);
+  const Tensor<float>& true_normals = brought(truth.normal, device, true_normal_room);
+  const Tensor<uint8_t>& mask = brought(truth.mask, device, mask_room);
   Metrics m;
   m.psnr = psnr(image, target, {});
   m.ssim = loss::ssim(image, target, {});
@@ -80,12 +99,12 @@ Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const 
     m.lpips = lpips::distance(*network, image, target, lpips::Input::defined);
     m.lpips_published = lpips::distance(*network, image, target, lpips::Input::published);
   }
-  m.normal_mae_deg = normal_mae_deg(normal, truth.normal, {});
-  const auto& mask = truth.mask.values();
-  if (std::any_of(mask.begin(), mask.end(), [](uint8_t v) { return v != 0; })) {
-    m.masked_psnr = psnr(image, target, truth.mask);
-    m.masked_ssim = loss::ssim(image, target, truth.mask);
-    m.masked_normal_mae_deg = normal_mae_deg(normal, truth.normal, truth.mask);
+  m.normal_mae_deg = normal_mae_deg(normals, true_normals, {});
+  const Sum masked = mask.empty() ? Sum{} : squared_error(image, target, mask);
+  if (masked.count > 0) {
+    m.masked_psnr = psnr_of(masked);
+    m.masked_ssim = loss::ssim(image, target, mask);
+    m.masked_normal_mae_deg = normal_mae_deg(normals, true_normals, mask);
   }
   return m;
 }
@@ -103,7 +122,7 @@ Metrics mean(const std::vector<Metrics>& views) {
   Metrics result;
   size_t next = 0;
   if (!sums.empty())
-    Metrics::visit(result, [&](const char*, std::optional<double>& value) { value = sums[next++].mean(); });
+    Metrics::visit(result, [&](const char*, std::optional<double>& value) { value = mean_of(sums[next++]); });
   return result;
 }
 

@@ -7,7 +7,7 @@
 #include "ops/lpips/lpips.h"
 
 // How near a rendered view comes to the photograph (method §8). Every figure is absent where it cannot be
-// had.
+// had. Figures are computed where the pictures are; the host waits for each, and reads nothing else.
 namespace traceflow::eval {
 
 struct Metrics {
@@ -45,14 +45,15 @@ std::optional<double> psnr(const Tensor<float>& image, const Tensor<float>& targ
 std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<float>& truth,
                                      const Tensor<uint8_t>& mask);
 
-// What a view is judged against. Tensors that the capture lacks are empty.
+// What a view is judged against, on any device. Tensors that the capture lacks are empty.
 struct Truth {
   const Tensor<float>& colour;
   const Tensor<uint8_t>& mask;
   const Tensor<float>& normal;
 };
 
-// All figures of one view. Colours are rounded to 8 bit first. network may be null: no LPIPS.
+// All figures of one view, computed where its colours are. Colours are rounded to 8 bit first. network may be
+// null: no LPIPS.
 Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
                 const lpips::Network* network);
 

@@ -190,19 +190,14 @@ void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels)
 Tensor<uint8_t> to_8bit(const Tensor<float>& image) {
   Tensor<uint8_t> result;
   result.resize(image.shape());
-  for (int64_t i = 0; i < image.size(); ++i) {
-    const float v = image[i];
-    const float shifted = v * 255.0F + 0.5F;
-    // A NaN fails both comparisons and becomes black.
-    result[i] = v >= 1.0F ? uint8_t{255} : v > 0.0F ? static_cast<uint8_t>(shifted) : uint8_t{0};
-  }
+  for (int64_t i = 0; i < image.size(); ++i) result[i] = to_8bit(image[i]);
   return result;
 }
 
 Tensor<float> from_8bit(const Tensor<uint8_t>& image) {
   Tensor<float> result;
   result.resize(image.shape());
-  for (int64_t i = 0; i < image.size(); ++i) result[i] = static_cast<float>(image[i]) / 255.0F;
+  for (int64_t i = 0; i < image.size(); ++i) result[i] = from_8bit(image[i]);
   return result;
 }
 

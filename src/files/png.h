@@ -4,6 +4,7 @@
 #include <span>
 
 #include "base/tensor.h"
+#include "files/eight_bit.h"
 
 namespace traceflow {
 
@@ -19,7 +20,7 @@ PngSize read_png_size(const std::filesystem::path& path);
 // pixels: H×W (grey) or H×W×C. Written atomically.
 void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels);
 
-// [0,1] ↔ 8 bit, rounding to nearest and clamping (method §8).
+// Whole images, on the host.
 Tensor<uint8_t> to_8bit(const Tensor<float>& image);
 Tensor<float> from_8bit(const Tensor<uint8_t>& image);
 

@@ -1,0 +1,66 @@
+#include "field_work.h"
+#include "on_device.h"
+#include "ops/optimize/adam.h"
+
+// A step of Adam on the CUDA device: all groups of a set of surfels, and a field's parameters.
+namespace traceflow {
+namespace {
+
+// Parameters, their gradients and moments, group by group.
+class OnDevice {
+ public:
+  void add(const Tensor<float>& parameter) {
+    const Shape& shape = parameter.shape();
+    groups_.push_back({parameter,
+                       bench::noise_on_device(shape, -1, 1, groups_.size()),
+                       {Tensor<float>(shape, Device::cuda), Tensor<float>(shape, Device::cuda), 0}});
+    floor_bytes_ += 7 * bench::bytes(parameter);  // parameter and moments come and go, the gradient comes
+    numbers_ += static_cast<double>(parameter.size());
+  }
+  void step() {
+    const float rate = 1e-3F;
+    for (size_t k = 0; k < groups_.size(); ++k) {
+      Group& g = groups_[k];
+      optimize::adam_step(g.parameter, g.gradient, g.state, std::span<const float>(&rate, 1), {},
+                          {notes_, static_cast<int64_t>(k)});
+    }
+  }
+  // Twelve operations a number, by count.
+  bench::Floor floor() const { return {floor_bytes_, 12 * numbers_}; }
+  void make_notes() {
+    notes_ = Tensor<optimize::LeftAlone>({static_cast<int64_t>(groups_.size())}, Device::cuda);
+  }
+
+ private:
+  struct Group {
+    Tensor<float> parameter, gradient;
+    optimize::AdamState state;
+  };
+  std::vector<Group> groups_;
+  Tensor<optimize::LeftAlone> notes_;
+  double floor_bytes_ = 0, numbers_ = 0;
+};
+
+void adam_surfels_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice d;
+  bench::surfels_on_device(state.range(0), state.range(0) == bench::main_surfels, 1)
+      .for_each([&](const char*, const Tensor<float>& group) { d.add(group); });
+  d.make_notes();
+  bench::time_on_device(state, d.floor(), [&] { d.step(); });
+}
+BENCHMARK(adam_surfels_on_device)->Apply(bench::both_sets);
+
+void adam_field_on_device(benchmark::State& state) {
+  if (bench::no_device(state)) return;
+  OnDevice d;
+  bench::trained_field(NetworkOptions{}.width)
+      .on(Device::cuda)
+      .for_each([&](const std::string&, const Tensor<float>& group) { d.add(group); });
+  d.make_notes();
+  bench::time_on_device(state, d.floor(), [&] { d.step(); });
+}
+BENCHMARK(adam_field_on_device)->Apply(bench::by_the_clock);
+
+}  // namespace
+}  // namespace traceflow

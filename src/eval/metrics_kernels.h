@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "files/eight_bit.h"
+#include "math/types.h"
+
+// The figures' steps: one pixel or number each, which return what it adds to the sum (method §8).
+namespace traceflow::eval {
+
+inline constexpr int64_t pixels_per_sum = 4096;
+
+// A sum over the pixels that count, and how many numbers that was.
+struct Sum {
+  double total = 0;
+  int64_t count = 0;
+  TRACEFLOW_HD Sum& operator+=(const Sum& other) {
+    total += other.total;
+    count += other.count;
+    return *this;
+  }
+};
+
+struct KeepSum {
+  Sum* kept;
+  TRACEFLOW_HD void operator()(const Sum& sum) const { *kept = sum; }
+};
+
+// mask null: every pixel counts.
+TRACEFLOW_HD inline bool counts(const uint8_t* mask, int64_t pixel) {
+  return mask == nullptr || mask[pixel] != 0;
+}
+
+struct RoundTo8Bit {
+  const float* from;
+  float* to;
+
+  TRACEFLOW_HD void operator()(int64_t i) const { to[i] = from_8bit(to_8bit(from[i])); }
+};
+
+struct SquaredError {
+  const float *image, *target;
+  const uint8_t* mask;
+
+  TRACEFLOW_HD Sum operator()(int64_t pixel) const {
+    if (!counts(mask, pixel)) return {};
+    const Vec3<double> difference = load3<double>(image + 3 * pixel) - load3<double>(target + 3 * pixel);
+    return {dot(difference, difference), 3};
+  }
+};
+
+// Between directions of any length; 90 where one has none.
+TRACEFLOW_HD inline double angle_deg(const Vec3<double>& normal, const Vec3<double>& truth) {
+  const double length = std::sqrt(dot(normal, normal) * dot(truth, truth));
+  if (!(length > 0) || !std::isfinite(length)) return 90;
+  // atan2 of sine and cosine keeps small angles exact where acos of a rounded cosine does not.
+  const Vec3<double> sine = cross(normal, truth);
+  return std::atan2(std::sqrt(dot(sine, sine)), dot(normal, truth)) * 180 / std::numbers::pi;
+}
+
+struct NormalError {
+  const float *normal, *truth;
+  const uint8_t* mask;
+
+  TRACEFLOW_HD Sum operator()(int64_t pixel) const {
+    const auto expected = load3<double>(truth + 3 * pixel);
+    if (!counts(mask, pixel) || !(dot(expected, expected) > 0)) return {};
+    return {angle_deg(load3<double>(normal + 3 * pixel), expected), 1};
+  }
+};
+
+}  // namespace traceflow::eval
