@@ -1,8 +1,8 @@
 #include <cstddef>
 
+#include "base/products.h"
 #include "math/bf16.h"
 #include "on_device.h"
-#include "ops/field/products_cuda.h"
 
 // What the CUDA device can do, measured: copies within its memory, matrix products, and how soon one small
 // piece of work follows another. The floors of the other benchmarks' calls rest on it (scripts/floors).
@@ -30,18 +30,18 @@ void start_on_device(benchmark::State& state) {
 BENCHMARK(start_on_device)->Apply(bench::by_the_clock);
 
 // The one place that knows the product's name. C = A·Bᵀ, as layers have it.
-void multiply(int64_t m, int64_t n, int64_t k, field::Number number, const Tensor<std::byte>& a,
+void multiply(int64_t m, int64_t n, int64_t k, Number number, const Tensor<std::byte>& a,
               const Tensor<std::byte>& b, Tensor<std::byte>& c) {
-  field::cuda::multiply({.m = m,
-                         .k = k,
-                         .n = n,
-                         .transposed_b = true,
-                         .stride_a = k,
-                         .stride_b = k,
-                         .stride_c = n,
-                         .operands = number,
-                         .result = number},
-                        {.a = a.data(), .b = b.data(), .c = c.data()});
+  cuda::multiply({.m = m,
+                  .k = k,
+                  .n = n,
+                  .transposed_b = true,
+                  .stride_a = k,
+                  .stride_b = k,
+                  .stride_c = n,
+                  .operands = number,
+                  .result = number},
+                 {.a = a.data(), .b = b.data(), .c = c.data()});
 }
 
 // Uniform in [-1, 1), since zeros would be multiplied faster.
@@ -57,7 +57,7 @@ Tensor<std::byte> random_operand(int64_t numbers, uint64_t seed) {
 }
 
 template <class T>
-void time_product(benchmark::State& state, field::Number number) {
+void time_product(benchmark::State& state, Number number) {
   const int64_t m = state.range(1), n = state.range(2), k = state.range(3);
   const Tensor<std::byte> a = random_operand<T>(m * k, 1), b = random_operand<T>(n * k, 2);
   Tensor<std::byte> c({m * n * static_cast<int64_t>(sizeof(T))}, Device::cuda);
@@ -71,9 +71,9 @@ void time_product(benchmark::State& state, field::Number number) {
 void product_on_device(benchmark::State& state) {
   if (bench::no_device(state)) return;
   if (state.range(0) == 16) {
-    time_product<Bf16>(state, field::Number::bf16);
+    time_product<Bf16>(state, Number::bf16);
   } else {
-    time_product<float>(state, field::Number::fp32);
+    time_product<float>(state, Number::fp32);
   }
 }
 BENCHMARK(product_on_device)

@@ -51,11 +51,11 @@ Device DeviceArguments::choose(bool quiet) const {
   }
   if (!quiet) {
     const std::string reason = asked == "auto" ? "it answers" : "asked for with --device cuda";
-    fmt::print(stderr, "{}\n",
-               cuda ? fmt::format("device: cuda, {}; {}", cuda_text(), reason)
-                    : fmt::format("device: cpu, {} thread{}; {}", thread_count(),
-                                  thread_count() == 1 ? "" : "s",
-                                  asked == "auto" ? "no CUDA: " + why_not : why_not));
+    fmt::print(
+        stderr, "{}\n",
+        cuda ? fmt::format("device: cuda, {}; {}", cuda_text(), reason)
+             : fmt::format("device: cpu, {} thread{}; {}", thread_count(), thread_count() == 1 ? "" : "s",
+                           asked == "auto" ? "no CUDA: " + why_not : why_not));
   }
   return cuda ? Device::cuda : Device::cpu;
 }

@@ -17,9 +17,7 @@ const Field* field_if(const std::optional<Field>& field, bool wanted) {
 
 int stored_degree(const Surfels& surfels) { return surfels.count() > 0 ? sh_degree(surfels.sh.dim(1)) : 0; }
 
-StoredRow stored_row(const Frame& frame) {
-  return {frame.subset.empty() ? nullptr : frame.subset.data()};
-}
+StoredRow stored_row(const Frame& frame) { return {frame.subset.empty() ? nullptr : frame.subset.data()}; }
 
 // Leaves the largest distance between posed and stored positions in the frame.
 void find_reach(const Surfels& stored, Frame& frame) {
@@ -95,8 +93,7 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   if (field) find_reach(scene.main, frame_);
 
   // Draw them.
-  raster::forward(frame_.main, request.camera, raster_options, frame_.raster,
-                  keep_for_backward ? raster_saved_.get() : nullptr);
+  raster::forward(frame_.main, request.camera, raster_options, frame_.raster, raster_saved_.get());
   if (request.pseudo_normals) {
     surface::pseudo_normals(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                             frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
@@ -212,9 +209,8 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
     trace::backward(frame_.environment, origins_, directions_, options_.trace_options(scene.extent),
                     *trace_saved_, grad_trace_, grad_trace_input_);
     gradient.environment_signal = grad_trace_input_.position_gradient;
-    parallel_for(
-        scene.device(), "render: flag signals", frame_.environment.count(),
-        FlagNonZero{gradient.environment_signal.data(), gradient.environment_visible.data()});
+    parallel_for(scene.device(), "render: flag signals", frame_.environment.count(),
+                 FlagNonZero{gradient.environment_signal.data(), gradient.environment_visible.data()});
     if (trainable.environment) {
       deform::backward(scene.environment, field, request.time, {}, frame_.environment, environment_saved_,
                        grad_trace_input_.surfels, gradient.environment,

@@ -38,12 +38,9 @@ Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, b
 }
 
 Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
-  Surfels result{edited_rows(surfels.position, edit, false),
-                 edited_rows(surfels.log_scale, edit, false),
-                 edited_rows(surfels.rotation, edit, false),
-                 edited_rows(surfels.opacity_logit, edit, false),
-                 edited_rows(surfels.sh, edit, false),
-                 {}};
+  Surfels result{edited_rows(surfels.position, edit, false), edited_rows(surfels.log_scale, edit, false),
+                 edited_rows(surfels.rotation, edit, false), edited_rows(surfels.opacity_logit, edit, false),
+                 edited_rows(surfels.sh, edit, false),       {}};
   if (surfels.has_tint()) result.tint_logit = edited_rows(surfels.tint_logit, edit, false);
   return result;
 }

@@ -41,8 +41,8 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
                                                         int64_t cap, bool& at_cap) const {
   Tensor<float> fetched[4];
   const Tensor<float>&log_scale = on_host(surfels.log_scale, fetched[0]),
-               &opacity_logit = on_host(surfels.opacity_logit, fetched[1]), &sum = on_host(sum_, fetched[2]),
-               &seen = on_host(seen_, fetched[3]);
+        &opacity_logit = on_host(surfels.opacity_logit, fetched[1]), &sum = on_host(sum_, fetched[2]),
+        &seen = on_host(seen_, fetched[3]);
   const auto mean_signal = [&](int64_t i) { return seen[i] > 0 ? sum[i] / seen[i] : 0; };
   const int64_t count = surfels.count();
   const float faint = std::log(options_.prune_opacity / (1 - options_.prune_opacity));

@@ -16,9 +16,15 @@ Json to_json(const events::SurfelCounts& counts) {
 }
 
 Json to_json(const events::Started& e) {
-  return {{"event", "started"},       {"capture", e.capture},         {"run", e.run.string()},
-          {"iteration", e.iteration}, {"iterations", e.iterations},   {"device", e.device},
-          {"threads", e.threads},     {"seed", e.seed},               {"surfels", to_json(e.surfels)},
+  return {{"event", "started"},
+          {"capture", e.capture},
+          {"run", e.run.string()},
+          {"iteration", e.iteration},
+          {"iterations", e.iterations},
+          {"device", e.device},
+          {"threads", e.threads},
+          {"seed", e.seed},
+          {"surfels", to_json(e.surfels)},
           {"forecast_bytes", e.forecast_bytes}};
 }
 

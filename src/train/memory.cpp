@@ -78,9 +78,9 @@ int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t
 
 int64_t memory_budget_bytes(const TrainOptions& options, Device device) {
   if (options.memory_budget > 0) return options.memory_budget * mebibyte;
-  const int64_t available = device == Device::cuda ? static_cast<int64_t>(cuda::facts().free_bytes)
-                                                   : static_cast<int64_t>(sysconf(_SC_AVPHYS_PAGES)) *
-                                                         sysconf(_SC_PAGESIZE);
+  const int64_t available = device == Device::cuda
+                                ? static_cast<int64_t>(cuda::facts().free_bytes)
+                                : static_cast<int64_t>(sysconf(_SC_AVPHYS_PAGES)) * sysconf(_SC_PAGESIZE);
   return available / 4 * 3;
 }
 

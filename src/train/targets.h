@@ -11,8 +11,8 @@ namespace traceflow {
 // The photographs that training compares with, where the scene is.
 class Targets {
  public:
-  // On the CUDA device the first views up to the limit stay there, small as the capture keeps them: views come
-  // in random order, so that dropping one for another would save nothing.
+  // On the CUDA device the first views up to the limit stay there, small as the capture keeps them: views
+  // come in random order, so that dropping one for another would save nothing.
   Targets(Device device, int64_t limit_bytes) : device_(device), limit_bytes_(limit_bytes) {}
 
   // Stands until the next call.

@@ -143,9 +143,8 @@ LossTerms Trainer::step() {
   const Frame& frame = renderer_.forward(scene_, request, true);
   grad_frame_.main_position.place(device_).resize({0});
   grad_rest_.place(device_).resize({0});
-  evaluate_objective(frame, target, options_.loss,
-                     schedule_.uses_normal_losses(iteration_) && trainable.main, grad_frame_, means_,
-                     schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
+  evaluate_objective(frame, target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main,
+                     grad_frame_, means_, schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
   non_finite_ = {};
@@ -190,7 +189,8 @@ void Trainer::control_density(int done) {
   };
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
-    tell(main_density_.update(scene_.main, optimiser_.main(), size_of_scene(), memory_.caps.main, random_), reset);
+    tell(main_density_.update(scene_.main, optimiser_.main(), size_of_scene(), memory_.caps.main, random_),
+         reset);
     bonds_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
@@ -236,8 +236,8 @@ events::Finished Trainer::finish(events::Ending ending, const std::string& reaso
 
 events::Finished Trainer::run(const std::atomic<bool>& stop) {
   stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations,
-                               std::string(name_of(device_)), thread_count(), static_cast<uint64_t>(options_.seed),
-                               counts(), memory_.forecast_bytes});
+                               std::string(name_of(device_)), thread_count(),
+                               static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes});
   for (const std::string& warning : capture_.warnings) stream_.emit(events::Warning{iteration_, warning});
   if (memory_.caps.lowered) {
     stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(memory_.caps.main) +

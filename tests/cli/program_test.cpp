@@ -3,11 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <vector>
 
 #include "base/parallel.h"
 #include "cli/error_boundary.h"
+#include "files/npy.h"
+#include "scene/ply.h"
 
 namespace traceflow::cli {
 namespace {
@@ -64,6 +69,29 @@ TEST(Program, ArgumentsThatCannotBeUsedAreOneLineAndCode2) {
     EXPECT_THAT(o.err, testing::StartsWith("traceflow: "));
     EXPECT_EQ(o.out, "");
   }
+}
+
+// This test's program is linked without the CUDA code.
+TEST(Program, CudaWhereThereIsNoneIsOneLineAndAutoSaysWhatRuns) {
+  const auto folder = std::filesystem::path(testing::TempDir()) / ("no_cuda_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  const std::string ply = (folder / "one.ply").string(), rays = (folder / "rays.npy").string(),
+                    output = (folder / "out").string();
+  Surfels surfels{Tensor<float>({1, 3}), Tensor<float>({1, 2}),    Tensor<float>({1, 4}),
+                  Tensor<float>({1}),    Tensor<float>({1, 1, 3}), Tensor<float>()};
+  surfels.rotation(0, 0) = 1;
+  write_ply(ply, {surfels, {}});
+  write_npy(rays, Tensor<float>({1, 6}));
+  const Outcome refused =
+      run_with({"trace", ply.c_str(), "--rays", rays.c_str(), "-o", output.c_str(), "--device", "cuda"});
+  EXPECT_EQ(refused.code, exit_input);
+  EXPECT_EQ(lines(refused.err), 1) << refused.err;
+  EXPECT_THAT(refused.err, HasSubstr("built without CUDA"));
+  const Outcome taken = run_with({"trace", ply.c_str(), "--rays", rays.c_str(), "-o", output.c_str()});
+  EXPECT_EQ(taken.code, exit_done);
+  EXPECT_THAT(taken.err, HasSubstr("device: cpu, "));
+  EXPECT_THAT(taken.err, HasSubstr("no CUDA: this program was built without CUDA"));
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Program, WithoutAVerbShowsTheHelpAndFails) {

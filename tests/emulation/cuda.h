@@ -44,11 +44,13 @@ namespace traceflow::emulation {
 template <class T>
 struct Lanes {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= lane_bytes);
-  Lanes(unsigned mask, T mine) {
-    WarpValues values = warp_exchange(mask, &mine, sizeof(T));
-    for (int lane = 0; lane < warp_size; ++lane) std::memcpy(&value[lane], values.lane[lane], sizeof(T));
+  Lanes(unsigned mask, T mine) : values(warp_exchange(mask, &mine, sizeof(T))) {}
+  T operator[](int lane) const {
+    T value;
+    std::memcpy(&value, values.lane[lane], sizeof(T));
+    return value;
   }
-  T value[warp_size];
+  const WarpValues& values;
 };
 
 inline int lane() { return current().lane; }
@@ -59,34 +61,34 @@ template <class T>
 T __shfl_sync(unsigned mask, T value, int from, int width = 32) {
   const traceflow::emulation::Lanes<T> all(mask, value);
   const int base = traceflow::emulation::lane() / width * width;
-  return all.value[base + (from & (width - 1))];
+  return all[base + (from & (width - 1))];
 }
 template <class T>
 T __shfl_xor_sync(unsigned mask, T value, int with, int width = 32) {
   const traceflow::emulation::Lanes<T> all(mask, value);
   const int lane = traceflow::emulation::lane();
   const int other = lane ^ with;
-  return other / width == lane / width ? all.value[other] : value;
+  return other / width == lane / width ? all[other] : value;
 }
 template <class T>
 T __shfl_up_sync(unsigned mask, T value, unsigned by, int width = 32) {
   const traceflow::emulation::Lanes<T> all(mask, value);
   const int lane = traceflow::emulation::lane();
   const int other = lane - static_cast<int>(by);
-  return other >= lane / width * width ? all.value[other] : value;
+  return other >= lane / width * width ? all[other] : value;
 }
 template <class T>
 T __shfl_down_sync(unsigned mask, T value, unsigned by, int width = 32) {
   const traceflow::emulation::Lanes<T> all(mask, value);
   const int lane = traceflow::emulation::lane();
   const int other = lane + static_cast<int>(by);
-  return other < (lane / width + 1) * width ? all.value[other] : value;
+  return other < (lane / width + 1) * width ? all[other] : value;
 }
 inline unsigned __ballot_sync(unsigned mask, int predicate) {
   const traceflow::emulation::Lanes<int> all(mask, predicate);
   unsigned bits = 0;
   for (int lane = 0; lane < 32; ++lane) {
-    if ((mask >> lane & 1U) != 0 && all.value[lane] != 0) bits |= 1U << lane;
+    if ((mask >> lane & 1U) != 0 && all[lane] != 0) bits |= 1U << lane;
   }
   return bits;
 }
@@ -96,7 +98,7 @@ inline unsigned __match_any_sync(unsigned mask, unsigned value) {
   const traceflow::emulation::Lanes<unsigned> all(mask, value);
   unsigned bits = 0;
   for (int lane = 0; lane < 32; ++lane) {
-    if ((mask >> lane & 1U) != 0 && all.value[lane] == value) bits |= 1U << lane;
+    if ((mask >> lane & 1U) != 0 && all[lane] == value) bits |= 1U << lane;
   }
   return bits;
 }

@@ -19,10 +19,13 @@ namespace {
 class Region {
  public:
   Region() {
-    void* const memory =
-        mmap(nullptr, region_bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    // Every kernel opens and closes all that is used, which takes as long as there are pages.
+    void* const memory = mmap(nullptr, region_bytes + huge_page, PROT_NONE,
+                              MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
     require(memory != MAP_FAILED, "the emulated device has memory");
-    begin_ = static_cast<std::byte*>(memory);
+    const auto address = reinterpret_cast<uintptr_t>(memory);
+    begin_ = static_cast<std::byte*>(memory) + (huge_page - address % huge_page) % huge_page;
+    madvise(begin_, region_bytes, MADV_HUGEPAGE);
   }
 
   // First fit.
@@ -38,7 +41,7 @@ class Region {
     blocks_[place] = size;
     allocated_ += size;
     const DeviceAccess access;
-    used_ = std::max(used_, place + size);
+    used_ = std::max(used_, (place + size + huge_page - 1) / huge_page * huge_page);
     protect(PROT_READ | PROT_WRITE);
     std::memset(begin_ + place, 0xff, size);
     return begin_ + place;
@@ -60,7 +63,7 @@ class Region {
 
  private:
   static constexpr size_t region_bytes = size_t{4} << 30;
-  static constexpr size_t page = 4096;
+  static constexpr size_t page = 4096, huge_page = size_t{2} << 20;
 
   void protect(int access) {
     if (used_ > 0)

@@ -4,9 +4,10 @@
 #include <functional>
 
 // Runs a CUDA grid on the host: blocks one after the other, the threads of a block as fibers that change
-// places at barriers and warp-wide operations, in an order that is shuffled each time, so that a barrier that
-// is missing shows. What a device leaves undefined ends the program with a message: lanes that disagree about
-// a mask, a barrier that some threads wait at while others have no way to reach it.
+// places at barriers and warp-wide operations, warps and the lanes of each in an order that is shuffled each
+// time, so that a barrier that is missing shows. What a device leaves undefined ends the program with a
+// message: lanes that disagree about a mask, a barrier that some threads wait at while others have no way to
+// reach it.
 namespace traceflow::emulation {
 
 inline constexpr int warp_size = 32;
@@ -39,7 +40,8 @@ void warp_barrier(unsigned mask);
 struct WarpValues {
   std::byte lane[warp_size][lane_bytes];
 };
-// Brings one value a lane of `mask`, and returns those of all when all have come.
-WarpValues warp_exchange(unsigned mask, const void* value, size_t bytes);
+// Brings one value a lane of `mask`, and returns those of all when all have come. They stand until the lane's
+// next exchange.
+const WarpValues& warp_exchange(unsigned mask, const void* value, size_t bytes);
 
 }  // namespace traceflow::emulation

@@ -63,7 +63,8 @@ inline TrainOptions small_run(int iterations) {
   return o;
 }
 
-inline Trainer make_trainer(const TrainOptions& options, const std::string& name, Device device = Device::cpu) {
+inline Trainer make_trainer(const TrainOptions& options, const std::string& name,
+                            Device device = Device::cpu) {
   const fs::path run = fs::path(::testing::TempDir()) / (name + "_" + std::to_string(::getpid()));
   fs::remove_all(run);
   return Trainer(options, load_capture(capture_folder(), options.capture), run, device);

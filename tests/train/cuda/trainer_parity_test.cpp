@@ -12,9 +12,17 @@ class TrainerOnDevice : public traceflow::testing::OnDevice {
   }
 };
 
-std::vector<double> losses(Trainer& trainer, int iterations) {
-  std::vector<double> curve;
-  for (int i = 0; i < iterations; ++i) curve.push_back(trainer.step().total);
+struct Curve {
+  std::vector<double> loss, l1;
+};
+
+Curve train(Trainer& trainer, int iterations) {
+  Curve curve;
+  for (int i = 0; i < iterations; ++i) {
+    const LossTerms terms = trainer.step();
+    curve.loss.push_back(terms.total);
+    curve.l1.push_back(terms.l1);
+  }
   return curve;
 }
 
@@ -37,13 +45,16 @@ TEST_F(TrainerOnDevice, TwoHundredIterationsFollowTheCpusCurve) {
   options.schedule.joint_from = 60;
   Trainer on_cpu = make_trainer(options, "curve_cpu"),
           on_cuda = make_trainer(options, "curve_cuda", Device::cuda);
-  const std::vector<double> expected = losses(on_cpu, 200), found = losses(on_cuda, 200);
-  for (size_t i = 0; i < 10; ++i) EXPECT_NEAR(found[i], expected[i], 1e-3 * expected[i]) << i;
-  for (size_t i = 0; i < 200; i += 20) {
-    EXPECT_NEAR(mean_of(found, i, i + 20), mean_of(expected, i, i + 20), 0.05 * mean_of(expected, i, i + 20))
-        << "from " << i;
+  const Curve expected = train(on_cpu, 200), found = train(on_cuda, 200);
+  for (size_t i = 0; i < 10; ++i) EXPECT_NEAR(found.loss[i], expected.loss[i], 1e-3 * expected.loss[i]) << i;
+  for (const auto curve : {&Curve::loss, &Curve::l1}) {
+    for (size_t i = 0; i < 200; i += 20) {
+      const double mean = mean_of(expected.*curve, i, i + 20);
+      EXPECT_NEAR(mean_of(found.*curve, i, i + 20), mean, 0.05 * mean) << "from " << i;
+    }
   }
-  EXPECT_LT(mean_of(found, 180, 200), 0.8 * mean_of(found, 0, 20));
+  // More terms join the loss on the way; the photographs' own falls.
+  EXPECT_LT(mean_of(found.l1, 180, 200), 0.9 * mean_of(found.l1, 0, 20));
   EXPECT_NEAR(static_cast<double>(on_cuda.scene().main.count()),
               static_cast<double>(on_cpu.scene().main.count()),
               0.1 * static_cast<double>(on_cpu.scene().main.count()));
@@ -51,7 +62,7 @@ TEST_F(TrainerOnDevice, TwoHundredIterationsFollowTheCpusCurve) {
 
 TEST_F(TrainerOnDevice, SumsInAFixedOrderGiveTheSameBytesAlsoWhenInterrupted) {
   cuda::set_deterministic(true);
-  const TrainOptions options = small_run(40);
+  const TrainOptions options = small_run(26);
   Trainer whole = make_trainer(options, "whole_cuda", Device::cuda);
   EXPECT_EQ(whole.run(never).ending, events::Ending::completed);
 
@@ -59,7 +70,7 @@ TEST_F(TrainerOnDevice, SumsInAFixedOrderGiveTheSameBytesAlsoWhenInterrupted) {
   std::atomic<bool> stop{false};
   first.stream().listen([&](const events::Event& event) {
     const auto* step = std::get_if<events::Step>(&event);
-    if (step != nullptr && step->iteration == 23) stop = true;
+    if (step != nullptr && step->iteration == 15) stop = true;
   });
   EXPECT_EQ(first.run(stop).ending, events::Ending::interrupted);
   const fs::path run = fs::path(::testing::TempDir()) / ("parts_cuda_" + std::to_string(::getpid()));
@@ -70,14 +81,14 @@ TEST_F(TrainerOnDevice, SumsInAFixedOrderGiveTheSameBytesAlsoWhenInterrupted) {
 }
 
 TEST_F(TrainerOnDevice, ARunGoesOnOnTheOtherDevice) {
-  const TrainOptions options = small_run(40);
+  const TrainOptions options = small_run(24);
   for (const Device from : {Device::cpu, Device::cuda}) {
     const Device to = from == Device::cpu ? Device::cuda : Device::cpu;
     Trainer first = make_trainer(options, "moves", from);
     std::atomic<bool> stop{false};
     first.stream().listen([&](const events::Event& event) {
       const auto* step = std::get_if<events::Step>(&event);
-      if (step != nullptr && step->iteration == 20) stop = true;
+      if (step != nullptr && step->iteration == 18) stop = true;
     });
     first.run(stop);
     const fs::path run = fs::path(::testing::TempDir()) / ("moves_" + std::to_string(::getpid()));
@@ -92,7 +103,7 @@ TEST_F(TrainerOnDevice, ARunGoesOnOnTheOtherDevice) {
 // The budget ends at another point of an iteration each time; wherever that is, what was learnt is saved, and
 // a run with more memory goes on from there.
 TEST_F(TrainerOnDevice, RunningOutOfMemoryEndsInASavedState) {
-  const TrainOptions options = small_run(30);
+  const TrainOptions options = small_run(20);
   for (const size_t more : {size_t{0}, size_t{20000}, size_t{60000}, size_t{200000}}) {
     Trainer trainer = make_trainer(options, "memory", Device::cuda);
     trainer.stream().listen([&](const events::Event& event) {
@@ -114,7 +125,7 @@ TEST_F(TrainerOnDevice, RunningOutOfMemoryEndsInASavedState) {
 }
 
 TEST_F(TrainerOnDevice, TheForecastCoversWhatARunTakes) {
-  const TrainOptions options = small_run(40);
+  const TrainOptions options = small_run(24);
   const size_t before = memory::device_bytes();
   int64_t forecast = 0;
   size_t most = 0;
