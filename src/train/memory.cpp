@@ -93,19 +93,25 @@ MemoryPlan plan_memory(const MemorySetting& run) {
   plan.image_bytes = o.capture.cache_mebibytes * mebibyte;
   const int64_t main = o.density.max_surfels;
   const int64_t environment = traced ? o.environment_density.max_surfels : 0;
-  const int64_t fixed = forecast_bytes(run, plan.kept, 0, 0);
-  const int64_t wanted = forecast_bytes(run, plan.kept, main, environment) - fixed;
-  const int64_t room = plan.budget_bytes - fixed;
-  if (room <= 0) {
+  if (const int64_t fixed = forecast_bytes(run, plan.kept, 0, 0); fixed >= plan.budget_bytes) {
     throw InputError("option", "memory_budget", number_text(plan.budget_bytes / mebibyte) + " MiB",
                      "more than " + number_text(fixed / mebibyte) + " MiB for images of this size",
                      "raise it, use --downscale, or lower capture.cache_mebibytes");
   }
-  plan.caps = {main, environment, wanted > room};
-  if (plan.caps.lowered) {
-    const double share = static_cast<double>(room) / static_cast<double>(wanted);
-    plan.caps.main = static_cast<int64_t>(share * static_cast<double>(main));
-    plan.caps.environment = static_cast<int64_t>(share * static_cast<double>(environment));
+  const auto caps = [&](double share) {
+    return SurfelCaps{static_cast<int64_t>(share * static_cast<double>(main)),
+                      static_cast<int64_t>(share * static_cast<double>(environment)), share < 1};
+  };
+  const auto fits = [&](const SurfelCaps& sizes) {
+    return forecast_bytes(run, plan.kept, sizes.main, sizes.environment) <= plan.budget_bytes;
+  };
+  plan.caps = caps(1);
+  if (!fits(plan.caps)) {
+    // What is kept only up to a limit makes the forecast bend, so that the share is searched for.
+    double low = 0, high = 1;
+    constexpr int halvings = 24;
+    for (int i = 0; i < halvings; ++i) (fits(caps((low + high) / 2)) ? low : high) = (low + high) / 2;
+    plan.caps = caps(low);
   }
   plan.forecast_bytes = forecast_bytes(run, plan.kept, plan.caps.main, plan.caps.environment);
   return plan;

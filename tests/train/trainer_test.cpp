@@ -183,11 +183,11 @@ TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {
   options.memory_budget = 1 << 20;
   EXPECT_FALSE(plan_memory(run).caps.lowered);
   EXPECT_EQ(plan_memory(run).caps.main, options.density.max_surfels);
-  options.memory_budget = 3000;
+  options.memory_budget = 2500;
   const MemoryPlan plan = plan_memory(run);
   EXPECT_TRUE(plan.caps.lowered);
   EXPECT_GT(plan.caps.main, 10000);
-  EXPECT_LE(plan.forecast_bytes, int64_t{3000} << 20);
+  EXPECT_LE(plan.forecast_bytes, int64_t{2500} << 20);
   options.memory_budget = 10;
   EXPECT_THROW(plan_memory(run), InputError);
 }
