@@ -28,4 +28,15 @@ void ordered_sum(Device device, const char* description, int64_t n, const F& f, 
   sum(description, n, f, finish);
 }
 
+// A sum, and over how many.
+struct CountedSum {
+  double sum = 0;
+  int64_t count = 0;
+  TRACEFLOW_HD CountedSum& operator+=(const CountedSum& other) {
+    sum += other.sum;
+    count += other.count;
+    return *this;
+  }
+};
+
 }  // namespace traceflow

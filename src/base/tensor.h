@@ -82,7 +82,7 @@ class Tensor {
   // Moves to a device, leaving the content behind: for what is about to be resized and written. Keeps the
   // memory where the device is the same.
   Tensor& place(Device device) {
-    if (device != this->device()) *this = Tensor(memory_type(nullptr, Free{device}));
+    if (device != this->device()) *this = Tensor(Memory(nullptr, Free{device}));
     return *this;
   }
 
@@ -115,7 +115,7 @@ class Tensor {
       shape_ = Shape();
       size_ = capacity_ = 0;
       const size_t bytes = static_cast<size_t>(room) * sizeof(T);
-      memory_ = memory_type(static_cast<T*>(memory::allocate(device, bytes)), Free{device, bytes});
+      memory_ = Memory(static_cast<T*>(memory::allocate(device, bytes)), Free{device, bytes});
       capacity_ = room;
     }
     shape_ = shape;
@@ -145,9 +145,9 @@ class Tensor {
     size_t bytes = 0;
     void operator()(T* p) const noexcept { memory::release(device, p, bytes); }
   };
-  using memory_type = std::unique_ptr<T, Free>;
+  using Memory = std::unique_ptr<T, Free>;
 
-  explicit Tensor(memory_type memory) : memory_(std::move(memory)) {}
+  explicit Tensor(Memory memory) : memory_(std::move(memory)) {}
 
   size_t bytes() const { return static_cast<size_t>(size_) * sizeof(T); }
   // A list on the CUDA device that grows once will grow again, and new memory there is dear: a quarter more.
@@ -160,7 +160,7 @@ class Tensor {
     memory::copy(device, data(), other.device(), other.data(), bytes());
   }
 
-  memory_type memory_;
+  Memory memory_;
   Shape shape_;
   int64_t size_ = 0;
   int64_t capacity_ = 0;

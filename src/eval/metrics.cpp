@@ -16,15 +16,15 @@ const uint8_t* address(const Tensor<uint8_t>& mask) { return mask.empty() ? null
 
 // The sum of f(pixel), which the host waits for.
 template <class F>
-Sum sum_of(Device device, const char* description, int64_t pixels, const F& f) {
-  Tensor<Sum> kept({1}, device);
-  ordered_sum<Sum>(device, description, pixels, f, KeepSum{kept.data()}, pixels_per_sum);
+CountedSum sum_of(Device device, const char* description, int64_t pixels, const F& f) {
+  Tensor<CountedSum> kept({1}, device);
+  ordered_sum<CountedSum>(device, description, pixels, f, KeepSum{kept.data()}, pixels_per_sum);
   return kept.on(Device::cpu)[0];
 }
 
-std::optional<double> mean_of(const Sum& sum) {
+std::optional<double> mean_of(const CountedSum& sum) {
   if (sum.count == 0) return std::nullopt;
-  return sum.total / static_cast<double>(sum.count);
+  return sum.sum / static_cast<double>(sum.count);
 }
 
 // Empty tensors lie anywhere.
@@ -33,7 +33,8 @@ void require_beside(const Tensor<float>& picture, const Tensor<T>& other) {
   require(other.empty() || other.device() == picture.device(), "a figure's pictures lie on one device");
 }
 
-Sum squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& mask) {
+CountedSum squared_error(const Tensor<float>& image, const Tensor<float>& target,
+                         const Tensor<uint8_t>& mask) {
   require(image.shape() == target.shape(), "image and target have one shape",
           image.shape().to_string() + " and " + target.shape().to_string());
   require_beside(image, target);
@@ -42,7 +43,7 @@ Sum squared_error(const Tensor<float>& image, const Tensor<float>& target, const
                 SquaredError{image.data(), target.data(), address(mask)});
 }
 
-std::optional<double> psnr_of(const Sum& squared_error) {
+std::optional<double> psnr_of(const CountedSum& squared_error) {
   const std::optional<double> error = mean_of(squared_error);
   if (!error || !(*error > 0) || !std::isfinite(*error)) return std::nullopt;
   return -10 * std::log10(*error);
@@ -100,7 +101,7 @@ Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const 
     m.lpips_published = lpips::distance(*network, image, target, lpips::Input::published);
   }
   m.normal_mae_deg = normal_mae_deg(normals, true_normals, {});
-  const Sum masked = mask.empty() ? Sum{} : squared_error(image, target, mask);
+  const CountedSum masked = mask.empty() ? CountedSum{} : squared_error(image, target, mask);
   if (masked.count > 0) {
     m.masked_psnr = psnr_of(masked);
     m.masked_ssim = loss::ssim(image, target, mask);
@@ -110,12 +111,12 @@ Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const 
 }
 
 Metrics mean(const std::vector<Metrics>& views) {
-  std::vector<Sum> sums;
+  std::vector<CountedSum> sums;
   for (const Metrics& view : views) {
     size_t next = 0;
     Metrics::visit(view, [&](const char*, const std::optional<double>& value) {
       if (sums.size() <= next) sums.emplace_back();
-      if (value) sums[next] += Sum{*value, 1};
+      if (value) sums[next] += CountedSum{*value, 1};
       ++next;
     });
   }

@@ -4,10 +4,11 @@
 namespace traceflow {
 
 using eval::KeepSum;
-using eval::Sum;
 
 template void cuda::for_each_index(const char*, int64_t, const eval::RoundTo8Bit&);
-template void cuda::sum_each_index<Sum>(const char*, int64_t, const eval::SquaredError&, const KeepSum&);
-template void cuda::sum_each_index<Sum>(const char*, int64_t, const eval::NormalError&, const KeepSum&);
+template void cuda::sum_each_index<CountedSum>(const char*, int64_t, const eval::SquaredError&,
+                                               const KeepSum&);
+template void cuda::sum_each_index<CountedSum>(const char*, int64_t, const eval::NormalError&,
+                                               const KeepSum&);
 
 }  // namespace traceflow

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "base/sums.h"
 #include "files/eight_bit.h"
 #include "math/types.h"
 
@@ -12,20 +13,9 @@ namespace traceflow::eval {
 
 inline constexpr int64_t pixels_per_sum = 4096;
 
-// A sum over the pixels that count, and how many numbers that was.
-struct Sum {
-  double total = 0;
-  int64_t count = 0;
-  TRACEFLOW_HD Sum& operator+=(const Sum& other) {
-    total += other.total;
-    count += other.count;
-    return *this;
-  }
-};
-
 struct KeepSum {
-  Sum* kept;
-  TRACEFLOW_HD void operator()(const Sum& sum) const { *kept = sum; }
+  CountedSum* kept;
+  TRACEFLOW_HD void operator()(const CountedSum& sum) const { *kept = sum; }
 };
 
 // mask null: every pixel counts.
@@ -44,7 +34,7 @@ struct SquaredError {
   const float *image, *target;
   const uint8_t* mask;
 
-  TRACEFLOW_HD Sum operator()(int64_t pixel) const {
+  TRACEFLOW_HD CountedSum operator()(int64_t pixel) const {
     if (!counts(mask, pixel)) return {};
     const Vec3<double> difference = load3<double>(image + 3 * pixel) - load3<double>(target + 3 * pixel);
     return {dot(difference, difference), 3};
@@ -64,7 +54,7 @@ struct NormalError {
   const float *normal, *truth;
   const uint8_t* mask;
 
-  TRACEFLOW_HD Sum operator()(int64_t pixel) const {
+  TRACEFLOW_HD CountedSum operator()(int64_t pixel) const {
     const auto expected = load3<double>(truth + 3 * pixel);
     if (!counts(mask, pixel) || !(dot(expected, expected) > 0)) return {};
     return {angle_deg(load3<double>(normal + 3 * pixel), expected), 1};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/sums.h"
 #include "base/tensor.h"
 #include "math/ssim.h"
 #include "math/types.h"
@@ -51,17 +52,6 @@ inline HalfWindow half_window() {
   for (size_t k = 0; k < half.size(); ++k) half[k] = static_cast<float>(window[ssim_radius + k]);
   return half;
 }
-
-// A sum over some of the pixels and their number.
-struct CountedSum {
-  double sum = 0;
-  int64_t count = 0;
-  TRACEFLOW_HD CountedSum& operator+=(const CountedSum& other) {
-    sum += other.sum;
-    count += other.count;
-    return *this;
-  }
-};
 
 // What becomes of a sum: the mean over a number of things that is known, or that was found with it.
 struct MeanOver {
