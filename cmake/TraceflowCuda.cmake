@@ -4,10 +4,10 @@
 set(TRACEFLOW_CUDA AUTO CACHE STRING "Build the CUDA code: AUTO (where nvcc is), ON or OFF")
 set(TRACEFLOW_CUDA_FOUND OFF)
 
-# Before project languages are enabled, so that no GPU is asked for: machine code for the chips that both CUDA 12.4
-# and 13 know, and PTX for those that come.
+# Before project languages are enabled, so that no GPU is asked for: machine code for the families of chips that both CUDA
+# 12.4 and 13 know (8.0's runs on 8.6 and 8.9 too), and PTX for those that come.
 if(NOT DEFINED CMAKE_CUDA_ARCHITECTURES AND NOT DEFINED ENV{CUDAARCHS})
-  set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 90-virtual)
+  set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 90)
 endif()
 
 if(NOT TRACEFLOW_CUDA STREQUAL "OFF")

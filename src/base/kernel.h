@@ -14,6 +14,7 @@
 #include "base/device_memory.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/profile.h"
 
 namespace traceflow::cuda {
 
@@ -35,15 +36,18 @@ void check(cudaError_t result, const char* what);
 template <class... Parameters, class... Arguments>
 void launch(const char* name, Grid grid, void (*kernel)(Parameters...), const Arguments&... arguments) {
   if (grid.blocks == 0) return;
+  const profile::Scope scope(name);
   kernel<<<static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads), 0, stream()>>>(
       static_cast<Parameters>(arguments)...);
   check(cudaGetLastError(), name);
+  if (profile::is_on()) synchronise();
 }
 
 #else
 
 template <class... Parameters, class... Arguments>
 void launch(const char* name, Grid grid, void (*kernel)(Parameters...), const Arguments&... arguments) {
+  const profile::Scope scope(name);
   emulation::launch(name, static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads),
                     [&] { kernel(static_cast<Parameters>(arguments)...); });
 }

@@ -150,7 +150,9 @@ class Library {
     const Plan& chosen = plan_locked(product);
     require(chosen.found(), "cuBLASLt has the product",
             std::to_string(product.m) + "×" + std::to_string(product.k) + "×" + std::to_string(product.n));
+    const profile::Scope scope("matrix product");
     chosen.run(product, at, handle_, workspace_.data());
+    if (profile::is_on()) synchronise();
   }
 
   bool allows_epilogues = true;

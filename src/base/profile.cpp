@@ -18,7 +18,7 @@ std::vector<Entry> table;
 }  // namespace
 
 Scope::Scope(const char* name) : name_(nullptr) {
-  if (!enabled.load(std::memory_order_relaxed) || in_parallel_loop()) return;
+  if (!is_on() || in_parallel_loop()) return;
   name_ = name;
   start_ = std::chrono::steady_clock::now();
 }
@@ -34,6 +34,7 @@ Scope::~Scope() {
 }
 
 void enable(bool on) { enabled = on; }
+bool is_on() { return enabled.load(std::memory_order_relaxed); }
 
 std::vector<Entry> entries() {
   const std::lock_guard lock(mutex);

@@ -28,8 +28,10 @@ class Scope {
   std::chrono::steady_clock::time_point start_;
 };
 
-// Off at the start. Scopes opened inside a parallel region are not recorded.
+// Off at the start. Scopes opened inside a parallel region are not recorded. While it is on, work on the CUDA
+// device is waited for kernel by kernel (base/kernel.h): each time is its own, and the whole takes longer.
 void enable(bool on);
+bool is_on();
 // All entries since the last clear(), in the order in which their names were first seen.
 std::vector<Entry> entries();
 void clear();
