@@ -3,7 +3,6 @@
 
 namespace traceflow {
 
-using loss::CountedSum;
 using loss::MeanOver;
 using loss::MeanOverCounted;
 
