@@ -41,14 +41,16 @@ Tensor<float> Frame::specular_image() const {
 void SceneGradient::reset(const Scene& scene) {
   main.reset_like(scene.main);
   environment.reset_like(scene.environment);
-  if (scene.main_field) main_field = zeros_like<float>(*scene.main_field);
-  if (scene.environment_field) environment_field = zeros_like<float>(*scene.environment_field);
+  if (scene.main_field) main_field.reset_like(*scene.main_field);
+  if (scene.environment_field) environment_field.reset_like(*scene.environment_field);
   if (scene.environment_map) {
     const Tensor<float>& logit = scene.environment_map->logit;
     environment_map.logit.place(logit.device()).reset(logit.shape());
-    environment_map.field.reset();
-    if (scene.environment_map->field)
-      environment_map.field = zeros_like<float>(*scene.environment_map->field);
+    if (!scene.environment_map->field) environment_map.field.reset();
+    if (scene.environment_map->field) {
+      if (!environment_map.field) environment_map.field.emplace();
+      environment_map.field->reset_like(*scene.environment_map->field);
+    }
   }
   camera = {};
   const Device device = scene.device();

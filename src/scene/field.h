@@ -61,6 +61,20 @@ struct BasicField {
     return result;
   }
 
+  // Zeros in the shapes of another field and on its device, in the memory that is there.
+  void reset_like(const BasicField& other) {
+    const auto zero = [](Tensor<T>& tensor, const Tensor<T>& like) {
+      tensor.place(like.device()).reset(like.shape());
+    };
+    shape = other.shape;
+    weight.resize(other.weight.size());
+    bias.resize(other.bias.size());
+    for (size_t l = 0; l < weight.size(); ++l) zero(weight[l], other.weight[l]);
+    for (size_t l = 0; l < bias.size(); ++l) zero(bias[l], other.bias[l]);
+    zero(head_weight, other.head_weight);
+    zero(head_bias, other.head_bias);
+  }
+
   // f(name, tensor) for every parameter tensor: "weight0", "bias0", …, "head_weight", "head_bias".
   template <class F>
   void for_each(F&& f) {
