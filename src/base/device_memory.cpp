@@ -16,6 +16,7 @@ constexpr std::align_val_t alignment{64};
 // What stands on the CUDA device.
 struct Account {
   std::atomic<size_t> bytes = 0, most = 0;
+  std::atomic<int64_t> allocations = 0;
   std::atomic<size_t> budget = std::numeric_limits<size_t>::max();
 
   void take(size_t wanted) {
@@ -24,6 +25,7 @@ struct Account {
       bytes -= wanted;
       throw OutOfMemory(wanted, budget - std::min<size_t>(budget, now - wanted));
     }
+    ++allocations;
     size_t before = most;
     while (now > before && !most.compare_exchange_weak(before, now)) {
     }
@@ -83,6 +85,7 @@ void synchronise(Device device) {
 
 size_t device_bytes() { return account.bytes; }
 size_t most_device_bytes() { return account.most; }
+int64_t device_allocations() { return account.allocations; }
 void set_device_budget(size_t bytes) { account.budget = bytes; }
 
 }  // namespace traceflow::memory

@@ -33,6 +33,8 @@ void synchronise(Device device);
 // Bytes that stand on the CUDA device now, and the most that ever did.
 size_t device_bytes();
 size_t most_device_bytes();
+// How often memory was asked for there, so far.
+int64_t device_allocations();
 // The most that may stand there: what goes beyond throws OutOfMemory. No limit but the device's own until it
 // is set.
 void set_device_budget(size_t bytes);

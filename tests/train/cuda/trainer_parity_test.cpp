@@ -124,6 +124,17 @@ TEST_F(TrainerOnDevice, RunningOutOfMemoryEndsInASavedState) {
   }
 }
 
+// Between two density controls, and once every view has been seen.
+TEST_F(TrainerOnDevice, AnIterationInItsStrideAsksForNoMemory) {
+  TrainOptions options = small_run(40);
+  options.density.until = options.environment_density.until = 0;
+  Trainer trainer = make_trainer(options, "stride", Device::cuda);
+  for (int i = 0; i < 22; ++i) trainer.step();
+  const int64_t before = memory::device_allocations();
+  for (int i = 0; i < 3; ++i) trainer.step();
+  EXPECT_EQ(memory::device_allocations(), before);
+}
+
 TEST_F(TrainerOnDevice, TheForecastCoversWhatARunTakes) {
   const TrainOptions options = small_run(24);
   const size_t before = memory::device_bytes();
