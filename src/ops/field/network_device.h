@@ -19,7 +19,7 @@ namespace traceflow::field::device {
 inline int64_t segment_values = int64_t{1} << 23;
 
 struct DeviceLayout : Layout {
-  DeviceLayout(const Field& field, Precision precision, int64_t points);
+  DeviceLayout(const Field& field, Precision precision, int64_t count);
 
   int64_t points;
   int64_t segment_rows;  // points in a segment

@@ -41,6 +41,7 @@ class VerbsOnDevice : public traceflow::testing::OnDevice {
   int run_verb(std::vector<std::string> words) {
     words.insert(words.begin(), "traceflow");
     std::vector<const char*> arguments;
+    arguments.reserve(words.size());
     for (const std::string& word : words) arguments.push_back(word.c_str());
     ::testing::internal::CaptureStderr();
     ::testing::internal::CaptureStdout();
