@@ -113,7 +113,8 @@ struct Saved {
     Tensor<SplatGradient> gradients;  // by entry
     // On the CUDA device.
     Tensor<uint32_t> depth_keys, depth_keys_sorted, surfels, surfels_sorted;
-    Tensor<int32_t> counts, offsets;
+    Tensor<int32_t> counts;
+    Tensor<int64_t> offsets;
     Tensor<uint32_t> tile_keys, tile_keys_sorted, places, places_sorted;
     Tensor<TileEntry> unsorted;
     Tensor<CameraGradient<double>> camera;
