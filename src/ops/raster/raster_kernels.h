@@ -21,7 +21,7 @@ inline constexpr int pixels_per_tile = tile_edge * tile_edge;
 
 // A surfel on the screen. Positions are relative to the anchor, a whole pixel near the projected centre, so
 // that single precision suffices; the forms are those of math/surfel_projection.h.
-struct alignas(64) Splat {
+struct alignas(16) Splat {
   float anchor_x, anchor_y;  // pixels
   float centre_x, centre_y;  // the projected centre
   float u_x, u_y, u_1;       // u·w = u_x x + u_y y + u_1
