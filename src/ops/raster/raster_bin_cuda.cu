@@ -4,6 +4,7 @@
 
 #include "base/kernel.h"
 #include "base/sort.h"
+#include "base/sum_kernels.h"
 #include "ops/raster/raster_chain.h"
 #include "ops/raster/raster_cuda.h"
 #include "ops/raster/raster_footprint.h"
@@ -16,6 +17,8 @@ namespace traceflow {
 template void cuda::for_each_index(const char*, int64_t, const raster::Prepare&);
 template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep&);
 template void cuda::for_each_index(const char*, int64_t, const raster::IsVisible&);
+template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t, const raster::CameraShareOf&,
+                                                           const raster::KeepCamera&);
 
 namespace raster::cuda_stage {
 
