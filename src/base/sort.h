@@ -20,5 +20,6 @@ TRACEFLOW_WITH_CUDA void sort_pairs(int64_t n, int bits, const uint32_t* keys, u
 // out[i] = in[0] + … + in[i − 1], so that with one entry more than there is to count the last is the total.
 // Both have n entries on the device; they may be the same list.
 TRACEFLOW_WITH_CUDA void exclusive_sum(const int32_t* in, int32_t* out, int64_t n, Tensor<uint8_t>& scratch);
+TRACEFLOW_WITH_CUDA void exclusive_sum(const int64_t* in, int64_t* out, int64_t n, Tensor<uint8_t>& scratch);
 
 }  // namespace traceflow::cuda

@@ -22,6 +22,15 @@ void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t
         "a sort");
 }
 
+template <class T>
+void sum(const T* in, T* out, int64_t n, Tensor<uint8_t>& scratch) {
+  if (n == 0) return;
+  size_t bytes = 0;
+  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, n, stream()), "the memory of a running sum");
+  scratch.place(Device::cuda).resize({static_cast<int64_t>(bytes)});
+  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, n, stream()), "a running sum");
+}
+
 }  // namespace
 
 void sort_pairs(int64_t n, int bits, const uint64_t* keys, uint64_t* sorted_keys, const uint32_t* values,
@@ -35,11 +44,11 @@ void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys
 }
 
 void exclusive_sum(const int32_t* in, int32_t* out, int64_t n, Tensor<uint8_t>& scratch) {
-  if (n == 0) return;
-  size_t bytes = 0;
-  check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, n, stream()), "the memory of a running sum");
-  scratch.place(Device::cuda).resize({static_cast<int64_t>(bytes)});
-  check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, n, stream()), "a running sum");
+  sum(in, out, n, scratch);
+}
+
+void exclusive_sum(const int64_t* in, int64_t* out, int64_t n, Tensor<uint8_t>& scratch) {
+  sum(in, out, n, scratch);
 }
 
 }  // namespace traceflow::cuda

@@ -48,6 +48,12 @@ template <class T>
 struct CameraGradient {
   Mat3<T> camera_from_world{T(0)};
   Vec3<T> position{T(0)};
+
+  TRACEFLOW_HD CameraGradient& operator+=(const CameraGradient& other) {
+    camera_from_world += other.camera_from_world;
+    position += other.position;
+    return *this;
+  }
 };
 
 }  // namespace traceflow

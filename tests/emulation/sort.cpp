@@ -27,6 +27,18 @@ void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t
   }
 }
 
+template <class T>
+void sum(const T* in, T* out, int64_t n, Tensor<uint8_t>& scratch) {
+  scratch.place(Device::cuda).resize({1});
+  const emulation::DeviceAccess access;
+  T so_far = 0;
+  for (int64_t i = 0; i < n; ++i) {
+    const T value = in[i];
+    out[i] = so_far;
+    so_far += value;
+  }
+}
+
 }  // namespace
 
 void sort_pairs(int64_t n, int bits, const uint64_t* keys, uint64_t* sorted_keys, const uint32_t* values,
@@ -40,14 +52,11 @@ void sort_pairs(int64_t n, int bits, const uint32_t* keys, uint32_t* sorted_keys
 }
 
 void exclusive_sum(const int32_t* in, int32_t* out, int64_t n, Tensor<uint8_t>& scratch) {
-  scratch.place(Device::cuda).resize({1});
-  const emulation::DeviceAccess access;
-  int32_t sum = 0;
-  for (int64_t i = 0; i < n; ++i) {
-    const int32_t value = in[i];
-    out[i] = sum;
-    sum += value;
-  }
+  sum(in, out, n, scratch);
+}
+
+void exclusive_sum(const int64_t* in, int64_t* out, int64_t n, Tensor<uint8_t>& scratch) {
+  sum(in, out, n, scratch);
 }
 
 }  // namespace traceflow::cuda

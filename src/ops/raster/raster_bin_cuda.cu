@@ -1,7 +1,10 @@
 #include <bit>
+#include <limits>
+#include <string>
 
 #include "base/kernel.h"
 #include "base/sort.h"
+#include "base/sum_kernels.h"
 #include "ops/raster/raster_chain.h"
 #include "ops/raster/raster_cuda.h"
 #include "ops/raster/raster_footprint.h"
@@ -14,6 +17,8 @@ namespace traceflow {
 template void cuda::for_each_index(const char*, int64_t, const raster::Prepare&);
 template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep&);
 template void cuda::for_each_index(const char*, int64_t, const raster::IsVisible&);
+template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t, const raster::CameraShareOf&,
+                                                           const raster::KeepCamera&);
 
 namespace raster::cuda_stage {
 
@@ -61,10 +66,10 @@ struct CountTiles {
 struct GatherCounts {
   const uint32_t* order;
   const int32_t* counts;
-  int32_t* ordered;  // N + 1
+  int64_t* ordered;  // N + 1
   int64_t count;
 
-  __device__ void operator()(int64_t k) const { ordered[k] = k < count ? counts[order[k]] : 0; }
+  __device__ void operator()(int64_t k) const { ordered[k] = k < count ? int64_t{counts[order[k]]} : 0; }
 };
 
 // The entries of the k-th nearest surfel: its tiles, in the places that the sums of counts give it.
@@ -73,7 +78,7 @@ struct WriteEntries {
   const Splat* splats;
   const Bounds* bounds;
   const uint32_t* order;
-  const int32_t* place;  // by order
+  const int64_t* place;  // by order
   const int32_t* entry;  // by surfel
   uint32_t *tiles, *places;
   TileEntry* entries;
@@ -81,7 +86,7 @@ struct WriteEntries {
   __device__ void operator()(int64_t k) const {
     const uint32_t surfel = order[k];
     if (bounds[surfel].tiles() == 0) return;
-    int32_t at = place[k];
+    int64_t at = place[k];
     auto own = static_cast<uint32_t>(entry[surfel]);
     grid.for_each_reached(splats[surfel], bounds[surfel], [&](int tile) {
       tiles[at] = static_cast<uint32_t>(tile);
@@ -123,8 +128,8 @@ T* resized(Tensor<T>& tensor, int64_t size) {
 }
 
 // A tensor's last number.
-int32_t read_back(const Tensor<int32_t>& tensor) {
-  int32_t value = 0;
+int64_t read_back(const Tensor<int64_t>& tensor) {
+  int64_t value = 0;
   memory::copy(Device::cpu, &value, Device::cuda, tensor.data() + tensor.size() - 1, sizeof(value));
   return value;
 }
@@ -150,11 +155,14 @@ void bin(SortOrder order, Saved& saved) {
   static_assert(sizeof(uint32_t) == sizeof(int32_t));
   auto* const entry = reinterpret_cast<int32_t*>(resized(saved.entry_begin, n + 1));
   cuda::exclusive_sum(counts, entry, n + 1, s.bytes);
-  // By order of depth: where they are written.
-  int32_t* const place = resized(s.offsets, n + 1);
+  // By order of depth: where they are written. In 64 bits, so that a number beyond all bounds is known as
+  // one.
+  int64_t* const place = resized(s.offsets, n + 1);
   cuda::for_each_index("raster: gather counts", n + 1, GatherCounts{ordered, counts, place, n});
   cuda::exclusive_sum(place, place, n + 1, s.bytes);
   const int64_t entries = read_back(s.offsets);
+  require(entries < std::numeric_limits<int32_t>::max(), "surfels times tiles fit 31 bits",
+          std::to_string(entries));
 
   uint32_t* const tiles = resized(s.tile_keys, entries);
   uint32_t* const tiles_sorted = resized(s.tile_keys_sorted, entries);

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/sums.h"
 
 namespace traceflow::raster {
 namespace {
@@ -11,35 +12,30 @@ constexpr int64_t surfels_per_block = 256;
 
 using CameraShare = CameraGradient<double>;
 
-CameraShare sum_of(const CameraShare* shares, int64_t count) {
-  CameraShare total;
-  for (int64_t i = 0; i < count; ++i) {
-    total.camera_from_world += shares[i].camera_from_world;
-    total.position += shares[i].position;
-  }
-  return total;
-}
-
 // Per block of surfels first, then over the blocks.
 CameraShare run_on_cpu(const Chain& chain, int64_t n) {
   std::vector<CameraShare> partial(static_cast<size_t>((n + surfels_per_block - 1) / surfels_per_block));
   parallel_blocks("raster: chain", n, surfels_per_block, [&](int64_t begin, int64_t end) {
     CameraShare& sum = partial[static_cast<size_t>(begin / surfels_per_block)];
-    for (int64_t i = begin; i < end; ++i) {
-      const CameraShare share = chain.run(i);
-      sum.camera_from_world += share.camera_from_world;
-      sum.position += share.position;
-    }
+    for (int64_t i = begin; i < end; ++i) sum += chain.run(i);
   });
-  return sum_of(partial.data(), static_cast<int64_t>(partial.size()));
+  CameraShare total;
+  for (const CameraShare& share : partial) total += share;
+  return total;
 }
 
 CameraShare run_on_device(const Chain& chain, int64_t n, bool wants_camera, const Saved& saved) {
   Tensor<CameraShare>& shares = saved.scratch.camera;
-  shares.place(Device::cuda).resize({wants_camera ? n : 0});
+  shares.place(Device::cuda).resize({wants_camera ? n + 1 : 0});  // the last is their sum
   parallel_for(Device::cuda, "raster: chain", n, ChainStep{chain, wants_camera ? shares.data() : nullptr});
-  const Tensor<CameraShare> on_host = shares.on(Device::cpu);
-  return sum_of(on_host.data(), on_host.size());
+  CameraShare total;
+  if (wants_camera) {
+    ordered_sum<CameraShare>(Device::cuda, "raster: camera", n, CameraShareOf{shares.data()},
+                             KeepCamera{shares.data() + n}, 1);
+    // The host waits: the pose is its own.
+    memory::copy(Device::cpu, &total, Device::cuda, shares.data() + n, sizeof(total));
+  }
+  return total;
 }
 
 }  // namespace

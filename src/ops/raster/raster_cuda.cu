@@ -7,6 +7,7 @@ namespace traceflow::raster::cuda_stage {
 namespace {
 
 constexpr int batch_splats = 128;
+static_assert(batch_splats <= pixels_per_tile);
 
 struct OutputView {
   float *colour, *alpha, *tint, *normal, *depth, *median_depth, *distortion;
@@ -83,7 +84,7 @@ class Blend {
 };
 
 __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out, PixelsView left) {
-  __shared__ Splat batch[batch_splats];
+  __shared__ BatchSplat batch[batch_splats];
   __shared__ unsigned touched[batch_splats];
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
@@ -101,10 +102,8 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
       }
       break;
     }
-    for (int k = static_cast<int>(threadIdx.x); k < here; k += static_cast<int>(blockDim.x)) {
-      batch[k] = saved.splats[saved.entries[begin + base + k].surfel];
-      touched[k] = 0;
-    }
+    load_batch(saved, begin + base, here, batch);
+    if (static_cast<int>(threadIdx.x) < here) touched[threadIdx.x] = 0;
     __syncthreads();
     if (__any_sync(cuda::full_warp, live)) {
       for (int first = 0; first < here; first += cuda::warp_lanes) {
@@ -124,8 +123,9 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
       }
     }
     __syncthreads();
-    for (int k = static_cast<int>(threadIdx.x); k < here; k += static_cast<int>(blockDim.x)) {
-      saved.touched[saved.entries[begin + base + k].entry] = static_cast<uint16_t>(touched[k]);
+    if (static_cast<int>(threadIdx.x) < here) {
+      saved.touched[saved.entries[begin + base + threadIdx.x].entry] =
+          static_cast<uint16_t>(touched[threadIdx.x]);
     }
   }
   if (pixel.in_image) blend.store(o, pixel.index, out, left);

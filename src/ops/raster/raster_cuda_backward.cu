@@ -144,7 +144,7 @@ template <Asked asked>
 __global__ void __launch_bounds__(pixels_per_tile)
     unblend_by_centre(SavedView saved, KernelOptions o, GradientView grad, PixelsView left,
                       SplatGradient* gradients) {
-  __shared__ Splat batch[batch_splats];
+  __shared__ BatchSplat batch[batch_splats];
   __shared__ float partial[warps_per_tile][batch_splats][sums_stored];
   __shared__ unsigned written[warps_per_tile];
   __shared__ int last_place;
@@ -166,9 +166,7 @@ __global__ void __launch_bounds__(pixels_per_tile)
   for (int base = last_place / batch_splats * batch_splats; base >= 0 && last_place >= 0;
        base -= batch_splats) {
     const int here = last_place + 1 - base < batch_splats ? last_place + 1 - base : batch_splats;
-    if (static_cast<int>(threadIdx.x) < here) {
-      batch[threadIdx.x] = saved.splats[saved.entries[begin + base + threadIdx.x].surfel];
-    }
+    load_batch(saved, begin + static_cast<uint32_t>(base), here, batch);
     __syncthreads();
     unsigned mine = 0;
     for (unsigned left_over = reached_splats(pixel, batch, 0, here); left_over != 0;) {

@@ -5,7 +5,9 @@
 #include "ops/raster/raster_kernels.h"
 
 // A splat at one pixel: what the vector kernels of the CPU do for many (raster_simd-inl.h), for devices with
-// a thread a pixel.
+// a thread a pixel. Several kernels must come to the same decisions here: which tiles a splat is listed in,
+// which hits a pixel has. So every fused operation is written out; a compiler could else fuse differently
+// where it inlines.
 namespace traceflow::raster {
 
 // The smaller (larger) of two; the second where one is not a number.
@@ -33,18 +35,18 @@ TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y) {
   PixelFootprint f;
   f.x = x - s.anchor_x;
   f.y = y - s.anchor_y;
-  f.w = s.w_x * f.x + (s.w_y * f.y + s.w_1);
+  f.w = std::fma(s.w_x, f.x, std::fma(s.w_y, f.y, s.w_1));
   f.inverse_w = 1.0F / f.w;
-  f.nu = s.u_x * f.x + (s.u_y * f.y + s.u_1);
-  f.nv = s.v_x * f.x + (s.v_y * f.y + s.v_1);
+  f.nu = std::fma(s.u_x, f.x, std::fma(s.u_y, f.y, s.u_1));
+  f.nv = std::fma(s.v_x, f.x, std::fma(s.v_y, f.y, s.v_1));
   f.dx = f.x - s.centre_x;
   f.dy = f.y - s.centre_y;
-  const float rho_screen = 2.0F * (f.dx * f.dx + f.dy * f.dy) + s.rho_screen_1;
-  const float rho_plane = (f.nu * f.nu + f.nv * f.nv) * (f.inverse_w * f.inverse_w);
+  const float rho_screen = std::fma(2.0F, std::fma(f.dx, f.dx, f.dy * f.dy), s.rho_screen_1);
+  const float rho_plane = std::fma(f.nu, f.nu, f.nv * f.nv) * (f.inverse_w * f.inverse_w);
   f.on_plane = f.w > 0.0F && f.w <= s.w_max && rho_plane <= lower(rho_screen, s.rho_max);
   const float rho = f.on_plane ? rho_plane : rho_screen;
   f.inside = rho <= s.rho_max;
-  f.opacity = std::exp2(rho * -0.72134752F + s.log2_opacity);
+  f.opacity = std::exp2(std::fma(rho, -0.72134752F, s.log2_opacity));
   return f;
 }
 
@@ -57,24 +59,24 @@ TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float
   low_y -= margin + s.anchor_y;
   high_x += margin - s.anchor_x;
   high_y += margin - s.anchor_y;
-  const float rho = s.rho_max * 1.002F + 0.02F;
+  const float rho = std::fma(s.rho_max, 1.002F, 0.02F);
   const auto clamp = [](float v, float low, float high) { return lower(higher(v, low), high); };
   const auto inside = [&](float x, float y) {
-    const float nu = s.u_x * x + (s.u_y * y + s.u_1);
-    const float nv = s.v_x * x + (s.v_y * y + s.v_1);
-    const float w = s.w_x * x + (s.w_y * y + s.w_1);
-    return nu * nu + nv * nv <= rho * (w * w);
+    const float nu = std::fma(s.u_x, x, std::fma(s.u_y, y, s.u_1));
+    const float nv = std::fma(s.v_x, x, std::fma(s.v_y, y, s.v_1));
+    const float w = std::fma(s.w_x, x, std::fma(s.w_y, y, s.w_1));
+    return std::fma(nu, nu, nv * nv) <= rho * (w * w);
   };
   // The convex form is lowest in a rectangle on the sides that face its centre.
   const float side_x = clamp(s.ellipse_x, low_x, high_x);
   const float side_y = clamp(s.ellipse_y, low_y, high_y);
-  const float on_side_x = s.slope_y * (side_x - s.ellipse_x) + s.ellipse_y;
-  const float on_side_y = s.slope_x * (side_y - s.ellipse_y) + s.ellipse_x;
+  const float on_side_x = std::fma(s.slope_y, side_x - s.ellipse_x, s.ellipse_y);
+  const float on_side_y = std::fma(s.slope_x, side_y - s.ellipse_y, s.ellipse_x);
   if (inside(side_x, clamp(on_side_x, low_y, high_y))) return true;
   if (inside(clamp(on_side_y, low_x, high_x), side_y)) return true;
   const float dx = clamp(s.centre_x, low_x, high_x) - s.centre_x;
   const float dy = clamp(s.centre_y, low_y, high_y) - s.centre_y;
-  return 2.0F * (dx * dx + dy * dy) + s.rho_screen_1 <= rho;
+  return std::fma(2.0F, std::fma(dx, dx, dy * dy), s.rho_screen_1) <= rho;
 }
 
 }  // namespace traceflow::raster

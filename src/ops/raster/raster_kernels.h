@@ -21,7 +21,7 @@ inline constexpr int pixels_per_tile = tile_edge * tile_edge;
 
 // A surfel on the screen. Positions are relative to the anchor, a whole pixel near the projected centre, so
 // that single precision suffices; the forms are those of math/surfel_projection.h.
-struct alignas(64) Splat {
+struct alignas(16) Splat {
   float anchor_x, anchor_y;  // pixels
   float centre_x, centre_y;  // the projected centre
   float u_x, u_y, u_1;       // u·w = u_x x + u_y y + u_1
@@ -113,7 +113,8 @@ struct Saved {
     Tensor<SplatGradient> gradients;  // by entry
     // On the CUDA device.
     Tensor<uint32_t> depth_keys, depth_keys_sorted, surfels, surfels_sorted;
-    Tensor<int32_t> counts, offsets;
+    Tensor<int32_t> counts;
+    Tensor<int64_t> offsets;
     Tensor<uint32_t> tile_keys, tile_keys_sorted, places, places_sorted;
     Tensor<TileEntry> unsorted;
     Tensor<CameraGradient<double>> camera;

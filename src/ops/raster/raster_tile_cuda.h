@@ -12,6 +12,13 @@ inline constexpr int warps_per_tile = pixels_per_tile / cuda::warp_lanes;
 inline constexpr int warp_columns = 8;  // of a warp's pixels
 inline constexpr int warp_rows = cuda::warp_lanes / warp_columns;
 
+// A splat in shared memory. The odd number of quads lets lanes that look at a splat each meet different
+// banks.
+struct BatchSplat : Splat {
+  float4 apart;
+};
+static_assert(sizeof(BatchSplat) / sizeof(float4) % 2 == 1);
+
 // The addresses of what forward leaves.
 struct SavedView {
   int width, height, tile_columns;
@@ -55,8 +62,20 @@ struct TilePixel {
   }
 };
 
+// Copies the splats of `count` entries. All threads of the block take part, eight a splat.
+__device__ inline void load_batch(const SavedView& saved, uint32_t first_entry, int count,
+                                  BatchSplat* batch) {
+  constexpr int quads = sizeof(Splat) / sizeof(float4);
+  for (int i = static_cast<int>(threadIdx.x); i < count * quads; i += pixels_per_tile) {
+    const int k = i / quads, quad = i % quads;
+    const Splat& from = saved.splats[saved.entries[first_entry + static_cast<uint32_t>(k)].surfel];
+    reinterpret_cast<float4*>(batch + k)[quad] = __ldg(reinterpret_cast<const float4*>(&from) + quad);
+  }
+}
+
 // Of the batch's splats from `first` on, which the warp's pixels may be reached by, a bit each.
-__device__ inline unsigned reached_splats(const TilePixel& pixel, const Splat* batch, int first, int count) {
+__device__ inline unsigned reached_splats(const TilePixel& pixel, const BatchSplat* batch, int first,
+                                          int count) {
   const int mine = first + pixel.lane;
   return __ballot_sync(cuda::full_warp, mine < count && pixel.reached_by(batch[mine]));
 }

@@ -94,20 +94,23 @@ struct RayBackward {
   }
 };
 
-// Adds a lane's row to its surfel. All lanes of the warp take part, so that neighbours in memory are added to
-// at once.
+// Adds the rows of those lanes of the warp that met the same surfel to it. All lanes take part, so that
+// neighbours in memory are added to at once.
 template <int degree>
-__device__ void add_row(const Rows& rows, int row, const BackwardTask& task) {
+__device__ void add_group(const Rows& rows, int first_row, unsigned group, const BackwardTask& task) {
   constexpr int numbers = 3 * sh_coefficients(degree);
-  const uint32_t surfel = rows.surfel[row];
+  const auto row_of = [first_row](unsigned lanes) { return first_row + __ffs(static_cast<int>(lanes)) - 1; };
+  const uint32_t surfel = rows.surfel[row_of(group)];
   for (int v = static_cast<int>(threadIdx.x) % warp_lanes; v < numbers + static_cast<int>(part::count);
        v += warp_lanes) {
-    if (v < numbers) {
-      atomicAdd(task.grad_sh + int64_t{numbers} * surfel + v,
-                rows.basis[row][v / 3] * rows.passed[row][v % 3]);
-    } else {
-      atomicAdd(task.surfel_sums[surfel].value + (v - numbers), rows.part[row][v - numbers]);
+    float sum = 0;
+    for (unsigned left = group; left != 0; left &= left - 1) {
+      const int row = row_of(left);
+      sum += v < numbers ? rows.basis[row][v / 3] * rows.passed[row][v % 3] : rows.part[row][v - numbers];
     }
+    atomicAdd(v < numbers ? task.grad_sh + int64_t{numbers} * surfel + v
+                          : task.surfel_sums[surfel].value + (v - numbers),
+              sum);
   }
 }
 
@@ -116,8 +119,11 @@ template <int degree>
 __device__ void add_rows(const Rows& rows, bool mine, const BackwardTask& task) {
   __syncwarp();
   const int first = static_cast<int>(threadIdx.x) / warp_lanes * warp_lanes;
-  for (unsigned left = __ballot_sync(full_warp, mine); left != 0; left &= left - 1) {
-    add_row<degree>(rows, first + __ffs(static_cast<int>(left)) - 1, task);
+  const unsigned same = __match_any_sync(full_warp, mine ? rows.surfel[threadIdx.x] : no_record);
+  for (unsigned left = __ballot_sync(full_warp, mine); left != 0;) {
+    const unsigned group = __shfl_sync(full_warp, same, __ffs(static_cast<int>(left)) - 1);
+    add_group<degree>(rows, first, group, task);
+    left &= ~group;
   }
   __syncwarp();
 }

@@ -111,6 +111,7 @@ struct TreeView {
 
 __device__ void set_child(const TreeView& tree, uint32_t node, uint32_t side, uint32_t child, bool is_disk) {
   tree.nodes[node].child[side] = is_disk ? child | disk_bit : child;
+  tree.nodes[node].unused[side] = 0;  // walks load it with the rest
   (is_disk ? tree.disk_parent : tree.node_parent)[child] = 2 * node + side;
 }
 
@@ -118,6 +119,7 @@ __device__ void set_child(const TreeView& tree, uint32_t node, uint32_t side, ui
 __device__ void make_lone_root(const TreeView& tree) {
   set_child(tree, 0, 0, 0, true);
   tree.nodes[0].child[1] = no_child;
+  tree.nodes[0].unused[1] = 0;
   for (int axis = 0; axis < 3; ++axis) {
     tree.nodes[0].box[axis][2] = INFINITY;
     tree.nodes[0].box[axis][3] = -INFINITY;

@@ -28,5 +28,14 @@ TEST_F(ExclusiveSum, IsTheSumOfWhatComesBefore) {
   }
 }
 
+TEST_F(ExclusiveSum, Of64BitsGoesBeyond32) {
+  Tensor<uint8_t> scratch;
+  Tensor<int64_t> numbers({4});
+  for (int64_t& v : numbers.values()) v = int64_t{1} << 31;
+  Tensor<int64_t> on_device = numbers.on(Device::cuda);
+  cuda::exclusive_sum(on_device.data(), on_device.data(), 4, scratch);
+  EXPECT_EQ(on_device.on(Device::cpu)[3], int64_t{3} << 31);
+}
+
 }  // namespace
 }  // namespace traceflow
