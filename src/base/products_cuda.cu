@@ -143,6 +143,7 @@ class Library {
   }
   bool supported(const ProductDescription& product) {
     if (product.has_epilogue() && !allows_epilogues) return false;
+    if (product.operands == Number::bf16 && !multiplies_bf16_) return false;
     return plan(product).found();
   }
   void multiply(const ProductDescription& product, const ProductAddresses& at) {
@@ -160,6 +161,10 @@ class Library {
  private:
   Library() : workspace_({static_cast<int64_t>(workspace_bytes)}, Device::cuda) {
     check(cublasLtCreate(&handle_), "cuBLASLt answers");
+    int major = 0;
+    traceflow::cuda::check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, 0),
+                           "the CUDA device's compute capability");
+    multiplies_bf16_ = major >= 8;
   }
   const Plan& plan(const ProductDescription& product) {
     const std::lock_guard lock(mutex_);
@@ -173,6 +178,8 @@ class Library {
 
   std::mutex mutex_;
   cublasLtHandle_t handle_ = nullptr;
+  // Older devices have no units for it, and the library's products in their place are slower than fp32's.
+  bool multiplies_bf16_ = false;
   Tensor<std::byte> workspace_;
   std::map<ProductDescription, std::unique_ptr<const Plan>> plans_;
 };

@@ -58,6 +58,7 @@ class Region {
   void close() {
     if (--depth_ == 0) protect(PROT_NONE);
   }
+  bool holds(const void* address) const { return address >= begin_ && address < begin_ + used_; }
   size_t allocated() const { return allocated_; }
   void limit(size_t limit) { limit_ = limit; }
 
@@ -86,6 +87,7 @@ Region& region() {
 DeviceAccess::DeviceAccess() { region().open(); }
 DeviceAccess::~DeviceAccess() { region().close(); }
 
+bool on_device(const void* address) { return region().holds(address); }
 size_t allocated_bytes() { return region().allocated(); }
 void limit_bytes(size_t limit) { region().limit(limit); }
 

@@ -16,6 +16,9 @@ class DeviceAccess {
   DeviceAccess& operator=(const DeviceAccess&) = delete;
 };
 
+// Whether an address is in the memory.
+bool on_device(const void* address);
+
 // Bytes that are allocated now; and the largest that may be, for tests of what happens at the limit.
 size_t allocated_bytes();
 void limit_bytes(size_t limit);

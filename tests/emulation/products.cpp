@@ -39,10 +39,78 @@ std::vector<float> dense(Number number, const void* from, int64_t first, int64_t
   return to;
 }
 
+int64_t bytes_of(Number number) { return number == Number::fp32 ? 4 : 2; }
+
+// A stored matrix's bytes, row after row, of all batches.
+struct Stored {
+  uintptr_t begin;
+  int64_t rows, row_bytes, stride_bytes, batches, batch_bytes;
+
+  uintptr_t end() const {
+    return begin +
+           static_cast<uintptr_t>((batches - 1) * batch_bytes + (rows - 1) * stride_bytes + row_bytes);
+  }
+  // Whether none of its numbers is one of the other's, which may stand beside it in the same rows.
+  bool apart_from(const Stored& other) const {
+    if (end() <= other.begin || other.end() <= begin) return true;
+    if (batches > 1 || other.batches > 1 || stride_bytes != other.stride_bytes) return false;
+    const int64_t distance = static_cast<int64_t>(other.begin - begin) % stride_bytes;
+    const int64_t column = distance < 0 ? distance + stride_bytes : distance;
+    return column >= row_bytes && column + other.row_bytes <= stride_bytes;
+  }
+};
+
+Stored stored(Number number, const void* address, int64_t rows, int64_t columns, int64_t stride,
+              int64_t batches, int64_t batch_stride) {
+  const int64_t size = bytes_of(number);
+  return {reinterpret_cast<uintptr_t>(address),
+          rows,
+          columns * size,
+          stride * size,
+          batches,
+          batch_stride * size};
+}
+
+// What the library refuses, or leaves undefined.
+void check(const ProductDescription& p) {
+  require(p.m > 0 && p.n > 0 && p.k > 0 && p.batches > 0, "a product has numbers");
+  require(p.stride_a >= (p.transposed_a ? p.m : p.k) && p.stride_b >= (p.transposed_b ? p.k : p.n) &&
+              p.stride_c >= p.n && (p.batches == 1 || p.batch_c >= p.m * p.stride_c),
+          "rows do not overlap");
+  const int64_t operands = bytes_of(p.operands), result = bytes_of(p.result);
+  require(p.stride_a * operands % 16 == 0 && p.stride_b * operands % 16 == 0 && p.stride_c * result % 16 == 0,
+          "rows are aligned");
+  require(p.batch_a * operands % 16 == 0 && p.batch_b * operands % 16 == 0 && p.batch_c * result % 16 == 0,
+          "batches are aligned");
+  require(p.operands == p.result || p.result == Number::fp32, "the library has the numbers' types");
+  require(!p.has_epilogue() || p.batches == 1, "what follows a product follows one alone");
+  require(p.mask == Mask::none || (p.mask_stride % 128 == 0 && p.mask_stride >= p.n), "a mask's rows fit");
+  require(p.mask != Mask::written || p.relu, "a ReLU writes the mask");
+  require(p.mask != Mask::read || (!p.bias && !p.relu && p.k > 1), "the mask alone follows the product");
+}
+
+void check(const ProductDescription& p, const ProductAddresses& at) {
+  require((at.bias != nullptr || !p.bias) && (at.mask != nullptr || p.mask == Mask::none),
+          "a product has what follows it");
+  for (const void* address :
+       {at.a, at.b, static_cast<const void*>(at.c), at.bias, static_cast<const void*>(at.mask)}) {
+    require(reinterpret_cast<uintptr_t>(address) % 16 == 0, "addresses are aligned");
+    require(address == nullptr || emulation::on_device(address), "addresses are the device's");
+  }
+  const Stored c = stored(p.result, at.c, p.m, p.n, p.stride_c, p.batches, p.batch_c);
+  const Stored a = stored(p.operands, at.a, p.transposed_a ? p.k : p.m, p.transposed_a ? p.m : p.k,
+                          p.stride_a, p.batches, p.batch_a);
+  const Stored b = stored(p.operands, at.b, p.transposed_b ? p.n : p.k, p.transposed_b ? p.k : p.n,
+                          p.stride_b, p.batches, p.batch_b);
+  require(c.apart_from(a) && c.apart_from(b), "a product does not write what it reads");
+}
+
 void finish_row(const ProductDescription& p, const ProductAddresses& at, int64_t batch, int64_t i,
                 std::vector<float>& row) {
   const int64_t first = batch * p.batch_c + i * p.stride_c;
   auto* const bits = static_cast<uint8_t*>(at.mask) + (at.mask == nullptr ? 0 : i * p.mask_stride / 8);
+  // Nothing is said of the bits behind a row's last.
+  if (p.mask == Mask::written) std::fill_n(bits, p.mask_stride / 8, uint8_t{0xff});
   for (int64_t j = 0; j < p.n; ++j) {
     float value = row[static_cast<size_t>(j)];
     const auto bit = static_cast<uint8_t>(1U << j % 8);
@@ -64,17 +132,8 @@ void allow_epilogues(bool allowed) { epilogues_allowed = allowed; }
 
 void multiply(const ProductDescription& p, const ProductAddresses& at) {
   require(supported(p), "the product is supported");
-  require(p.stride_a >= (p.transposed_a ? p.m : p.k) && p.stride_b >= (p.transposed_b ? p.k : p.n) &&
-              p.stride_c >= p.n &&
-              (p.mask == Mask::none || (p.mask_stride % 128 == 0 && p.mask_stride >= p.n)),
-          "rows do not overlap");
-  for (const void* address :
-       {at.a, at.b, static_cast<const void*>(at.c), at.bias, static_cast<const void*>(at.mask)}) {
-    require(reinterpret_cast<uintptr_t>(address) % 16 == 0, "addresses are aligned");
-  }
-  const int64_t operands = p.operands == Number::fp32 ? 4 : 2, result = p.result == Number::fp32 ? 4 : 2;
-  require(p.stride_a * operands % 16 == 0 && p.stride_b * operands % 16 == 0 && p.stride_c * result % 16 == 0,
-          "rows are aligned");
+  check(p);
+  check(p, at);
   const emulation::DeviceAccess access;
   std::vector<float> row(static_cast<size_t>(p.n));
   for (int64_t batch = 0; batch < p.batches; ++batch) {

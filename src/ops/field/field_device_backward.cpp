@@ -56,7 +56,7 @@ struct Scratch {
     exact_grad_output.place(Device::cuda).resize({rows, layout.padded_outputs});
     values.place(Device::cuda).reset({sums.size()});
   }
-  Tensor<std::byte> gradient[2], grad_output, activations;
+  Tensor<std::byte> gradient[2], grad_output;
   Tensor<float> exact_grad_output, values;
 };
 
@@ -164,7 +164,7 @@ void backward(const Field& field, const Tensor<float>& points, float time, const
 
   for (int64_t s = 0; s < layout.segments(); ++s) {
     const bool kept = s < saved.kept_blocks;
-    if (!kept) scratch.activations.place(Device::cuda).resize({activations.bytes});
+    if (!kept) passing_memory().resize({activations.bytes});
     const int64_t rows = layout.rows_in(s);
     const Segment segment{
         .count = layout.points_in(s),
@@ -172,7 +172,7 @@ void backward(const Field& field, const Tensor<float>& points, float time, const
         .points = points.row(s * layout.segment_rows),
         // Only read where it was kept.
         .memory = kept ? const_cast<std::byte*>(saved.activations.data()) + s * activations.bytes
-                       : scratch.activations.data(),
+                       : passing_memory().data(),
         .masks = masks_supported(layout, rows)};
     if (!kept) forward_hidden(layout, saved.weights.data(), activations, segment);
     backward_segment(pass, segment, grad_output.row(s * layout.segment_rows), scratch);

@@ -138,6 +138,12 @@ void pack_weights(const DeviceLayout& layout, const Field& field, float time, Te
   });
 }
 
+Tensor<std::byte>& passing_memory() {
+  thread_local Tensor<std::byte> memory;
+  memory.place(Device::cuda);
+  return memory;
+}
+
 bool masks_supported(const DeviceLayout& layout, int64_t rows) {
   for (int layer = 0; layer < layout.depth; ++layer) {
     if (!cuda::supported(forward_product(layout, layer, rows, true)) ||

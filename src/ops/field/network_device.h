@@ -96,6 +96,9 @@ struct Segment {
   bool masks;  // ReLUs leave masks for backward
 };
 
+// Memory for the activations of a segment that are not kept, until the next segment; for either pass.
+Tensor<std::byte>& passing_memory();
+
 // Whether the library can write and read the masks of all layers, so that backward need not read the
 // activations themselves.
 bool masks_supported(const DeviceLayout& layout, int64_t rows);

@@ -186,6 +186,23 @@ TEST_F(FieldOnDevice, SegmentsAreKeptOrComputedAgainToTheSameBytes) {
   }
 }
 
+// Two segments, then four of which three fit: what is kept stays within the limit as it grows.
+TEST_F(FieldOnDevice, KeptActivationsStayWithinTheirLimit) {
+  const Field field = random_field({.depth = 4, .width = 64, .skip = 2}, 11).on(Device::cuda);
+  field::device::segment_values = int64_t{128} * 64;
+  Tensor<float> output;
+  field::Saved saved;
+  for (const int64_t count : {250, 450}) {
+    const field::device::DeviceLayout layout(field, Precision::fp32, count);
+    saved.memory_limit = 3 * field::device::Activations(layout, true).bytes + 1000;
+    field::forward(field, random_points(count).on(Device::cuda), test_time, Precision::fp32, output, &saved);
+    EXPECT_EQ(saved.kept_blocks, std::min<int64_t>(layout.segments(), 3));
+  }
+  const size_t before = memory::device_bytes();
+  saved.activations = {};
+  EXPECT_LE(before - memory::device_bytes(), static_cast<size_t>(saved.memory_limit));
+}
+
 // Without fused epilogues the same steps follow as kernels; bf16 is then rounded once more.
 TEST_F(FieldOnDevice, AgreesWithoutFusedEpilogues) {
   const Field field = random_field({.depth = 4, .width = 96, .skip = 2}, 10);
