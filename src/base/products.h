@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <tuple>
 
 #include "base/device.h"
@@ -51,6 +52,8 @@ struct ProductAddresses {
   void* mask = nullptr;
 };
 
+// Whether the library of products is there; where not, why.
+TRACEFLOW_WITH_CUDA bool products_answer(std::string& why_not);
 // Whether there is code for the product on this device. Asking once makes the product ready.
 TRACEFLOW_WITH_CUDA bool supported(const ProductDescription& product);
 // Puts the product on the stream; the same bytes every time. Throws InternalError where it is not supported.

@@ -1,12 +1,11 @@
 #include "base/products.h"
 
-#include <cublasLt.h>
-
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 
+#include "base/cublas_lt.h"
 #include "base/kernel.h"
 #include "base/tensor.h"
 
@@ -18,9 +17,15 @@ constexpr size_t workspace_bytes = size_t{32} << 20;
 // What every address and row is a multiple of, and so what algorithms may count on.
 constexpr uint32_t alignment = 16;
 
+const CublasLt& lt() {
+  const CublasLt& found = CublasLt::instance();
+  require(found.found(), "cuBLASLt answers", found.why_not());
+  return found;
+}
+
 void check(cublasStatus_t result, const char* what) {
   require(result == CUBLAS_STATUS_SUCCESS, what,
-          result == CUBLAS_STATUS_SUCCESS ? "" : cublasLtGetStatusString(result));
+          result == CUBLAS_STATUS_SUCCESS ? "" : lt().status_string(result));
 }
 
 cudaDataType_t type_of(Number number) { return number == Number::bf16 ? CUDA_R_16BF : CUDA_R_32F; }
@@ -49,8 +54,7 @@ class Plan {
  private:
   template <class T>
   void set(cublasLtMatmulDescAttributes_t attribute, const T& value) const {
-    check(cublasLtMatmulDescSetAttribute(operation_, attribute, &value, sizeof(value)),
-          "a product is described");
+    check(lt().set_operation(operation_, attribute, &value, sizeof(value)), "a product is described");
   }
   void point(const ProductDescription& p, const void* bias, const void* mask) const {
     if (p.bias) set(CUBLASLT_MATMUL_DESC_BIAS_POINTER, bias);
@@ -68,22 +72,22 @@ class Plan {
 cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored_columns, int64_t stride,
                               int64_t batches, int64_t batch_stride) {
   cublasLtMatrixLayout_t made = nullptr;
-  check(cublasLtMatrixLayoutCreate(&made, type_of(number), static_cast<uint64_t>(stored_columns),
-                                   static_cast<uint64_t>(stored_rows), stride),
+  check(lt().create_layout(&made, type_of(number), static_cast<uint64_t>(stored_columns),
+                           static_cast<uint64_t>(stored_rows), stride),
         "a product's matrix is described");
   if (batches > 1) {
     const auto count = static_cast<int32_t>(batches);
-    check(cublasLtMatrixLayoutSetAttribute(made, CUBLASLT_MATRIX_LAYOUT_BATCH_COUNT, &count, sizeof(count)),
+    check(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_BATCH_COUNT, &count, sizeof(count)),
           "a product's batches are described");
-    check(cublasLtMatrixLayoutSetAttribute(made, CUBLASLT_MATRIX_LAYOUT_STRIDED_BATCH_OFFSET, &batch_stride,
-                                           sizeof(batch_stride)),
+    check(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_STRIDED_BATCH_OFFSET, &batch_stride,
+                          sizeof(batch_stride)),
           "a product's batches are described");
   }
   return made;
 }
 
 Plan::Plan(const ProductDescription& p, cublasLtHandle_t handle) {
-  check(cublasLtMatmulDescCreate(&operation_, CUBLAS_COMPUTE_32F, CUDA_R_32F), "a product is described");
+  check(lt().create_operation(&operation_, CUBLAS_COMPUTE_32F, CUDA_R_32F), "a product is described");
   set(CUBLASLT_MATMUL_DESC_TRANSA, p.transposed_b ? CUBLAS_OP_T : CUBLAS_OP_N);
   set(CUBLASLT_MATMUL_DESC_TRANSB, p.transposed_a ? CUBLAS_OP_T : CUBLAS_OP_N);
   set(CUBLASLT_MATMUL_DESC_EPILOGUE, epilogue_of(p));
@@ -101,10 +105,9 @@ Plan::Plan(const ProductDescription& p, cublasLtHandle_t handle) {
 
 void Plan::choose(cublasLtHandle_t handle) {
   cublasLtMatmulPreference_t preference = nullptr;
-  check(cublasLtMatmulPreferenceCreate(&preference), "a product's preferences");
+  check(lt().create_preference(&preference), "a product's preferences");
   const auto prefer = [&](cublasLtMatmulPreferenceAttributes_t attribute, const auto& value) {
-    check(cublasLtMatmulPreferenceSetAttribute(preference, attribute, &value, sizeof(value)),
-          "a product's preferences");
+    check(lt().set_preference(preference, attribute, &value, sizeof(value)), "a product's preferences");
   };
   prefer(CUBLASLT_MATMUL_PREF_MAX_WORKSPACE_BYTES, uint64_t{workspace_bytes});
   // Parts of a sum meet in the workspace and are added in their order, never where they fall.
@@ -118,8 +121,8 @@ void Plan::choose(cublasLtHandle_t handle) {
   cublasLtMatmulHeuristicResult_t result{};
   int count = 0;
   const cublasStatus_t status =
-      cublasLtMatmulAlgoGetHeuristic(handle, operation_, b_, a_, c_, c_, preference, 1, &result, &count);
-  cublasLtMatmulPreferenceDestroy(preference);
+      lt().heuristic(handle, operation_, b_, a_, c_, c_, preference, 1, &result, &count);
+  lt().destroy_preference(preference);
   found_ = status == CUBLAS_STATUS_SUCCESS && count == 1 && result.state == CUBLAS_STATUS_SUCCESS;
   if (found_) algorithm_ = result.algo;
 }
@@ -128,8 +131,8 @@ void Plan::run(const ProductDescription& p, const ProductAddresses& at, cublasLt
                void* workspace) const {
   point(p, at.bias, at.mask);
   const float one = 1, before = p.accumulate ? 1.0F : 0.0F;
-  check(cublasLtMatmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
-                       workspace, workspace_bytes, stream()),
+  check(lt().matmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
+                    workspace, workspace_bytes, stream()),
         "a matrix product on the CUDA device");
 }
 
@@ -160,7 +163,7 @@ class Library {
 
  private:
   Library() : workspace_({static_cast<int64_t>(workspace_bytes)}, Device::cuda) {
-    check(cublasLtCreate(&handle_), "cuBLASLt answers");
+    check(lt().create(&handle_), "cuBLASLt answers");
     int major = 0;
     traceflow::cuda::check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, 0),
                            "the CUDA device's compute capability");
@@ -186,6 +189,10 @@ class Library {
 
 }  // namespace
 
+bool products_answer(std::string& why_not) {
+  why_not = CublasLt::instance().why_not();
+  return CublasLt::instance().found();
+}
 bool supported(const ProductDescription& product) { return Library::instance().supported(product); }
 void multiply(const ProductDescription& product, const ProductAddresses& at) {
   Library::instance().multiply(product, at);

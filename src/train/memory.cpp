@@ -26,8 +26,8 @@ constexpr int64_t device_bytes_per_entry = 192;
 constexpr int64_t entries_per_surfel = 8;
 // A surfel's node, disk and keys in the tracer's tree, and its sums.
 constexpr int64_t device_bytes_per_disk = 640;
-// Of the matrix library, and of small lists.
-constexpr int64_t device_bytes_of_ops = 128 * mebibyte;
+// Of the matrix library, the fields' sums and the segments that pass through them, and of small lists.
+constexpr int64_t device_bytes_of_ops = 512 * mebibyte;
 
 struct SetShape {
   int degree;

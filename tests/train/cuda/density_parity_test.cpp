@@ -41,12 +41,10 @@ struct Edited {
 Edited edited(Device device) {
   constexpr int64_t count = 300;
   Random random(3);
-  Surfels s{random_tensor<float>({count, 3}, random, -1, 1),
-            random_tensor<float>({count, 2}, random, -7, 0),
-            random_tensor<float>({count, 4}, random, -1, 1),
-            random_tensor<float>({count}, random, -4, 4),
-            random_tensor<float>({count, 4, 3}, random, -1, 1),
-            random_tensor<float>({count}, random, -1, 1)};
+  Surfels s{
+      random_tensor<float>({count, 3}, random, -1, 1),    random_tensor<float>({count, 2}, random, -7, 0),
+      random_tensor<float>({count, 4}, random, -1, 1),    random_tensor<float>({count}, random, -4, 4),
+      random_tensor<float>({count, 4, 3}, random, -1, 1), random_tensor<float>({count}, random, -1, 1)};
   Edited e;
   e.surfels = s.on(device);
   e.moments.reset_like(e.surfels);

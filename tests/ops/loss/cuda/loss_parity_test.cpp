@@ -111,7 +111,8 @@ TEST_F(LossOnDevice, SameBytesTwice) {
 TEST_F(LossOnDevice, SsimAgreesWhereThePicturesAreSmooth) {
   Tensor<float> image({40, 48, 3}), target({40, 48, 3});
   for (int64_t i = 0; i < image.size(); ++i) {
-    const auto x = static_cast<float>(i / 3 % 48), y = static_cast<float>(i / 3 / 48);
+    const int64_t pixel = i / 3, row = pixel / 48;
+    const auto x = static_cast<float>(pixel % 48), y = static_cast<float>(row);
     target[i] = 0.5F + 0.4F * std::sin(x / 20) * std::cos(y / 15);
     image[i] = target[i] + 0.05F * std::sin(x / 3);
   }
