@@ -52,6 +52,33 @@ TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {
   expect_equal(gradient.main.position, expected, "position");
 }
 
+TEST(Renderer, DensityControlIsToldNormsOfWhatWasDrawn) {
+  Fixture f;
+  f.request.cull = true;
+  Renderer renderer(RenderOptions{});
+  const Frame& frame = renderer.forward(f.scene, f.request, true);
+  FrameGradient grad_frame;
+  Random random(6);
+  grad_frame.colour.reset(frame.colour.shape());
+  for (float& v : grad_frame.colour.values()) v = static_cast<float>(random.normal());
+  SceneGradient gradient;
+  gradient.reset(f.scene);
+  renderer.backward(f.scene, f.request, Trainable{}, grad_frame, gradient);
+  int64_t main = 0, environment = 0;
+  for (int64_t i = 0; i < f.scene.main.count(); ++i) {
+    ASSERT_GE(gradient.main_signal[i], 0);
+    if (gradient.main_signal[i] > 0) ++main;
+    ASSERT_TRUE(gradient.main_visible[i] != 0 || gradient.main_signal[i] == 0);
+  }
+  for (int64_t i = 0; i < f.scene.environment.count(); ++i) {
+    ASSERT_GE(gradient.environment_signal[i], 0);
+    if (gradient.environment_signal[i] > 0) ++environment;
+    ASSERT_EQ(gradient.environment_visible[i] != 0, gradient.environment_signal[i] > 0);
+  }
+  EXPECT_GT(main, 100);
+  EXPECT_GT(environment, 10);
+}
+
 TEST(Renderer, WithoutReflectionsTheImageIsTheDiffuseOne) {
   Fixture f;
   f.request.specular = false;
