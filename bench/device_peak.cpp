@@ -1,8 +1,8 @@
 #include <cstddef>
 
-#include "base/products.h"
 #include "math/bf16.h"
 #include "on_device.h"
+#include "primitives/products.h"
 
 // What the CUDA device can do, measured: copies within its memory, matrix products, and how soon one small
 // piece of work follows another. The floors of the other benchmarks' calls rest on it (scripts/floors).

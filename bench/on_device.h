@@ -7,6 +7,7 @@
 #include "base/device_memory.h"
 #include "base/random.h"
 #include "base/tensor.h"
+#include "primitives/products.h"
 #include "scene/field.h"
 #include "scene/surfels.h"
 
@@ -22,8 +23,8 @@ inline constexpr int64_t sh_numbers = 48;  // of a surfel, degree 3
 
 // Says why a benchmark is skipped where no device answers.
 inline bool no_device(benchmark::State& state) {
-  std::string why_not = "built without CUDA";
-  if (cuda::answers != nullptr && cuda::answers(why_not)) return false;
+  std::string why_not;
+  if (cuda::is_ready(why_not)) return false;
   state.SkipWithError(("no CUDA device: " + why_not).c_str());
   return true;
 }

@@ -288,7 +288,7 @@ void register_on_device(const std::string& name, const Step& step) {
 // Before main() looks for what is registered.
 [[maybe_unused]] const bool device_registered = [] {
   std::string why_not;
-  if (cuda::answers == nullptr || !cuda::answers(why_not)) return false;
+  if (!cuda::is_ready(why_not)) return false;
   register_on_device("build", [](OnDevice& t) { t.build(); });
   register_on_device("forward", [](OnDevice& t) { t.forward(nullptr); });
   register_on_device("forward_saved", [](OnDevice& t) { t.forward(t.saved()); });

@@ -44,7 +44,7 @@ function(traceflow_cuda_library)
   add_library(traceflow_cuda_objects OBJECT ${sources})
   target_include_directories(traceflow_cuda_objects PRIVATE ${CMAKE_SOURCE_DIR}/src)
   target_compile_definitions(traceflow_cuda_objects PRIVATE GLM_FORCE_SILENT_WARNINGS GLM_FORCE_XYZW_ONLY)
-  # cuBLASLt is opened when it is needed (base/cublas_lt.h).
+  # cuBLASLt is opened when it is needed (primitives/cublas_lt.h).
   target_compile_definitions(traceflow_cuda_objects PRIVATE TRACEFLOW_CUDA_LIBRARIES="${CUDAToolkit_LIBRARY_DIR}")
   # The standard is named as an option because CMake 3.25 does not know that nvcc has it.
   set_target_properties(traceflow_cuda_objects PROPERTIES CUDA_EXTENSIONS ON CXX_STANDARD_REQUIRED OFF)

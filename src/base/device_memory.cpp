@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/profile.h"
 
 namespace traceflow::memory {
 
@@ -66,7 +67,11 @@ void copy(Device to_device, void* to, Device from_device, const void* from, size
   if (to_device == Device::cpu && from_device == Device::cpu) {
     std::memcpy(to, from, bytes);
   } else {
+    const profile::Scope scope(to_device == Device::cpu     ? "device: read by the host"
+                               : from_device == Device::cpu ? "device: written by the host"
+                                                            : "device: copy");
     cuda::copy(to_device, to, from_device, from, bytes);
+    if (profile::is_on()) cuda::synchronise();
   }
 }
 
@@ -75,7 +80,9 @@ void zero(Device device, void* memory, size_t bytes) {
   if (device == Device::cpu) {
     std::memset(memory, 0, bytes);
   } else {
+    const profile::Scope scope("device: zeros");
     cuda::zero(memory, bytes);
+    if (profile::is_on()) cuda::synchronise();
   }
 }
 

@@ -64,9 +64,9 @@ __global__ void index_kernel(int64_t n, F f) {
 }
 
 template <class F>
-void for_each_index(const char* name, int64_t n, const F& f) {
+void for_each_index(const char* description, int64_t n, const F& f) {
   constexpr int threads = 256;
-  launch(name, {blocks_for(n, threads), threads}, index_kernel<F>, n, f);
+  launch(description, {blocks_for(n, threads), threads}, index_kernel<F>, n, f);
 }
 
 // The sum over the lanes of a warp, in all of them; in a fixed order.

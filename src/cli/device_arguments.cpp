@@ -6,17 +6,11 @@
 #include "base/device_memory.h"
 #include "base/error.h"
 #include "base/parallel.h"
+#include "primitives/products.h"
 
 namespace traceflow::cli {
 
 namespace {
-
-// Whether the CUDA device can be used; where not, why.
-bool cuda_answers(std::string& why_not) {
-  if (cuda::answers != nullptr) return cuda::answers(why_not);
-  why_not = "this program was built without CUDA";
-  return false;
-}
 
 std::string cuda_text() {
   const cuda::DeviceFacts facts = cuda::facts();
@@ -45,7 +39,7 @@ Device DeviceArguments::choose(bool quiet) const {
   cuda::set_deterministic(state_->deterministic);
   const std::string& asked = state_->device;
   std::string why_not = "asked for with --device cpu";
-  const bool cuda = asked != "cpu" && cuda_answers(why_not);
+  const bool cuda = asked != "cpu" && cuda::is_ready(why_not);
   if (asked == "cuda" && !cuda) {
     throw InputError("--device", "", "cuda, but " + why_not, "a CUDA device", "use --device cpu");
   }

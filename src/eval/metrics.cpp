@@ -4,9 +4,9 @@
 #include <cmath>
 #include <vector>
 
-#include "base/sums.h"
 #include "eval/metrics_kernels.h"
 #include "ops/loss/loss.h"
+#include "primitives/sums.h"
 
 namespace traceflow::eval {
 

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <numbers>
 
-#include "base/sums.h"
 #include "files/eight_bit.h"
 #include "math/types.h"
+#include "primitives/sums.h"
 
 // The figures' steps: one pixel or number each, which return what it adds to the sum (method §8).
 namespace traceflow::eval {

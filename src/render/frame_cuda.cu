@@ -1,6 +1,6 @@
 #include "base/kernel.h"
-#include "base/list_where.h"
-#include "base/sum_kernels.h"
+#include "primitives/list_where.h"
+#include "primitives/sum_kernels.h"
 #include "render/frame_kernels.h"
 
 namespace traceflow {

@@ -1,9 +1,9 @@
 #include "render/renderer.h"
 
 #include "base/parallel.h"
-#include "base/sums.h"
 #include "math/spherical_harmonics.h"
 #include "ops/shade/shade.h"
+#include "primitives/sums.h"
 #include "render/frame_kernels.h"
 #include "render/visibility.h"
 

@@ -1,6 +1,6 @@
 #include "render/visibility.h"
 
-#include "base/list_where.h"
+#include "primitives/list_where.h"
 #include "render/frame_kernels.h"
 
 namespace traceflow {

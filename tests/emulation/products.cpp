@@ -2,9 +2,10 @@
 #include <vector>
 
 #include "base/error.h"
-#include "base/products.h"
+#include "base/profile.h"
 #include "emulation/device.h"
 #include "math/bf16.h"
+#include "primitives/products.h"
 
 // Stands in for cuBLASLt: the same products in plain loops.
 namespace traceflow::cuda {
@@ -132,6 +133,7 @@ bool supported(const ProductDescription& product) { return epilogues_allowed || 
 void allow_epilogues(bool allowed) { epilogues_allowed = allowed; }
 
 void multiply(const ProductDescription& p, const ProductAddresses& at) {
+  const profile::Scope scope("matrix product");
   require(supported(p), "the product is supported");
   check(p);
   check(p, at);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "primitives/products.h"
 #include "support/gradients.h"
 
 // What the parity tests share: the same op on the CPU and on the CUDA device, or on its emulation.
@@ -12,7 +13,7 @@ class OnDevice : public ::testing::Test {
  protected:
   void SetUp() override {
     std::string why_not;
-    if (!cuda::answers(why_not)) GTEST_SKIP() << "no CUDA device: " << why_not;
+    if (!cuda::is_ready(why_not)) GTEST_SKIP() << "no CUDA device: " << why_not;
   }
 };
 

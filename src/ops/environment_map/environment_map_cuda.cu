@@ -1,9 +1,9 @@
 #include <bit>
 
 #include "base/kernel.h"
-#include "base/sort.h"
 #include "ops/environment_map/environment_map_cuda.h"
 #include "ops/environment_map/environment_map_kernels.h"
+#include "primitives/sort.h"
 
 // Rays are sorted by the first texel that they look at, and each texel collects from its own and its
 // neighbours' rays in their order: the same bytes every run.

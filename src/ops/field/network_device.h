@@ -4,11 +4,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "base/products.h"
 #include "base/tensor.h"
 #include "math/bf16.h"
 #include "ops/field/field.h"
 #include "ops/field/network.h"
+#include "primitives/products.h"
 
 // How the CUDA device sees a network (method §1.2). Points go through all layers in segments, whose hidden
 // values of two layers stay in a large device's second-level cache. The encoding and the hidden values before

@@ -4,7 +4,7 @@
 #include <memory>
 #include <tuple>
 
-#include "base/number.h"
+#include "primitives/number.h"
 
 // Matrix products on one thread, by oneDNN. All matrices are dense and row-major, but for a B that is used
 // often: it can be packed into the order in which the product reads it.

@@ -1,5 +1,5 @@
-#include "base/sum_kernels.h"
 #include "ops/loss/loss_kernels.h"
+#include "primitives/sum_kernels.h"
 
 namespace traceflow {
 

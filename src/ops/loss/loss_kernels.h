@@ -4,11 +4,11 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/sums.h"
 #include "base/tensor.h"
 #include "math/ssim.h"
 #include "math/types.h"
 #include "ops/loss/mean.h"
+#include "primitives/sums.h"
 
 // What the loss terms share, and their steps: one pixel or number each, which return what it adds to the sum.
 namespace traceflow::loss {

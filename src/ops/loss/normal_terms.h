@@ -1,7 +1,7 @@
 #pragma once
 
-#include "base/sums.h"
 #include "ops/loss/loss_kernels.h"
+#include "primitives/sums.h"
 
 // The terms on normals, for single precision on any device and for the reference.
 namespace traceflow::loss {

@@ -2,10 +2,10 @@
 
 #include <limits>
 
-#include "base/lists.h"
-#include "base/sum_kernels.h"
 #include "ops/loss/loss_kernels.h"
 #include "ops/loss/rigidity_kernels.h"
+#include "primitives/lists.h"
+#include "primitives/sum_kernels.h"
 
 // Edges are measured twice: once for the term's mean, which weighs the gradient, and once by either end,
 // which collects what its edges send it, those that it is the far end of as well as its own, in the order

@@ -1,6 +1,6 @@
 #include "ops/loss/ssim_cuda.h"
 
-#include "base/sum_kernels.h"
+#include "primitives/sum_kernels.h"
 
 // SSIM by tiles of one channel. A block loads its tile with the border that the window reaches into (zeros
 // outside the picture), sums along the rows into shared memory and from there down the columns: the window is

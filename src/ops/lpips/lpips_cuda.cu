@@ -1,8 +1,8 @@
 #include "ops/lpips/lpips_cuda.h"
 
-#include "base/sum_kernels.h"
 #include "ops/lpips/device_kernels.h"
 #include "ops/lpips/lpips_directions.h"
+#include "primitives/sum_kernels.h"
 
 namespace traceflow {
 

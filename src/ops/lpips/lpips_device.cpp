@@ -4,10 +4,10 @@
 #include <array>
 #include <utility>
 
-#include "base/products.h"
-#include "base/sums.h"
 #include "ops/lpips/device_kernels.h"
 #include "ops/lpips/lpips_cuda.h"
+#include "primitives/products.h"
+#include "primitives/sums.h"
 
 namespace traceflow::lpips::device {
 

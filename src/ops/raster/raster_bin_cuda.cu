@@ -3,12 +3,12 @@
 #include <string>
 
 #include "base/kernel.h"
-#include "base/sort.h"
-#include "base/sum_kernels.h"
 #include "ops/raster/raster_chain.h"
 #include "ops/raster/raster_cuda.h"
 #include "ops/raster/raster_footprint.h"
 #include "ops/raster/raster_prepare.h"
+#include "primitives/sort.h"
+#include "primitives/sum_kernels.h"
 
 // The list of surfels of every tile. Surfels are put in order of depth once; their entries are written in
 // that order; a stable sort by tile then leaves each tile's list front to back.

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "base/sums.h"
+#include "primitives/sums.h"
 
 namespace traceflow::raster {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "base/sums.h"
 #include "base/tensor.h"
 #include "ops/surface/surface_kernels.h"
+#include "primitives/sums.h"
 
 namespace traceflow::surface {
 

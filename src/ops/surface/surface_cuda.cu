@@ -1,7 +1,7 @@
 #include "base/kernel.h"
-#include "base/list_where.h"
-#include "base/sum_kernels.h"
 #include "ops/surface/surface_kernels.h"
+#include "primitives/list_where.h"
+#include "primitives/sum_kernels.h"
 
 namespace traceflow {
 

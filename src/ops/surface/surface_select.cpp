@@ -1,6 +1,6 @@
-#include "base/list_where.h"
 #include "ops/surface/surface.h"
 #include "ops/surface/surface_kernels.h"
+#include "primitives/list_where.h"
 
 namespace traceflow::surface {
 

@@ -1,9 +1,9 @@
 #include "base/kernel.h"
-#include "base/sort.h"
 #include "math/blend.h"
 #include "ops/trace/trace_bvh.h"
 #include "ops/trace/trace_cuda.h"
 #include "ops/trace/trace_disk.h"
+#include "primitives/sort.h"
 
 // Builds the tree from scratch (Karras 2012): keys along a curve, a sort, all nodes at once from the keys,
 // and the boxes from the leaves up.

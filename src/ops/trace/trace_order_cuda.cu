@@ -1,6 +1,6 @@
-#include "base/sort.h"
 #include "ops/trace/trace_forward_cuda.h"
 #include "ops/trace/trace_ray_key.h"
+#include "primitives/sort.h"
 
 // Orders rays as trace_order.cpp does on the CPU, but for its groups.
 namespace traceflow::trace::cuda {

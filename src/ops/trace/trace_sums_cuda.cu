@@ -1,6 +1,6 @@
-#include "base/sort.h"
 #include "math/spherical_harmonics.h"
 #include "ops/trace/trace_forward_cuda.h"
+#include "primitives/sort.h"
 
 // Adds what hits bring to their surfels in an order that is the same every run. Hits are sorted by surfel,
 // and by ray. A warp adds the runs of a span of them: one that lies inside the span is done, those at its

@@ -2,8 +2,8 @@
 #include <cstring>
 #include <limits>
 
-#include "base/products.h"
 #include "ops/lpips/lpips_device.h"
+#include "primitives/products.h"
 #include "support/device.h"
 #include "support/narrow_lpips.h"
 

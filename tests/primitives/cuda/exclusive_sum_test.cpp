@@ -1,6 +1,6 @@
 #include <numeric>
 
-#include "base/sort.h"
+#include "primitives/sort.h"
 #include "support/device.h"
 
 namespace traceflow {

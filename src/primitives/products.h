@@ -4,8 +4,8 @@
 #include <string>
 #include <tuple>
 
-#include "base/device.h"
-#include "base/number.h"
+#include "base/device_memory.h"
+#include "primitives/number.h"
 
 // Matrix products on the CUDA device, by cuBLASLt. All matrices are row-major.
 namespace traceflow::cuda {
@@ -54,6 +54,11 @@ struct ProductAddresses {
 
 // Whether the library of products is there; where not, why.
 TRACEFLOW_WITH_CUDA bool products_answer(std::string& why_not);
+// Whether the device can be used: code for it, an answer from it, and that library; where not, why.
+inline bool is_ready(std::string& why_not) {
+  why_not = "this program was built without CUDA";
+  return answers != nullptr && answers(why_not) && products_answer(why_not);
+}
 // Whether there is code for the product on this device. Asking once makes the product ready.
 TRACEFLOW_WITH_CUDA bool supported(const ProductDescription& product);
 // Puts the product on the stream; the same bytes every time. Throws InternalError where it is not supported.

@@ -1,13 +1,13 @@
-#include "base/products.h"
+#include "primitives/products.h"
 
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 
-#include "base/cublas_lt.h"
 #include "base/kernel.h"
 #include "base/tensor.h"
+#include "primitives/cublas_lt.h"
 
 namespace traceflow::cuda {
 

@@ -2,7 +2,7 @@
 #include <cub/device/device_scan.cuh>
 
 #include "base/kernel.h"
-#include "base/sort.h"
+#include "primitives/sort.h"
 
 namespace traceflow::cuda {
 

@@ -1,4 +1,4 @@
-#include "base/lists.h"
+#include "primitives/lists.h"
 
 #include "support/device.h"
 

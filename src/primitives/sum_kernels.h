@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "base/kernel.h"
-#include "base/sums.h"
 #include "base/tensor.h"
+#include "primitives/sums.h"
 
 // Sums on the CUDA device, in an order that depends on nothing but the number of terms: every block adds up
 // its share, and then one block what they found.
@@ -55,12 +55,12 @@ T* memory_for_partial_sums(int64_t count) {
 }
 
 template <class T, class F, class G>
-void sum_each_index(const char* name, int64_t n, const F& f, const G& finish) {
+void sum_each_index(const char* description, int64_t n, const F& f, const G& finish) {
   constexpr int64_t most_blocks = 1024, terms_each = 4;
   const int64_t blocks = std::clamp<int64_t>(blocks_for(n, sum_threads * terms_each), 1, most_blocks);
   T* const partial = memory_for_partial_sums<T>(blocks);
-  launch(name, {blocks, sum_threads}, partial_sums<T, F>, n, f, partial);
-  launch(name, {1, sum_threads}, add_up<T, G>, blocks, partial, finish);
+  launch(description, {blocks, sum_threads}, partial_sums<T, F>, n, f, partial);
+  launch(description, {1, sum_threads}, add_up<T, G>, blocks, partial, finish);
 }
 
 }  // namespace traceflow::cuda

@@ -1,8 +1,8 @@
-#include "base/lists.h"
+#include "primitives/lists.h"
 
 #include "base/kernel.h"
-#include "base/list_where.h"
-#include "base/sort.h"
+#include "primitives/list_where.h"
+#include "primitives/sort.h"
 
 // Counts the entries of every key, adds the counts up to places, fills the places as threads come, and puts
 // each list into order: one thread a list, for lists are short.

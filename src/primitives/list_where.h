@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "base/parallel.h"
-#include "base/sort.h"
 #include "base/tensor.h"
+#include "primitives/sort.h"
 
 namespace traceflow {
 

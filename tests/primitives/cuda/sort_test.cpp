@@ -1,4 +1,4 @@
-#include "base/sort.h"
+#include "primitives/sort.h"
 
 #include <algorithm>
 #include <vector>

@@ -7,8 +7,8 @@
 namespace traceflow {
 
 namespace cuda {
-// The sum of f(i) over [0, n) as kernels. Defined in base/sum_kernels.h; the .cu file beside the functors
-// instantiates it.
+// The sum of f(i) over [0, n) as kernels. Defined in primitives/sum_kernels.h; the .cu file beside the
+// functors instantiates it.
 template <class T, class F, class G>
 TRACEFLOW_WITH_CUDA void sum_each_index(const char* description, int64_t n, const F& f, const G& finish);
 }  // namespace cuda
