@@ -4,6 +4,7 @@
 #include "math/spherical_harmonics.h"
 #include "ops/shade/shade.h"
 #include "primitives/sums.h"
+#include "primitives/zeros.h"
 #include "render/frame_kernels.h"
 #include "render/visibility.h"
 
@@ -39,25 +40,33 @@ Tensor<float> Frame::specular_image() const {
 }
 
 void SceneGradient::reset(const Scene& scene) {
-  main.reset_like(scene.main);
-  environment.reset_like(scene.environment);
-  if (scene.main_field) main_field.reset_like(*scene.main_field);
-  if (scene.environment_field) environment_field.reset_like(*scene.environment_field);
+  Zeros zeros;
+  const auto like = [&](auto& gradient, const auto& parameters) {
+    gradient.resize_like(parameters);
+    gradient.for_each([&](const auto&, auto& tensor) { zeros.add(tensor); });
+  };
+  const auto sized = [&](auto& tensor, const Shape& shape) {
+    tensor.place(scene.device()).resize(shape);
+    zeros.add(tensor);
+  };
+  like(main, scene.main);
+  like(environment, scene.environment);
+  if (scene.main_field) like(main_field, *scene.main_field);
+  if (scene.environment_field) like(environment_field, *scene.environment_field);
   if (scene.environment_map) {
-    const Tensor<float>& logit = scene.environment_map->logit;
-    environment_map.logit.place(logit.device()).reset(logit.shape());
+    sized(environment_map.logit, scene.environment_map->logit.shape());
     if (!scene.environment_map->field) environment_map.field.reset();
     if (scene.environment_map->field) {
       if (!environment_map.field) environment_map.field.emplace();
-      environment_map.field->reset_like(*scene.environment_map->field);
+      like(*environment_map.field, *scene.environment_map->field);
     }
   }
   camera = {};
-  const Device device = scene.device();
-  main_signal.place(device).reset({scene.main.count()});
-  main_visible.place(device).reset({scene.main.count()});
-  environment_signal.place(device).reset({scene.environment.count()});
-  environment_visible.place(device).reset({scene.environment.count()});
+  sized(main_signal, {scene.main.count()});
+  sized(main_visible, {scene.main.count()});
+  sized(environment_signal, {scene.environment.count()});
+  sized(environment_visible, {scene.environment.count()});
+  zeros.fill();
 }
 
 Renderer::Renderer(const RenderOptions& options, const KeptMemory& kept) : options_(options) {

@@ -61,18 +61,18 @@ struct BasicField {
     return result;
   }
 
-  // Zeros in the shapes of another field and on its device, in the memory that is there.
-  void reset_like(const BasicField& other) {
-    const auto zero = [](Tensor<T>& tensor, const Tensor<T>& like) {
-      tensor.place(like.device()).reset(like.shape());
+  // The shapes of another field, on its device, in the memory that is there.
+  void resize_like(const BasicField& other) {
+    const auto resize = [](Tensor<T>& tensor, const Tensor<T>& like) {
+      tensor.place(like.device()).resize(like.shape());
     };
     shape = other.shape;
     weight.resize(other.weight.size());
     bias.resize(other.bias.size());
-    for (size_t l = 0; l < weight.size(); ++l) zero(weight[l], other.weight[l]);
-    for (size_t l = 0; l < bias.size(); ++l) zero(bias[l], other.bias[l]);
-    zero(head_weight, other.head_weight);
-    zero(head_bias, other.head_bias);
+    for (size_t l = 0; l < weight.size(); ++l) resize(weight[l], other.weight[l]);
+    for (size_t l = 0; l < bias.size(); ++l) resize(bias[l], other.bias[l]);
+    resize(head_weight, other.head_weight);
+    resize(head_bias, other.head_bias);
   }
 
   // f(name, tensor) for every parameter tensor: "weight0", "bias0", …, "head_weight", "head_bias".

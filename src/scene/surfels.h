@@ -25,15 +25,15 @@ struct BasicSurfels {
             opacity_logit.on(device), sh.on(device),        tint_logit.on(device)};
   }
 
-  // Zeros in the shapes of another set and on its device, in the memory that is there.
-  void reset_like(const BasicSurfels& other) {
+  // The shapes of another set, on its device, in the memory that is there.
+  void resize_like(const BasicSurfels& other) {
     const Device device = other.device();
-    position.place(device).reset(other.position.shape());
-    log_scale.place(device).reset(other.log_scale.shape());
-    rotation.place(device).reset(other.rotation.shape());
-    opacity_logit.place(device).reset(other.opacity_logit.shape());
-    sh.place(device).reset(other.sh.shape());
-    tint_logit.place(device).reset(other.tint_logit.shape());
+    position.place(device).resize(other.position.shape());
+    log_scale.place(device).resize(other.log_scale.shape());
+    rotation.place(device).resize(other.rotation.shape());
+    opacity_logit.place(device).resize(other.opacity_logit.shape());
+    sh.place(device).resize(other.sh.shape());
+    tint_logit.place(device).resize(other.tint_logit.shape());
   }
 
   // f(name, tensor) for every group, in the order above. An environment has no tint group.
