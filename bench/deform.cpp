@@ -20,7 +20,7 @@ class OnDevice {
       grad_field_ = zeros_like<float>(field_);
     }
     saved_.field.memory_limit = int64_t{8} << 30;
-    grad_stored_.reset_like(stored_);
+    grad_stored_ = zeros_like<float>(stored_);
     forward();
     grad_posed_ = posed_;
   }

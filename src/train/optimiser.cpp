@@ -18,10 +18,10 @@ std::vector<optimize::AdamState> zero_states(const Field& field) {
   return states;
 }
 
-// One Adam step per tensor, with a note of what was not finite.
+// Collects the tensors of a step, so that all of them are stepped at once.
 class Stepper {
  public:
-  Stepper(const optimize::AdamOptions& options, StepNotes& notes) : options_(options), notes_(notes) {}
+  explicit Stepper(StepNotes& notes) : notes_(notes) { notes_.tensors.clear(); }
 
   void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
                   optimize::AdamState& state, double rate) {
@@ -30,12 +30,15 @@ class Stepper {
   // A rate for each column of a row.
   void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
                   optimize::AdamState& state, const std::vector<float>& rates) {
-    optimize::adam_step(parameter, gradient, state, std::span<const float>(rates), options_,
-                        notes_.add(name, parameter));
+    tasks_.push_back({&parameter, &gradient, &state, rates});
+    notes_.tensors.push_back({name, parameter.row_size()});
+  }
+  void finish(const optimize::AdamOptions& options) {
+    optimize::adam_step(tasks_, options, notes_.left_alone);
   }
 
  private:
-  optimize::AdamOptions options_;
+  std::vector<optimize::AdamTask> tasks_;
   StepNotes& notes_;
 };
 
@@ -64,24 +67,14 @@ void step_field(Stepper& step, const std::string& name, Field& field, const Fiel
 
 }  // namespace
 
-void StepNotes::begin(Device device, int64_t most) {
-  tensors_.clear();
-  notes_.place(device).reset({most});
-}
-
-optimize::LeftAloneSlot StepNotes::add(const std::string& name, const Tensor<float>& parameter) {
-  tensors_.push_back({name, parameter.row_size()});
-  return {notes_, static_cast<int64_t>(tensors_.size()) - 1};
-}
-
 NonFiniteGradients StepNotes::report() const {
   NonFiniteGradients report;
-  const Tensor<optimize::LeftAlone> notes = notes_.on(Device::cpu);
-  for (size_t k = 0; k < tensors_.size(); ++k) {
+  const Tensor<optimize::LeftAlone> notes = left_alone.on(Device::cpu);
+  for (size_t k = 0; k < tensors.size(); ++k) {
     const optimize::LeftAlone& note = notes[static_cast<int64_t>(k)];
     if (note.count > 0 && report.count == 0) {
-      const int64_t row = tensors_[k].row_size > 0 ? note.first() / tensors_[k].row_size : 0;
-      report.first = tensors_[k].name + ", row " + std::to_string(row);
+      const int64_t row = tensors[k].row_size > 0 ? note.first() / tensors[k].row_size : 0;
+      report.first = tensors[k].name + ", row " + std::to_string(row);
     }
     report.count += note.count;
   }
@@ -119,10 +112,7 @@ Optimiser::Optimiser(const Scene& scene) {
 
 void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
                      const Schedule& schedule, const RateOptions& rates, int iteration) {
-  int64_t tensors = 0;
-  for_each(*this, [&](const std::string&, const optimize::AdamState&) { ++tensors; });
-  notes_.begin(scene.main.position.device(), tensors);
-  Stepper step(rates.adam(), notes_);
+  Stepper step(notes_);
   const double position_rate = schedule.position_rate(iteration) * scene.extent;
   const double field_rate = schedule.field_rate(iteration);
 
@@ -150,6 +140,7 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
                  field_rate);
     }
   }
+  step.finish(rates.adam());
 }
 
 template <class Self, class F>

@@ -36,22 +36,16 @@ struct NonFiniteGradients {
   std::string first;
 };
 
-// Notes of what was not finite in a step, one for each tensor that it went through, where the tensors are.
-class StepNotes {
- public:
-  // Forgets the last step's. At most `most` tensors follow.
-  void begin(Device device, int64_t most);
-  // The place of the next tensor's note.
-  optimize::LeftAloneSlot add(const std::string& name, const Tensor<float>& parameter);
-  NonFiniteGradients report() const;
-
- private:
-  struct Noted {
+// What was not finite in a step, by the tensors that it went through, where they are.
+struct StepNotes {
+  struct Stepped {
     std::string name;
     int64_t row_size;
   };
-  std::vector<Noted> tensors_;
-  Tensor<optimize::LeftAlone> notes_;
+  std::vector<Stepped> tensors;
+  Tensor<optimize::LeftAlone> left_alone;  // one for each
+
+  NonFiniteGradients report() const;
 };
 
 // Updates a scene by Adam with the schedule's rates (method §7.6).

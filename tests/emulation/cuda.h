@@ -16,6 +16,7 @@
 #define __host__
 #define __forceinline__ inline
 #define __launch_bounds__(...)
+#define __grid_constant__
 // Blocks run one after the other, so one copy serves them all; as on a device it holds what the last one
 // left.
 #define __shared__ static

@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "base/tensor.h"
 
-// Adam (method §7.6), one parameter tensor at a time, fused: one pass over parameter, gradient and both
-// moments.
+// Adam (method §7.6), fused: one pass over parameters, gradients and both moments.
 namespace traceflow::optimize {
 
 struct AdamOptions {
@@ -26,6 +26,16 @@ struct BasicAdamState {
 };
 using AdamState = BasicAdamState<float>;
 
+// A step of one parameter tensor. learning_rates: one rate for all, or one for each column of a row (the
+// harmonics' first coefficient learns faster than the others), at most most_rates.
+struct AdamTask {
+  Tensor<float>* parameter;
+  const Tensor<float>* gradient;
+  AdamState* state;
+  std::vector<float> learning_rates;
+};
+inline constexpr int most_rates = 64;
+
 // What a step left alone, since its gradient is not finite: how many entries, and which is the first. All
 // zeros mean none.
 struct LeftAlone {
@@ -35,21 +45,11 @@ struct LeftAlone {
   int64_t first() const { return largest_index - inverted_first; }
 };
 
-// Where a step notes that: a place in a list on the parameter's device, which holds zeros there before.
-// Nobody waits for it until the list is read.
-struct LeftAloneSlot {
-  Tensor<LeftAlone>& list;
-  int64_t place;
-};
-
-// parameter −= rate · m̂ / (√v̂ + ε). Increments state.step. A gradient entry that is not finite, or whose
-// square is not, leaves its parameter and moments alone and is noted. learning_rates: one rate for all, or
-// one for each column of a row (the harmonics' first coefficient learns faster than the others), at most
-// most_rates. Runs where the parameter is.
-inline constexpr int most_rates = 64;
-void adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
-               std::span<const float> learning_rates, const AdamOptions& options, const LeftAloneSlot& slot);
-// Returns how many entries were left alone, for which the host waits.
+// parameter −= rate · m̂ / (√v̂ + ε) for all tasks, whose tensors are on one device. Increments their step. A
+// gradient entry that is not finite, or whose square is not, leaves its parameter and moments alone and is
+// noted: left_alone gets one entry a task there, for which nobody waits until it is read.
+void adam_step(std::span<const AdamTask> tasks, const AdamOptions& options, Tensor<LeftAlone>& left_alone);
+// The same for one tensor. Returns how many entries were left alone, for which the host waits.
 int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
                   std::span<const float> learning_rates, const AdamOptions& options);
 inline int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,

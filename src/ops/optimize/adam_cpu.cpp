@@ -78,8 +78,11 @@ void note(const Tensor<float>& gradient, int64_t count, LeftAlone& left_alone) {
                 LeftAlone::largest_index - static_cast<int32_t>(bad - values.begin())};
 }
 
-void step_on_host(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
-                  std::span<const float> learning_rates, const AdamOptions& options, LeftAlone& left_alone) {
+void step_on_host(const AdamTask& task, const AdamOptions& options, LeftAlone& left_alone) {
+  Tensor<float>& parameter = *task.parameter;
+  const Tensor<float>& gradient = *task.gradient;
+  AdamState& state = *task.state;
+  const std::vector<float>& learning_rates = task.learning_rates;
   // Blocks begin at multiples of the row, so that one block's rates serve them all.
   const auto columns = static_cast<int64_t>(learning_rates.size());
   const int64_t grain = std::max<int64_t>(1, block_size / columns) * columns;
@@ -107,48 +110,67 @@ void step_on_host(Tensor<float>& parameter, const Tensor<float>& gradient, AdamS
   note(gradient, total, left_alone);
 }
 
-void step_on_device(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
-                    std::span<const float> learning_rates, const AdamOptions& options,
-                    LeftAlone* left_alone) {
-  cuda::AdamTensor tensor{parameter.data(),
-                          gradient.data(),
-                          state.first.data(),
-                          state.second.data(),
-                          parameter.size(),
-                          options.beta1,
-                          options.beta2,
-                          options.epsilon,
-                          inverse_correction(options.beta1, state.step),
-                          inverse_correction(options.beta2, state.step),
-                          static_cast<int32_t>(learning_rates.size()),
-                          {},
-                          left_alone};
-  std::copy(learning_rates.begin(), learning_rates.end(), tensor.rates.begin());
-  cuda::adam_step(tensor);
+void add_to(cuda::AdamTable& table, const AdamTask& task) {
+  const std::vector<float>& rates = task.learning_rates;
+  table.tensor[static_cast<size_t>(table.tensors++)] = {
+      .parameter = task.parameter->data(),
+      .gradient = task.gradient->data(),
+      .first = task.state->first.data(),
+      .second = task.state->second.data(),
+      .count = static_cast<int32_t>(task.parameter->size()),
+      .columns = static_cast<int32_t>(rates.size()),
+      .first_rate = table.rates,
+      .inverse_correction1 = inverse_correction(table.options.beta1, task.state->step),
+      .inverse_correction2 = inverse_correction(table.options.beta2, task.state->step),
+      .first_block = 0};
+  std::copy(rates.begin(), rates.end(), table.rate.begin() + table.rates);
+  table.rates += static_cast<int32_t>(rates.size());
+}
+
+void step_on_device(std::span<const AdamTask> tasks, const AdamOptions& options, LeftAlone* left_alone) {
+  cuda::AdamTable table;
+  table.options = options;
+  table.left_alone = left_alone;
+  for (const AdamTask& task : tasks) {
+    if (!table.has_room(task.learning_rates.size())) {
+      cuda::adam_step(table);
+      table.left_alone += table.tensors;
+      table.tensors = table.rates = 0;
+    }
+    add_to(table, task);
+  }
+  cuda::adam_step(table);
+}
+
+void require_fit(const AdamTask& task, Device device) {
+  const int64_t size = task.parameter->size();
+  require(task.gradient->size() == size && task.state->first.size() == size &&
+              task.state->second.size() == size && !task.learning_rates.empty() &&
+              task.learning_rates.size() <= most_rates && size <= LeftAlone::largest_index,
+          "gradient and moments fit their parameter", task.parameter->shape().to_string());
+  require(task.parameter->device() == device, "all parameters of a step are on one device");
 }
 
 }  // namespace
 
-void adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
-               std::span<const float> learning_rates, const AdamOptions& options, const LeftAloneSlot& slot) {
-  require(gradient.size() == parameter.size() && state.first.size() == parameter.size() &&
-              state.second.size() == parameter.size() && !learning_rates.empty() &&
-              learning_rates.size() <= most_rates && parameter.size() <= LeftAlone::largest_index,
-          "gradient and moments fit their parameter", parameter.shape().to_string());
-  require(slot.list.device() == parameter.device() && slot.place >= 0 && slot.place < slot.list.size(),
-          "what a step leaves alone is noted where its parameter is", slot.list.shape().to_string());
-  ++state.step;
-  if (parameter.device() == Device::cuda) {
-    step_on_device(parameter, gradient, state, learning_rates, options, slot.list.data() + slot.place);
-  } else {
-    step_on_host(parameter, gradient, state, learning_rates, options, slot.list[slot.place]);
+void adam_step(std::span<const AdamTask> tasks, const AdamOptions& options, Tensor<LeftAlone>& left_alone) {
+  const Device device = tasks.empty() ? Device::cpu : tasks.front().parameter->device();
+  for (const AdamTask& task : tasks) require_fit(task, device);
+  left_alone.place(device).reset({static_cast<int64_t>(tasks.size())});
+  for (const AdamTask& task : tasks) ++task.state->step;
+  if (device == Device::cuda) {
+    step_on_device(tasks, options, left_alone.data());
+    return;
   }
+  int64_t k = 0;
+  for (const AdamTask& task : tasks) step_on_host(task, options, left_alone[k++]);
 }
 
 int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
                   std::span<const float> learning_rates, const AdamOptions& options) {
-  Tensor<LeftAlone> left_alone({1}, parameter.device());
-  adam_step(parameter, gradient, state, learning_rates, options, {left_alone, 0});
+  const AdamTask task{&parameter, &gradient, &state, {learning_rates.begin(), learning_rates.end()}};
+  Tensor<LeftAlone> left_alone;
+  adam_step({&task, 1}, options, left_alone);
   return left_alone.on(Device::cpu)[0].count;
 }
 

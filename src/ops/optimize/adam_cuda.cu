@@ -9,34 +9,46 @@ namespace {
 
 constexpr int threads = 256;
 constexpr int group_entries = 4;
-constexpr int groups_each = 4;  // so that the rates are not brought in for a handful of entries
+constexpr int groups_each = 4;  // so that a tensor is not looked up for a handful of entries
+constexpr int block_entries = threads * group_entries * groups_each;
 
 struct alignas(16) Group {
   float value[group_entries];
 };
 
-__device__ void update(const AdamTensor& t, int64_t i, float rate, float g, float& m, float& v, float& p) {
-  const float squared = g * g;
-  if (!std::isfinite(squared)) {
-    atomicAdd(&t.left_alone->count, 1);
-    atomicMax(&t.left_alone->inverted_first, LeftAlone::largest_index - static_cast<int32_t>(i));
-    return;
-  }
-  m = t.beta1 * m + (1 - t.beta1) * g;
-  v = t.beta2 * v + (1 - t.beta2) * squared;
-  p -= rate * (m * t.inverse_correction1) / (std::sqrt(v * t.inverse_correction2) + t.epsilon);
-}
+// What all entries of a tensor share.
+struct Setting {
+  AdamOptions options;
+  float inverse_correction1, inverse_correction2;
+  LeftAlone* left_alone;
 
-__global__ void __launch_bounds__(threads) step(AdamTensor t) {
+  __device__ void update(int64_t i, float rate, float g, float& m, float& v, float& p) const {
+    const float squared = g * g;
+    if (!std::isfinite(squared)) {
+      atomicAdd(&left_alone->count, 1);
+      atomicMax(&left_alone->inverted_first, LeftAlone::largest_index - static_cast<int32_t>(i));
+      return;
+    }
+    m = options.beta1 * m + (1 - options.beta1) * g;
+    v = options.beta2 * v + (1 - options.beta2) * squared;
+    p -= rate * (m * inverse_correction1) / (std::sqrt(v * inverse_correction2) + options.epsilon);
+  }
+};
+
+__global__ void __launch_bounds__(threads) step(const __grid_constant__ AdamTable table) {
   __shared__ float rates[most_rates];
-  const auto thread = static_cast<int>(threadIdx.x);
-  if (thread < t.columns) rates[thread] = t.rates[static_cast<size_t>(thread)];
+  const auto thread = static_cast<int>(threadIdx.x), block = static_cast<int>(blockIdx.x);
+  const int k = traceflow::cuda::part_of(table.tensor.data(), table.tensors, block);
+  const AdamTensor& t = table.tensor[static_cast<size_t>(k)];
+  const Setting setting{table.options, t.inverse_correction1, t.inverse_correction2, table.left_alone + k};
+  if (thread < t.columns) rates[thread] = table.rate[static_cast<size_t>(t.first_rate + thread)];
   __syncthreads();
 
-  const int64_t stride = int64_t{gridDim.x} * threads * group_entries;
-  for (int64_t begin = (int64_t{blockIdx.x} * threads + thread) * group_entries; begin < t.count;
-       begin += stride) {
-    int32_t column = static_cast<int32_t>(begin) % t.columns;
+  const int64_t block_begin = int64_t{block - t.first_block} * block_entries;
+  const int64_t block_end = std::min<int64_t>(t.count, block_begin + block_entries);
+  for (int64_t begin = block_begin + thread * group_entries; begin < block_end;
+       begin += threads * group_entries) {
+    int32_t column = static_cast<int32_t>(begin % t.columns);
     const auto next_rate = [&] {
       const float rate = rates[column];
       column = column + 1 == t.columns ? 0 : column + 1;
@@ -44,15 +56,16 @@ __global__ void __launch_bounds__(threads) step(AdamTensor t) {
     };
     if (begin + group_entries > t.count) {
       for (int64_t i = begin; i < t.count; ++i)
-        update(t, i, next_rate(), t.gradient[i], t.first[i], t.second[i], t.parameter[i]);
+        setting.update(i, next_rate(), t.gradient[i], t.first[i], t.second[i], t.parameter[i]);
       continue;
     }
     const Group g = *reinterpret_cast<const Group*>(t.gradient + begin);
     Group m = *reinterpret_cast<Group*>(t.first + begin);
     Group v = *reinterpret_cast<Group*>(t.second + begin);
     Group p = *reinterpret_cast<Group*>(t.parameter + begin);
-    for (int k = 0; k < group_entries; ++k)
-      update(t, begin + k, next_rate(), g.value[k], m.value[k], v.value[k], p.value[k]);
+    for (int entry = 0; entry < group_entries; ++entry)
+      setting.update(begin + entry, next_rate(), g.value[entry], m.value[entry], v.value[entry],
+                     p.value[entry]);
     *reinterpret_cast<Group*>(t.first + begin) = m;
     *reinterpret_cast<Group*>(t.second + begin) = v;
     *reinterpret_cast<Group*>(t.parameter + begin) = p;
@@ -61,9 +74,11 @@ __global__ void __launch_bounds__(threads) step(AdamTensor t) {
 
 }  // namespace
 
-void adam_step(const AdamTensor& tensor) {
-  const int64_t blocks = traceflow::cuda::blocks_for(tensor.count, threads * group_entries * groups_each);
-  traceflow::cuda::launch("optimize: adam", {blocks, threads}, step, tensor);
+void adam_step(AdamTable& table) {
+  const int64_t blocks = traceflow::cuda::deal_blocks(
+      std::span(table.tensor).first(static_cast<size_t>(table.tensors)),
+      [](const AdamTensor& tensor) { return traceflow::cuda::blocks_for(tensor.count, block_entries); });
+  traceflow::cuda::launch("optimize: adam", {blocks, threads}, step, table);
 }
 
 }  // namespace traceflow::optimize::cuda

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "ops/optimize/adam.h"
+#include "primitives/parts.h"
 
 namespace traceflow::optimize {
 
@@ -21,20 +22,35 @@ struct AdamBlock {
 
 namespace cuda {
 
-// A whole parameter tensor on the device, as its kernel takes it.
+// A parameter tensor on the device.
 struct AdamTensor {
   float* parameter;
   const float* gradient;
   float* first;
   float* second;
-  int64_t count;
-  float beta1, beta2, epsilon;
+  int32_t count;
+  int32_t columns, first_rate;                     // its rates, one for each column, in the table's
   float inverse_correction1, inverse_correction2;  // 1 / (1 − β^step)
-  int32_t columns;
-  std::array<float, most_rates> rates;  // one for each column
-  LeftAlone* left_alone;
+  int32_t first_block;                             // of the kernel's blocks, the first that works on it
 };
-TRACEFLOW_WITH_CUDA void adam_step(const AdamTensor& tensor);
+
+// Parameter tensors that one kernel steps: a kernel each would cost more than most of them take. As large as
+// the parameters of a kernel may be.
+struct AdamTable {
+  static constexpr int most_tensors = 48, room_for_rates = 3 * most_rates;
+  AdamOptions options;
+  int32_t tensors = 0, rates = 0;
+  LeftAlone* left_alone = nullptr;  // one for each tensor
+  std::array<AdamTensor, most_tensors> tensor;
+  std::array<float, room_for_rates> rate;
+
+  bool has_room(size_t more_rates) const {
+    return tensors < most_tensors && static_cast<size_t>(rates) + more_rates <= room_for_rates;
+  }
+};
+static_assert(sizeof(AdamTable) <= traceflow::cuda::most_parameter_bytes);
+// Sets first_block of every tensor.
+TRACEFLOW_WITH_CUDA void adam_step(AdamTable& table);
 
 }  // namespace cuda
 
