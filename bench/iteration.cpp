@@ -2,6 +2,7 @@
 
 #include "capture/synth.h"
 #include "on_device.h"
+#include "render/frame_kernels.h"
 #include "render/renderer.h"
 #include "train/initialise.h"
 #include "train/objective.h"
@@ -110,7 +111,8 @@ void iteration_on_device(benchmark::State& state) {
     rates.sh = rates.opacity = rates.log_scale = rates.rotation = rates.tint = 1e-30F;
     optimiser.step(s.scene, gradient, trainable, schedule, rates, 0);
     benchmark::DoNotOptimize(optimiser.left_alone());
-    s.scene.main_reach = frame.reach.on(Device::cpu)[0];
+    parallel_for(Device::cuda, "train: follow the reach", 1,
+                 FollowReach{frame.reach.data(), s.scene.main_reach.data()});
     if (k == 1) tell(state, frame);
   };
   for (int i = 0; i < views; ++i) step();

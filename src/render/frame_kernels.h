@@ -65,6 +65,16 @@ struct FlagNonZero {
   TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = value[i] != 0 ? 1 : 0; }
 };
 
+// The reach follows the field at once when it grows and slowly when it shrinks.
+struct FollowReach {
+  const float* found;
+  float* reach;
+  TRACEFLOW_HD void operator()(int64_t) const {
+    const float before = 0.995F * *reach;
+    *reach = *found > before ? *found : before;
+  }
+};
+
 // The view's pyramid: inward unit normals of its four sides, in camera axes, through the origin.
 struct ViewPyramid {
   Vec3<float> left, right, top, bottom;
@@ -92,12 +102,13 @@ struct CanShow {
   Camera<float> camera;
   ViewPyramid pyramid;
   const float *position, *log_scale;
-  float near_plane, reach;
+  float near_plane;
+  const float* reach;  // null for 0
 
   TRACEFLOW_HD bool operator()(int64_t i) const {
     const Vec3<float> centre = camera.point_in_camera(load3<float>(position + 3 * i));
     const float a = log_scale[2 * i], b = log_scale[2 * i + 1];
-    const float radius = reach + disk_radius * std::exp(a < b ? b : a);
+    const float radius = (reach != nullptr ? *reach : 0.0F) + disk_radius * std::exp(a < b ? b : a);
     return std::isfinite(radius) && pyramid.meets(centre, radius, near_plane);
   }
 };

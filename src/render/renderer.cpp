@@ -90,8 +90,8 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   // Choose the surfels that can show, and pose them.
   frame_.subset.place(device).resize({0});
   if (request.cull) {
-    surfels_in_view(scene.main, request.camera, raster_options.near_plane, field ? scene.main_reach : 0,
-                    frame_.subset);
+    surfels_in_view(scene.main, request.camera, raster_options.near_plane,
+                    field ? scene.main_reach.data() : nullptr, frame_.subset);
   }
   if (request.cull && frame_.subset.empty()) {
     frame_.main.reset_like(PosedSurfels{}.on(device));

@@ -5,8 +5,8 @@
 
 namespace traceflow {
 
-void surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane, float reach,
-                     Tensor<int32_t>& in_view) {
+void surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane,
+                     const float* reach, Tensor<int32_t>& in_view) {
   list_where(surfels.device(), "render: view culling", surfels.count(),
              CanShow{camera, ViewPyramid(camera), surfels.position.data(), surfels.log_scale.data(),
                      near_plane, reach},

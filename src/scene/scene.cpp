@@ -9,6 +9,7 @@ void Scene::move_to(Device device) {
   if (main_field) move(*main_field);
   if (environment_field) move(*environment_field);
   if (environment_map) move(*environment_map);
+  move(main_reach);
 }
 
 }  // namespace traceflow

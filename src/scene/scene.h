@@ -35,8 +35,9 @@ struct Scene {
   SceneNormalisation normalisation;
   float extent =
       1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
-  // The largest distance by which the main field lately moved a surfel: what view culling must allow for.
-  float main_reach = 0;
+  // One number: the largest distance by which the main field lately moved a surfel, what view culling must
+  // allow for.
+  Tensor<float> main_reach{Shape{1}};
 
   // Where all of it lives.
   Device device() const { return main.device(); }

@@ -92,7 +92,7 @@ Scene scene_from(const Json& json, const Safetensors& file) {
   const auto centre = json.at("centre").get<std::array<double, 3>>();
   scene.normalisation = {{centre[0], centre[1], centre[2]}, json.at("scale").get<double>()};
   scene.extent = json.at("extent").get<float>();
-  scene.main_reach = json.at("main_reach").get<float>();
+  scene.main_reach[0] = json.at("main_reach").get<float>();
   scene.main = get_surfels("scene/main/", file);
   if (json.at("environment").get<bool>()) scene.environment = get_surfels("scene/environment/", file);
   if (json.contains("main_field"))
@@ -118,7 +118,7 @@ void put_scene(const Scene& scene, Safetensors& file) {
   json["centre"] = std::array<double, 3>{centre.x, centre.y, centre.z};
   json["scale"] = scene.normalisation.scale;
   json["extent"] = scene.extent;
-  json["main_reach"] = scene.main_reach;
+  json["main_reach"] = scene.main_reach.on(Device::cpu)[0];
   json["environment"] = scene.environment.count() > 0;
   json["map"] = scene.environment_map.has_value();
   put_surfels(scene.main, "scene/main/", file);

@@ -165,8 +165,8 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   }
   optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
   non_finite_ = optimiser_.left_alone();
-  // The reach follows the field at once when it grows and slowly when it shrinks.
-  scene_.main_reach = std::max(frame.reach.on(Device::cpu)[0], 0.995F * scene_.main_reach);
+  parallel_for(device_, "train: follow the reach", 1,
+               FollowReach{frame.reach.data(), scene_.main_reach.data()});
 }
 
 void Trainer::add_rigidity(const Frame& frame) {

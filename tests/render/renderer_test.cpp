@@ -22,7 +22,7 @@ TEST(Renderer, CullingChangesNoPixel) {
   const Frame& whole = renderer.forward(f.scene, f.request);
   const Tensor<float> colour = whole.colour;
   const Tensor<float> depth = whole.raster.depth;
-  f.scene.main_reach = whole.reach[0];
+  f.scene.main_reach = whole.reach;
   f.request.cull = true;
   const Frame& culled = renderer.forward(f.scene, f.request);
   ASSERT_LT(culled.main.count(), f.scene.main.count() * 9 / 10) << "the view leaves something out";

@@ -44,12 +44,12 @@ Scene full_scene() {
   scene.specular = Specular::environment_map;
   scene.normalisation = {{0.1, -2, 3}, 0.37};
   scene.extent = 1.75F;
-  scene.main_reach = 0.125F;
+  scene.main_reach[0] = 0.125F;
   return scene;
 }
 
 std::vector<float> all_numbers(const Scene& scene) {
-  std::vector<float> all{scene.extent, scene.main_reach, static_cast<float>(scene.normalisation.scale)};
+  std::vector<float> all{scene.extent, scene.main_reach[0], static_cast<float>(scene.normalisation.scale)};
   const auto take = [&](const auto&, const Tensor<float>& t) {
     all.insert(all.end(), t.values().begin(), t.values().end());
   };

@@ -1,3 +1,4 @@
+#include "base/profile.h"
 #include "support/device.h"
 #include "train/small_run.h"
 
@@ -133,6 +134,34 @@ TEST_F(TrainerOnDevice, AnIterationInItsStrideAsksForNoMemory) {
   const int64_t before = memory::device_allocations();
   for (int i = 0; i < 3; ++i) trainer.step();
   EXPECT_EQ(memory::device_allocations(), before);
+}
+
+// Each costs the host a few microseconds, and what it reads stops the device. With the paper's depth of
+// networks and its losses, all of them at work.
+TEST_F(TrainerOnDevice, AnIterationIsFewKernelsAndFewerReads) {
+  TrainOptions options = small_run(40);
+  options.density.until = options.environment_density.until = 0;
+  options.loss = preset("paper").loss;
+  for (NetworkOptions* network : {&options.deform.network, &options.deform.environment_network}) {
+    *network = preset("paper").deform.network;
+    network->width = 16;
+  }
+  Trainer trainer = make_trainer(options, "few", Device::cuda);
+  for (int i = 0; i < 22; ++i) trainer.step();
+  profile::clear();
+  profile::enable(true);
+  trainer.step();
+  profile::enable(false);
+  int64_t reads = 0, products = 0, others = 0;
+  for (const profile::Entry& entry : profile::entries()) {
+    (entry.name == "device: read by the host" ? reads
+     : entry.name == "matrix product"         ? products
+                                              : others) += entry.calls;
+  }
+  EXPECT_EQ(reads, 6);
+  EXPECT_EQ(products,
+            52);  // 8 layers and the heads, forward and twice backward, less 2 by the inputs; two sets
+  EXPECT_LE(others, 125);
 }
 
 TEST_F(TrainerOnDevice, TheForecastCoversWhatARunTakes) {
