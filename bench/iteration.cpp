@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "base/parallel.h"
 #include "capture/synth.h"
 #include "on_device.h"
 #include "render/frame_kernels.h"

@@ -41,8 +41,8 @@ struct AdamTable {
   AdamOptions options;
   int32_t tensors = 0, rates = 0;
   LeftAlone* left_alone = nullptr;  // one for each tensor
-  std::array<AdamTensor, most_tensors> tensor;
-  std::array<float, room_for_rates> rate;
+  std::array<AdamTensor, most_tensors> tensor{};
+  std::array<float, room_for_rates> rate{};
 
   bool has_room(size_t more_rates) const {
     return tensors < most_tensors && static_cast<size_t>(rates) + more_rates <= room_for_rates;
