@@ -16,6 +16,11 @@ namespace traceflow::emulation {
 
 namespace {
 
+uint64_t next_random(uint64_t& state) {
+  state = state * 6364136223846793005U + 1442695040888963407U;
+  return state >> 33;
+}
+
 namespace context = boost::context;
 
 // Stacks of fibers that have ended, for those to come.
@@ -185,10 +190,7 @@ class Block {
       return std::move(scheduler_);
     });
   }
-  uint64_t random() {
-    shuffle_ = shuffle_ * 6364136223846793005U + 1442695040888963407U;
-    return shuffle_ >> 33;
-  }
+  uint64_t random() { return next_random(shuffle_); }
 
   const char* kernel_;
   const std::function<void()>& body_;
@@ -244,10 +246,16 @@ const ThreadState& current() { return running_block->current(); }
 
 void run_grid(const char* kernel, Size3 grid, Size3 block, const std::function<void()>& thread) {
   static uint64_t shuffle = 1;
-  for (unsigned z = 0; z < grid.z; ++z) {
-    for (unsigned y = 0; y < grid.y; ++y) {
-      for (unsigned x = 0; x < grid.x; ++x) Block(kernel, grid, block, {x, y, z}, thread, shuffle).run();
-    }
+  const uint64_t blocks = uint64_t{grid.x} * grid.y * grid.z;
+  // Steps that have no divisor in common with the number of blocks come to each of them once.
+  uint64_t step = next_random(shuffle) % std::max<uint64_t>(blocks, 1);
+  while (std::gcd(step, blocks) != 1 && blocks > 0) ++step;
+  uint64_t at = next_random(shuffle);
+  for (uint64_t k = 0; k < blocks; ++k) {
+    at = (at + step) % blocks;
+    const Index3 place{static_cast<unsigned>(at % grid.x), static_cast<unsigned>(at / grid.x % grid.y),
+                       static_cast<unsigned>(at / grid.x / grid.y)};
+    Block(kernel, grid, block, place, thread, shuffle).run();
   }
 }
 

@@ -4,10 +4,10 @@
 #include <functional>
 
 // Runs a CUDA grid on the host: blocks one after the other, the threads of a block as fibers that change
-// places at barriers and warp-wide operations, warps and the lanes of each in an order that is shuffled each
-// time, so that a barrier that is missing shows. What a device leaves undefined ends the program with a
-// message: lanes that disagree about a mask, a barrier that some threads wait at while others have no way to
-// reach it.
+// places at barriers and warp-wide operations; blocks, warps and the lanes of each in an order that is
+// shuffled each time, so that a barrier that is missing shows, and what depends on the order of blocks. What
+// a device leaves undefined ends the program with a message: lanes that disagree about a mask, a barrier that
+// some threads wait at while others have no way to reach it.
 namespace traceflow::emulation {
 
 inline constexpr int warp_size = 32;

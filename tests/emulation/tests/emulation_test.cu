@@ -38,6 +38,8 @@ __global__ void warp_operations(float* sum, uint32_t* odd, int32_t* above) {
 
 __global__ void count_into(int32_t* total) { atomicAdd(total, 1); }
 
+__global__ void take_a_number(int32_t* next, int32_t* number) { number[blockIdx.x] = atomicAdd(next, 1); }
+
 __global__ void half_a_warp_misses_the_mask(int32_t* to) {
   if (threadIdx.x < 16) to[threadIdx.x] = __shfl_sync(0xffff0000U, 1, 0);
 }
@@ -95,6 +97,24 @@ TEST(Emulation, AtomicsOfAllBlocksMeet) {
   Tensor<int32_t> total({1}, Device::cuda);
   cuda::launch("count", {7, block}, count_into, total.data());
   EXPECT_EQ(total.on(Device::cpu)[0], 7 * block);
+}
+
+TEST(Emulation, EveryBlockComesOnceInNoOrder) {
+  for (const int64_t blocks : {1, 60, 97}) {
+    std::vector<std::vector<int32_t>> orders;
+    for (int time = 0; time < 2; ++time) {
+      Tensor<int32_t> next({1}, Device::cuda), number({blocks}, Device::cuda);
+      cuda::launch("order", {blocks, 1}, take_a_number, next.data(), number.data());
+      const Tensor<int32_t> found = number.on(Device::cpu);
+      orders.emplace_back(found.values().begin(), found.values().end());
+    }
+    EXPECT_EQ(orders[0] == orders[1], blocks == 1);
+    for (std::vector<int32_t>& order : orders) {
+      EXPECT_EQ(std::is_sorted(order.begin(), order.end()), blocks == 1);
+      std::sort(order.begin(), order.end());
+      for (int64_t k = 0; k < blocks; ++k) EXPECT_EQ(order[static_cast<size_t>(k)], k);
+    }
+  }
 }
 
 TEST(Emulation, FreshMemoryHoldsNoNumbers) {
