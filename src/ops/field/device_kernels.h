@@ -16,6 +16,18 @@ namespace traceflow::field::device {
 inline constexpr int max_layers = 32;
 inline constexpr int max_time_encoding = 33;
 
+// What a thread reads or writes at once. Every row of a matrix is whole ones of these, and starts at one.
+template <class T>
+struct alignas(16) Numbers {
+  static constexpr int count = 16 / sizeof(T);
+  T value[count];
+
+  TRACEFLOW_HD static Numbers& at(T* address) { return *reinterpret_cast<Numbers*>(address); }
+  TRACEFLOW_HD static const Numbers& at(const T* address) {
+    return *reinterpret_cast<const Numbers*>(address);
+  }
+};
+
 // γ(points) into rows of `parts` times `columns` numbers. i: (row, column).
 template <class T>
 struct Encode {
@@ -119,37 +131,45 @@ struct Pack {
   }
 };
 
-// What stands in for a product's bias and ReLU where the library has no code for them. i: (row, column).
+// What stands in for a product's bias and ReLU where the library has no code for them. i: (row, group).
 template <class T>
 struct AddBiasAndRelu {
   T* values;
   const T* bias;  // null: none
-  int columns;
+  int groups;     // of a row
   int64_t stride;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    const auto index = static_cast<uint32_t>(i);
-    const auto width = static_cast<uint32_t>(columns);
-    T& value = values[int64_t{index / width} * stride + index % width];
-    const float sum = to_float(value) + (bias == nullptr ? 0.0F : to_float(bias[index % width]));
-    store(sum > 0 ? sum : 0.0F, value);
+    const auto index = static_cast<uint32_t>(i), width = static_cast<uint32_t>(groups);
+    const int64_t column = int64_t{index % width} * Numbers<T>::count;
+    Numbers<T>& place = Numbers<T>::at(values + int64_t{index / width} * stride + column);
+    Numbers<T> group = place;
+    for (int k = 0; k < group.count; ++k) {
+      const float sum = to_float(group.value[k]) + (bias == nullptr ? 0.0F : to_float(bias[column + k]));
+      store(sum > 0 ? sum : 0.0F, group.value[k]);
+    }
+    place = group;
   }
 };
 
-// And for the derivative of that ReLU: gradient = 0 where the activation is not > 0.
+// And for the derivative of that ReLU: gradient = 0 where the activation is not > 0. i: (row, group).
 template <class T>
 struct MaskByActivation {
   T* gradient;  // dense
   const T* activation;
-  int columns;
+  int groups;      // of a row
   int64_t stride;  // of the activation
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    const auto index = static_cast<uint32_t>(i);
-    const auto width = static_cast<uint32_t>(columns);
-    if (!(to_float(activation[int64_t{index / width} * stride + index % width]) > 0)) {
-      store(0.0F, gradient[i]);
+    const auto index = static_cast<uint32_t>(i), width = static_cast<uint32_t>(groups);
+    const int64_t column = int64_t{index % width} * Numbers<T>::count;
+    const Numbers<T> made = Numbers<T>::at(activation + int64_t{index / width} * stride + column);
+    Numbers<T>& place = Numbers<T>::at(gradient + i * Numbers<T>::count);
+    Numbers<T> group = place;
+    for (int k = 0; k < group.count; ++k) {
+      if (!(to_float(made.value[k]) > 0)) store(0.0F, group.value[k]);
     }
+    place = group;
   }
 };
 

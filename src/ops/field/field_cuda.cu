@@ -28,14 +28,9 @@ namespace field::cuda {
 
 namespace {
 
-constexpr int sum_threads = 256;
+using device::Numbers;
 
-// What a thread reads at once.
-template <class T>
-struct alignas(16) Numbers {
-  static constexpr int count = 16 / sizeof(T);
-  T value[count];
-};
+constexpr int sum_threads = 256;
 
 // A block is a slot. Its threads stand side by side over the columns and, as far as they last, over several
 // rows.
@@ -53,7 +48,7 @@ __global__ void column_sums_kernel(const T* values, int64_t rows, int columns, f
   float sum[numbers] = {};
   if (thread < side_by_side * groups) {
     for (int64_t row = blockIdx.x * rows / gridDim.x + thread / groups; row < end; row += side_by_side) {
-      const auto read = *reinterpret_cast<const Numbers<T>*>(values + row * columns + group * numbers);
+      const Numbers<T> read = Numbers<T>::at(values + row * columns + group * numbers);
       for (int k = 0; k < numbers; ++k) sum[k] += to_float(read.value[k]);
     }
   }

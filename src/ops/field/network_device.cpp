@@ -173,9 +173,10 @@ void forward_hidden(const DeviceLayout& layout, const std::byte* weights, const 
         continue;
       }
       cuda::multiply(without_epilogue(product), at);
-      parallel_for(Device::cuda, "field: bias and ReLU", segment.rows * layout.width,
-                   AddBiasAndRelu<T>{static_cast<T*>(at.c), static_cast<const T*>(at.bias), layout.width,
-                                     product.stride_c});
+      const int groups = layout.width / Numbers<T>::count;
+      parallel_for(
+          Device::cuda, "field: bias and ReLU", segment.rows * groups,
+          AddBiasAndRelu<T>{static_cast<T*>(at.c), static_cast<const T*>(at.bias), groups, product.stride_c});
     }
   });
 }
@@ -193,9 +194,10 @@ void backward_hidden(const DeviceLayout& layout, int layer, const std::byte* wei
   if (segment.masks) return;
   with_number(layout, [&]<class T>(T) {
     const std::byte* const input = activations.output(layout, layer - 1, segment.memory);
-    parallel_for(Device::cuda, "field: ReLU backward", segment.rows * layout.width,
+    const int groups = layout.width / Numbers<T>::count;
+    parallel_for(Device::cuda, "field: ReLU backward", segment.rows * groups,
                  MaskByActivation<T>{reinterpret_cast<T*>(grad_input), reinterpret_cast<const T*>(input),
-                                     layout.width, layout.output_stride(layer - 1)});
+                                     groups, layout.output_stride(layer - 1)});
   });
 }
 
