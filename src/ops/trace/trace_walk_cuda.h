@@ -10,7 +10,8 @@ namespace traceflow::trace::cuda {
 inline constexpr int walk_threads = 128;
 // k: hits that are held at a time. Where more exist the ray walks again, from the last one on.
 inline constexpr int held_hits = 16;
-// A tree is no deeper than its keys have bits: 63, and 30 of the index where keys are equal.
+// A tree is no deeper than its keys have bits: 64, and 30 of the index where keys are equal. Each of its
+// nodes leaves one child waiting.
 inline constexpr int walk_stack = 96;
 
 // A place in a ray's order of hits.
