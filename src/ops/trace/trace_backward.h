@@ -55,7 +55,7 @@ struct alignas(64) SurfelSums {
   float value[part::padded];
 };
 
-// Turns the sums of all hits of surfel i into gradients.
+// Turns the sums of all hits of surfel i into gradients: sets all but dL/dsh, which is a sum itself.
 struct FinishSurfel {
   SurfelView<float> surfels;
   const BackwardFrame* frames;
@@ -77,13 +77,17 @@ struct FinishSurfel {
     const float* sum = sums[i].value;
     const float* p = sum + part::position;
     const float* turned = sum + part::turn;
+    Vec3<float> moved(0);
+    Vec4<float> q(0);
+    // What has no hits may have a frame that is not finite.
     if (p[0] != 0 || p[1] != 0 || p[2] != 0) {
-      store3(position + 3 * i, p[0] * f.t_u + p[1] * f.t_v + p[2] * f.normal);
+      moved = p[0] * f.t_u + p[1] * f.t_v + p[2] * f.normal;
       // A rotation's gradient that has these turns: its other components do not matter to a unit quaternion.
       const Mat3<float> turn(turned[2] * f.t_v - turned[1] * f.normal, turned[0] * f.normal, Vec3<float>(0));
-      const Vec4<float> q = rotation_from_quaternion_backward(load4<float>(surfels.rotation + 4 * i), turn);
-      for (int k = 0; k < 4; ++k) rotation[4 * i + k] = q[k];
+      q = rotation_from_quaternion_backward(load4<float>(surfels.rotation + 4 * i), turn);
     }
+    store3(position + 3 * i, moved);
+    for (int k = 0; k < 4; ++k) rotation[4 * i + k] = q[k];
     for (int k = 0; k < 2; ++k) scale[2 * i + k] = sum[part::scale + static_cast<size_t>(k)];
     opacity[i] = sum[part::opacity];
     signal[i] = sum[part::signal];

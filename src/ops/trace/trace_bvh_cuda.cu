@@ -106,7 +106,7 @@ struct Keys {
 
 struct TreeView {
   Node* nodes;
-  uint32_t *disk_parent, *node_parent;
+  uint32_t *disk_parent, *node_parent, *arrived;
 };
 
 __device__ void set_child(const TreeView& tree, uint32_t node, uint32_t side, uint32_t child, bool is_disk) {
@@ -118,6 +118,7 @@ __device__ void set_child(const TreeView& tree, uint32_t node, uint32_t side, ui
 // One disk alone has a root all the same, whose right half is empty.
 __device__ void make_lone_root(const TreeView& tree) {
   set_child(tree, 0, 0, 0, true);
+  tree.arrived[0] = 0;
   tree.nodes[0].child[1] = no_child;
   tree.nodes[0].unused[1] = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -152,6 +153,7 @@ __global__ void __launch_bounds__(threads) make_nodes(Keys keys, TreeView tree) 
   const int cut = static_cast<int>(i + split * step) + (step < 0 ? -1 : 0);
   const int first = step > 0 ? i : other_end, last = step > 0 ? other_end : i;
   const auto node = static_cast<uint32_t>(i), left = static_cast<uint32_t>(cut);
+  tree.arrived[node] = 0;
   set_child(tree, node, 0, left, first == cut);
   set_child(tree, node, 1, left + 1, last == cut + 1);
 }
@@ -176,7 +178,7 @@ __device__ void join_other_half(const Node& node, uint32_t side, DiskBox& box) {
 // there yet: that one will go on.
 __global__ void __launch_bounds__(threads)
     make_disks_and_boxes(BuildInput input, const uint64_t* sorted_keys, const uint32_t* sorted_indices,
-                         TreeView tree, uint32_t* arrived, Disk* disks) {
+                         TreeView tree, Disk* disks) {
   const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
   if (i >= input.count) return;
   const uint32_t surfel = sorted_indices[i];
@@ -194,7 +196,7 @@ __global__ void __launch_bounds__(threads)
       tree.nodes[node].box[axis][2 * side + 1] = box.upper[axis];
     }
     __threadfence();
-    if (atomicAdd(arrived + node, 1U) == 0) return;
+    if (atomicAdd(tree.arrived + node, 1U) == 0) return;
     __threadfence();
     join_other_half(tree.nodes[node], side, box);
     at = tree.node_parent[node];
@@ -212,7 +214,7 @@ void make_room(int64_t count, Tree& tree) {
   tree.sorted_indices.place(device).resize({count});
   tree.disk_parent.place(device).resize({count});
   tree.node_parent.place(device).resize({nodes});
-  tree.arrived.place(device).reset({nodes});
+  tree.arrived.place(device).resize({nodes});
   tree.bounds.place(device).reset({6});
 }
 
@@ -228,7 +230,8 @@ void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
   if (count == 0) return;
   make_room(count, tree);
   const BuildInput input{surfels, count, {options.alpha_min, options.alpha_max, options.transmittance_min}};
-  const TreeView view{tree.nodes.data(), tree.disk_parent.data(), tree.node_parent.data()};
+  const TreeView view{tree.nodes.data(), tree.disk_parent.data(), tree.node_parent.data(),
+                      tree.arrived.data()};
   const Grid grid{blocks_for(count, threads), threads};
   launch("trace: choose surfels", grid, choose_surfels, input, tree.keys.data(), tree.indices.data(),
          tree.bounds.data());
@@ -238,7 +241,7 @@ void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
              tree.sorted_indices.data(), tree.sort_scratch);
   launch("trace: nodes", grid, make_nodes, Keys{tree.sorted_keys.data(), static_cast<int>(count)}, view);
   launch("trace: boxes", grid, make_disks_and_boxes, input, tree.sorted_keys.data(),
-         tree.sorted_indices.data(), view, tree.arrived.data(), tree.disks.data());
+         tree.sorted_indices.data(), view, tree.disks.data());
 }
 
 }  // namespace traceflow::trace::cuda

@@ -106,12 +106,9 @@ __global__ void __launch_bounds__(walk_threads)
     if (store.keep) keep_hits(store, hits, blended, transmittance, last_head);
   }
   if (exists && output.colour) write_ray(output, input.background, r, ray, blending);
-  if (!store.keep) return;
-  if (exists) store.last_head[i] = last_head;
-  if (!store.hits) return;
-  if (exists) keep_ray(store, i, blending);
-  const auto hits = warp_sum(static_cast<unsigned long long>(blending.hits));
-  if (threadIdx.x % warp_lanes == 0 && hits > 0) atomicAdd(store.hit_count, hits);
+  if (!exists || !store.keep) return;
+  store.last_head[i] = last_head;
+  if (store.hits) keep_ray(store, i, blending);
 }
 
 }  // namespace

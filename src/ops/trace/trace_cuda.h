@@ -91,13 +91,12 @@ struct SavedHits {
   SortedRays sorted;
   bool is_sorted = false;
   std::shared_ptr<Tree> tree;
-  int64_t builds = 0;                    // of the tree when it was walked
-  Tensor<Record> records;                // as many as have room
-  Tensor<unsigned long long> used;       // records that were wanted
-  Tensor<unsigned long long> hit_count;  // over all rays
-  Tensor<uint32_t> last_head;            // of each ray; no_record where it has no hits
-  Tensor<uint32_t> hits;                 // of each ray
-  Tensor<RaySums> sums;                  // of each ray
+  int64_t builds = 0;               // of the tree when it was walked
+  Tensor<Record> records;           // as many as have room
+  Tensor<unsigned long long> used;  // records that were wanted
+  Tensor<uint32_t> last_head;       // of each ray; no_record where it has no hits
+  Tensor<uint32_t> hits;            // of each ray
+  Tensor<RaySums> sums;             // of each ray
   // What the host has seen of `used` since the last forward pass, unknown until it looks; and before that
   // pass.
   int64_t records_wanted = unknown, most_wanted = 0;

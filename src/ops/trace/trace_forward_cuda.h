@@ -72,7 +72,6 @@ struct RecordStore {
   // Null where rays are traced again.
   uint32_t* hits;
   RaySums* sums;
-  unsigned long long* hit_count;
 };
 
 // The order of all rays, of which there is one and a surfel. Equal ones stay in the caller's order.

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <bit>
+#include <numeric>
 
 #include "math/spherical_harmonics.h"
 #include "ops/trace/trace_bvh.h"
@@ -47,15 +48,29 @@ void make_room(const Saved& saved, int64_t rays, SavedHits& hits) {
       std::min(allowed_records(saved), std::max(expected_records * rays, hits.most_wanted / 4 * 5));
   if (hits.records.size() < wanted) room(hits.records, {wanted});
   room(hits.used, {1});
-  room(hits.hit_count, {1});
   room(hits.last_head, {rays});
   room(hits.hits, {rays});
   room(hits.sums, {rays});
   hits.used.zero();
-  hits.hit_count.zero();
   hits.rays = rays;
   hits.records_wanted = SavedHits::unknown;
   hits.overwritten = false;
+}
+
+// All of the gradient is set, but for dL/dsh, which hits are added to, and tints, which no ray sees.
+void make_room(const PosedSurfels& surfels, int64_t rays, InputGradient& gradient) {
+  PosedSurfels& g = gradient.surfels;
+  room(g.position, surfels.position.shape());
+  room(g.scale, surfels.scale.shape());
+  room(g.rotation, surfels.rotation.shape());
+  room(g.opacity, surfels.opacity.shape());
+  room(g.sh, surfels.sh.shape());
+  room(g.tint, surfels.tint.shape());
+  g.sh.zero();
+  g.tint.zero();
+  room(gradient.origins, {rays, 3});
+  room(gradient.directions, {rays, 3});
+  room(gradient.position_gradient, {surfels.count()});
 }
 
 // Reads how many records the forward pass wanted. The host waits for the device: what is launched next
@@ -92,8 +107,7 @@ RecordStore store_of(SavedHits& hits) {
           hits.used.data(),
           hits.last_head.data(),
           hits.hits.data(),
-          hits.sums.data(),
-          hits.hit_count.data()};
+          hits.sums.data()};
 }
 
 // The backward pass of one set of surfels and rays.
@@ -163,7 +177,6 @@ class Backward {
     RecordStore store = store_of(hits_);
     store.hits = nullptr;
     store.sums = nullptr;
-    store.hit_count = nullptr;
     trace_rays(degree_, rays, {}, store);
   }
 
@@ -176,7 +189,8 @@ class Backward {
 }  // namespace
 
 int64_t blended_hits(const Saved& saved) {
-  return static_cast<int64_t>(hits_of(saved).hit_count.on(Device::cpu)[0]);
+  const Tensor<uint32_t> hits = hits_of(saved).hits.on(Device::cpu);
+  return std::accumulate(hits.values().begin(), hits.values().end(), int64_t{0});
 }
 
 void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
@@ -208,15 +222,10 @@ void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const T
   SavedHits& hits = hits_of(saved);
   const int64_t rays = origins.empty() ? 0 : origins.dim(0), count = surfels.count();
   require(hits.rays == rays, "the hits were saved for these rays");
-  gradient.surfels.reset_like(surfels);
-  room(gradient.origins, {rays, 3});
-  room(gradient.directions, {rays, 3});
-  room(gradient.position_gradient, {count});
-  gradient.position_gradient.zero();
-  if (rays == 0) return;
-  parallel_for(Device::cuda, "trace: frames", count, MakeFrame{surfels, room(hits.frames, {count})});
+  make_room(surfels, rays, gradient);
   room(hits.surfel_sums, {count});
   hits.surfel_sums.zero();
+  parallel_for(Device::cuda, "trace: frames", count, MakeFrame{surfels, room(hits.frames, {count})});
   const int64_t allowed = allowed_records(saved), wanted = look_at_records(hits);
   RayInput input = input_of(surfels, hits.tree.get(), origins, directions, options);
   if (hits.is_sorted) input.order = hits.sorted.order.data();

@@ -10,7 +10,8 @@ namespace traceflow::trace::cuda {
 inline constexpr int walk_threads = 128;
 // k: hits that are held at a time. Where more exist the ray walks again, from the last one on.
 inline constexpr int held_hits = 16;
-// A tree is no deeper than its keys have bits: 63, and 30 of the index where keys are equal.
+// A tree is no deeper than its keys have bits: 64, and 30 of the index where keys are equal. Each of its
+// nodes leaves one child waiting.
 inline constexpr int walk_stack = 96;
 
 // A place in a ray's order of hits.
@@ -149,25 +150,25 @@ __device__ inline void meet_disk(const Disk& disk, const UnitRay& ray, const Wal
   hits.insert(t, plane.surfel, std::fmin(std::exp(exponent), rules.blend.alpha_max));
 }
 
-// Entries of boxes that wait, nearest on top.
+// Boxes that wait, nearest on top.
 class WalkStack {
  public:
-  __device__ void push(float near, uint32_t child) {
-    near_[depth_] = near;
-    child_[depth_++] = child;
-  }
+  __device__ void push(float near, uint32_t child) { waiting_[depth_++] = {near, child}; }
   // The next one that is entered before `far`, or no_child.
   __device__ uint32_t pop(float far) {
     while (depth_ > 0) {
-      --depth_;
-      if (near_[depth_] <= far * 1.000001F) return child_[depth_];
+      const Entry entry = waiting_[--depth_];
+      if (entry.near <= far * 1.000001F) return entry.child;
     }
     return no_child;
   }
 
  private:
-  float near_[walk_stack];
-  uint32_t child_[walk_stack];
+  struct alignas(8) Entry {
+    float near;  // where the ray enters the box
+    uint32_t child;
+  };
+  Entry waiting_[walk_stack];
   int depth_ = 0;
 };
 

@@ -2,43 +2,27 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
 #include <numeric>
 
-#include "../field/field_scene.h"
-#include "deform_scene.h"
+#include "deform_run.h"
 
 namespace traceflow {
 namespace {
 
 using field::Precision;
+using testing::broken_surfels;
 using testing::expect_close;
+using testing::is_broken;
+using testing::nan;
 using testing::random_surfels;
 using testing::same_bytes;
-
-constexpr NetworkOptions small{.depth = 4, .width = 64, .skip = 2};
-constexpr float test_time = 0.62F;
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
-// One forward and backward pass with a random gradient.
-struct Pass {
-  PosedSurfels posed, grad_posed;
-  Surfels grad_stored;
-  Field grad_field;
-};
+using testing::small;
+using testing::test_time;
+using Pass = testing::DeformPass;
 
 Pass run(const Surfels& stored, const Field* field, const Tensor<int32_t>& subset = {}, int sh_degree = 3,
-         Precision precision = Precision::fp32) {
-  Pass pass;
-  deform::Saved saved;
-  deform::forward(stored, field, test_time, subset, sh_degree, precision, pass.posed, &saved);
-  pass.grad_posed = testing::random_gradient_like(pass.posed);
-  pass.grad_stored = zeros_like<float>(stored);
-  if (field != nullptr) pass.grad_field = zeros_like<float>(*field);
-  deform::backward(stored, field, test_time, subset, pass.posed, saved, pass.grad_posed, pass.grad_stored,
-                   field == nullptr ? nullptr : &pass.grad_field);
-  return pass;
+         Precision precision = Precision::fp32, bool frozen = false) {
+  return testing::run_deform(Device::cpu, stored, field, subset, sh_degree, precision, frozen);
 }
 
 void expect_posed_close(const PosedSurfels& found, const BasicPosedSurfels<double>& expected,
@@ -115,8 +99,7 @@ TEST(Deform, CopiesOnlyTheDegreesInUse) {
 TEST(Deform, ASubsetIsASliceOfTheWhole) {
   const Surfels stored = random_surfels(1500, true);
   const Field field = testing::random_field(small, residual::main_outputs);
-  std::vector<int32_t> subset;
-  for (int32_t i = 3; i < 1500; i += i % 5 + 1) subset.push_back(i);
+  const std::vector<int32_t> subset = testing::some_of(1500);
   const Pass whole = run(stored, &field);
   const Pass part = run(stored, &field, tensor_of(subset));
   const auto count = static_cast<int64_t>(subset.size());
@@ -170,13 +153,9 @@ TEST(Deform, ASubsetsGradientIsScatteredToItsRows) {
 TEST(Deform, AFrozenFieldGetsNoGradientAndStoredValuesDo) {
   const Surfels stored = random_surfels(64, true);
   const Field field = testing::random_field(small, residual::main_outputs);
-  deform::Saved saved;
-  PosedSurfels posed;
-  deform::forward(stored, &field, test_time, {}, 3, Precision::fp32, posed, &saved);
-  const PosedSurfels grad_posed = testing::random_gradient_like(posed);
-  Surfels grad_stored = zeros_like<float>(stored);
-  deform::backward(stored, &field, test_time, {}, posed, saved, grad_posed, grad_stored, nullptr);
-  EXPECT_TRUE(same_bytes(grad_stored.opacity_logit, run(stored, &field).grad_stored.opacity_logit));
+  const Pass frozen = run(stored, &field, {}, 3, Precision::fp32, true);
+  EXPECT_TRUE(same_bytes(frozen.grad_field, zeros_like<float>(field)));
+  EXPECT_TRUE(same_bytes(frozen.grad_stored.opacity_logit, run(stored, &field).grad_stored.opacity_logit));
 }
 
 TEST(Deform, IsTheSameWithoutSaving) {
@@ -217,25 +196,6 @@ TEST(Deform, IsTheSameBytesAtAnyThreadCount) {
     });
   }
 }
-
-// Each kind of stored value broken in its own way, in surfel 10·k.
-Surfels broken_surfels(const Surfels& clean) {
-  Surfels stored = clean;
-  stored.position(0, 1) = nan;
-  stored.rotation(10, 3) = infinity;
-  stored.log_scale(20, 0) = nan;
-  stored.log_scale(30, 1) = 200;   // overflows
-  stored.log_scale(40, 0) = -200;  // underflows: a disk without extent
-  stored.log_scale(50, 0) = -infinity;
-  stored.opacity_logit[60] = infinity;
-  stored.opacity_logit[70] = nan;
-  stored.sh(80, 15, 2) = nan;
-  stored.tint_logit[90] = -infinity;
-  stored.position(100, 0) = -infinity;
-  return stored;
-}
-
-bool is_broken(int64_t i) { return i % 10 == 0 && i <= 100; }
 
 TEST(DeformHostile, ABrokenSurfelIsInvisibleFiniteAndPoisonsNothing) {
   const Surfels clean = random_surfels(150, true);

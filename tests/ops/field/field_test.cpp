@@ -2,11 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-#include <ostream>
 #include <thread>
 
-#include "field_scene.h"
+#include "field_run.h"
 
 namespace traceflow {
 namespace {
@@ -15,28 +13,16 @@ using field::Precision;
 using testing::expect_close;
 using testing::expect_fields_close;
 using testing::random_field;
+using testing::random_gradient;
 using testing::random_points;
-using testing::random_tensor;
 using testing::same_bytes;
-
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr float test_time = 0.37F;
-
-// Output and gradient of one forward and backward pass.
-struct Pass {
-  Tensor<float> output;
-  Field gradient;
-};
+using testing::test_time;
+using Pass = testing::FieldPass;
+using Case = testing::FieldCase;
 
 Pass run(const Field& field, const Tensor<float>& points, const Tensor<float>& grad_output,
          Precision precision, int64_t memory_limit = int64_t{1} << 29) {
-  Pass pass{{}, zeros_like<float>(field)};
-  field::Saved saved;
-  saved.memory_limit = memory_limit;
-  field::forward(field, points, test_time, precision, pass.output, &saved);
-  field::backward(field, points, test_time, saved, grad_output, pass.gradient);
-  return pass;
+  return testing::run_field(Device::cpu, field, points, grad_output, precision, memory_limit);
 }
 
 struct ReferencePass {
@@ -53,23 +39,6 @@ ReferencePass run_reference(const Field& field, const Tensor<float>& points,
   field::forward_reference(truth, exact_points, exact_time, pass.output);
   field::backward_reference(truth, exact_points, exact_time, convert<double>(grad_output), pass.gradient);
   return pass;
-}
-
-Tensor<float> random_gradient(int64_t count, int outputs) {
-  Random random(17);
-  return random_tensor<float>({count, outputs}, random, -1, 1);
-}
-
-struct Case {
-  NetworkOptions shape;
-  int outputs;
-  int64_t points;
-};
-
-std::ostream& operator<<(std::ostream& out, const Case& c) {
-  return out << "depth " << c.shape.depth << " width " << c.shape.width << " skip " << c.shape.skip
-             << " octaves " << c.shape.position_frequencies << "+" << c.shape.time_frequencies << " outputs "
-             << c.outputs << " points " << c.points;
 }
 
 class FieldCases : public ::testing::TestWithParam<Case> {};
@@ -125,7 +94,7 @@ TEST(Field, ANewFieldIsZeroEverywhere) {
 }
 
 TEST(Field, IsTheSameBytesAtAnyThreadCount) {
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
+  for (const Precision precision : testing::both_precisions) {
     const Field field = random_field({.depth = 4, .width = 128, .skip = 2}, 11);
     const Tensor<float> points = random_points(9001);
     const Tensor<float> grad_output = random_gradient(9001, 11);
@@ -154,7 +123,7 @@ TEST(Field, IsTheSameBytesOnAnotherThread) {
 }
 
 TEST(Field, ComputingActivationsAgainGivesTheSameBytes) {
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
+  for (const Precision precision : testing::both_precisions) {
     const Field field = random_field({.depth = 4, .width = 128, .skip = 2}, 11);
     const Tensor<float> points = random_points(2000);
     const Tensor<float> grad_output = random_gradient(2000, 11);
@@ -199,72 +168,18 @@ TEST(Field, BackwardAddsToTheGradient) {
   field::backward(field, points, test_time, saved, grad_output, once);
   field::backward(field, points, test_time, saved, grad_output, twice);
   field::backward(field, points, test_time, saved, grad_output, twice);
-  once.for_each([](const std::string&, Tensor<float>& t) {
-    for (float& v : t.values()) v *= 2;
-  });
-  EXPECT_TRUE(same_bytes(once, twice));
+  EXPECT_TRUE(same_bytes(testing::doubled(once), twice));
 }
 
-// Bad points and bad gradients in the middle of good ones: their rows are zero, the other rows and the sums
-// are those of a set in which they have no part.
 TEST(FieldHostile, BadRowsAreZeroAndPoisonNothing) {
-  const Field field = random_field({.depth = 4, .width = 64, .skip = 2}, 11);
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
-    Tensor<float> points = random_points(1200);
-    Tensor<float> grad_output = random_gradient(1200, 11);
-    const Tensor<float> clean_output = run(field, points, grad_output, precision).output;
-    Tensor<float> clean_gradient = grad_output;
-    const float bad_values[] = {nan, infinity, -infinity, 1e30F, -2e6F, std::numeric_limits<float>::max()};
-    std::vector<int64_t> bad;
-    for (size_t k = 0; k < std::size(bad_values); ++k) {
-      bad.push_back(static_cast<int64_t>(100 + 190 * k));
-      points(bad.back(), static_cast<int64_t>(k % 3)) = bad_values[k];
-    }
-    grad_output(7, 3) = nan;
-    grad_output(1100, 0) = infinity;
-    for (const int64_t i : bad) std::fill_n(clean_gradient.row(i), 11, 0.0F);
-    for (const int64_t i : {7, 1100}) std::fill_n(clean_gradient.row(i), 11, 0.0F);
-
-    const Pass found = run(field, points, grad_output, precision);
-    for (int64_t i = 0; i < 1200; ++i) {
-      const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
-      for (int k = 0; k < 11; ++k) ASSERT_EQ(found.output(i, k), is_bad ? 0 : clean_output(i, k)) << i;
-    }
-    EXPECT_TRUE(same_bytes(found.gradient, run(field, points, clean_gradient, precision).gradient));
-    for (const auto& t : testing::tensors_of(found.gradient)) EXPECT_TRUE(testing::all_finite(t));
-  }
+  testing::expect_bad_rows_poison_nothing(Device::cpu, 1200);
 }
 
-TEST(FieldHostile, PointsAtTheLimitAreFinite) {
-  const Field field = random_field({.depth = 3, .width = 64, .skip = 2, .position_frequencies = 16}, 11);
-  Tensor<float> points(Shape{3, 3});
-  points(0, 0) = field::coordinate_limit;
-  points(1, 1) = -field::coordinate_limit;
-  points(2, 2) = std::numeric_limits<float>::denorm_min();
-  const Pass pass = run(field, points, random_gradient(3, 11), Precision::fp32);
-  EXPECT_TRUE(testing::all_finite(pass.output));
-  for (const auto& t : testing::tensors_of(pass.gradient)) EXPECT_TRUE(testing::all_finite(t));
-}
+TEST(FieldHostile, PointsAtTheLimitAreFinite) { testing::expect_finite_at_the_limit(Device::cpu); }
 
-TEST(FieldHostile, NoPointsGiveNoRowsAndNoGradient) {
-  const Field field = random_field({.depth = 3, .width = 64, .skip = 2}, 11);
-  for (const Tensor<float>& points : {Tensor<float>(), Tensor<float>(Shape{0, 3})}) {
-    const Pass pass = run(field, points, Tensor<float>(Shape{0, 11}), Precision::fp32);
-    EXPECT_EQ(pass.output.shape(), (Shape{0, 11}));
-    EXPECT_TRUE(same_bytes(pass.gradient, zeros_like<float>(field)));
-  }
-}
+TEST(FieldHostile, NoPointsGiveNoRowsAndNoGradient) { testing::expect_nothing_of_no_points(Device::cpu); }
 
-TEST(FieldHostile, BrokenParametersAndTimesDoNotCrash) {
-  Field field = random_field({.depth = 3, .width = 64, .skip = 2}, 11);
-  const Tensor<float> points = random_points(10);
-  field.weight[1](0, 0) = nan;
-  field.weight[2](5, 5) = infinity;
-  EXPECT_EQ(run(field, points, random_gradient(10, 11), Precision::fp32).output.shape(), (Shape{10, 11}));
-  Tensor<float> output;
-  field::forward(field, points, nan, Precision::bf16, output, nullptr);
-  EXPECT_EQ(output.shape(), (Shape{10, 11}));
-}
+TEST(FieldHostile, BrokenParametersAndTimesDoNotCrash) { testing::expect_no_crash_where_broken(Device::cpu); }
 
 TEST(FieldHostile, AGradientOfAnotherShapeIsRefused) {
   const Field field = random_field({.depth = 2, .width = 32, .skip = 1}, 4);

@@ -45,24 +45,19 @@ void expect_matches_reference(const TestScene& scene, const Options& options, do
 
 TEST(Trace, MatchesTheReferenceAtEveryDegree) {
   for (int degree = 0; degree <= 3; ++degree) {
-    SceneOptions o;
-    o.surfels = 2000;
-    o.rays = 700;
-    o.sh_degree = degree;
-    o.scale_min = 0.02;
-    o.scale_max = 0.2;
+    const SceneOptions o{
+        .surfels = 2000, .rays = 700, .sh_degree = degree, .scale_min = 0.02, .scale_max = 0.2};
     expect_matches_reference(random_scene(static_cast<uint64_t>(degree), o), {}, 0.01);
   }
 }
 
 TEST(Trace, MatchesTheReferenceWhereEveryRayEndsEarly) {
-  SceneOptions o;
-  o.surfels = 3000;
-  o.rays = 500;
-  o.scale_min = 0.05;
-  o.scale_max = 0.3;
-  o.opacity_min = 0.9;
-  o.opacity_max = 1.0;
+  const SceneOptions o{.surfels = 3000,
+                       .rays = 500,
+                       .scale_min = 0.05,
+                       .scale_max = 0.3,
+                       .opacity_min = 0.9,
+                       .opacity_max = 1.0};
   Options options;
   options.hits_per_pass = 2;
   options.background = {0.1F, 0.2F, 0.3F};
@@ -70,11 +65,7 @@ TEST(Trace, MatchesTheReferenceWhereEveryRayEndsEarly) {
 }
 
 TEST(Trace, MatchesTheReferenceFromInsideTheScene) {
-  SceneOptions o;
-  o.surfels = 1000;
-  o.rays = 500;
-  o.ray_distance = 0.3;
-  o.scale_min = 0.05;
+  const SceneOptions o{.surfels = 1000, .rays = 500, .scale_min = 0.05, .ray_distance = 0.3};
   Options options;
   options.t_min = 0.1F;
   expect_matches_reference(random_scene(12, o), options, 0.01);
@@ -83,11 +74,7 @@ TEST(Trace, MatchesTheReferenceFromInsideTheScene) {
 // Faint, wide surfels and a far cut-off: nothing flips, so that gradients agree everywhere.
 TEST(Trace, GradientsMatchTheReference) {
   for (int degree = 0; degree <= 3; ++degree) {
-    SceneOptions o;
-    o.surfels = 300;
-    o.rays = 700;
-    o.sh_degree = degree;
-    o.opacity_max = 0.6;
+    const SceneOptions o{.surfels = 300, .rays = 700, .sh_degree = degree, .opacity_max = 0.6};
     const TestScene scene = random_scene(20 + static_cast<uint64_t>(degree), o);
     Options options;
     options.alpha_min = 1e-9F;
@@ -111,7 +98,7 @@ TEST(Trace, GradientsMatchTheReference) {
 }
 
 TEST(Trace, PositionGradientIsTheNormTimesHalfTheDistance) {
-  TestScene scene{make_surfels(1, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  TestScene scene = blank_scene(1, 0, 1);
   set_facing(scene.surfels, 0, 2, 0.5F, 0.8F);
   scene.origins(0, 0) = 0.3F;
   scene.directions(0, 2) = 4;
@@ -122,10 +109,7 @@ TEST(Trace, PositionGradientIsTheNormTimesHalfTheDistance) {
 }
 
 TEST(Trace, HitsPerPassChangesNothing) {
-  SceneOptions o;
-  o.surfels = 3000;
-  o.rays = 600;
-  o.scale_max = 0.3;
+  SceneOptions o{.surfels = 3000, .rays = 600, .scale_max = 0.3};
   for (const double opacity : {0.3, 0.99}) {
     o.opacity_max = opacity;
     const TestScene scene = random_scene(31, o);
@@ -142,11 +126,7 @@ TEST(Trace, HitsPerPassChangesNothing) {
 }
 
 TEST(Trace, SameBytesAtAnyNumberOfThreads) {
-  SceneOptions o;
-  o.surfels = 40000;
-  o.rays = 3000;
-  o.scale_min = 0.02;
-  o.scale_max = 0.1;
+  const SceneOptions o{.surfels = 40000, .rays = 3000, .scale_min = 0.02, .scale_max = 0.1};
   const TestScene scene = random_scene(41, o);
   set_threads(1);
   const Traced one = trace(scene, {});
@@ -173,9 +153,7 @@ void expect_near(const Tensor<float>& a, const Tensor<float>& b, double toleranc
 }
 
 TEST(Trace, TheOrderOfTheSurfelsDoesNotMatter) {
-  SceneOptions o;
-  o.surfels = 2000;
-  o.rays = 500;
+  const SceneOptions o{.surfels = 2000, .rays = 500};
   const TestScene scene = random_scene(51, o);
   std::vector<int64_t> order(static_cast<size_t>(o.surfels));
   std::iota(order.begin(), order.end(), 0);
@@ -201,7 +179,7 @@ TEST(Trace, TheOrderOfTheSurfelsDoesNotMatter) {
 }
 
 TEST(Trace, HitsAtOneDistanceBlendInOrderOfIndex) {
-  TestScene scene{make_surfels(70, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  TestScene scene = blank_scene(70, 0, 1);
   for (int64_t i = 0; i < 70; ++i) {
     set_facing(scene.surfels, i, 1, 1, 0.5F);
     for (int c = 0; c < 3; ++c)
@@ -218,7 +196,7 @@ TEST(Trace, HitsAtOneDistanceBlendInOrderOfIndex) {
 // More hits on a ray than any buffer starts with.
 TEST(Trace, AnyNumberOfHits) {
   constexpr int64_t count = 5000;
-  TestScene scene{make_surfels(count, 0), Tensor<float>({2, 3}), Tensor<float>({2, 3})};
+  TestScene scene = blank_scene(count, 0, 2);
   for (int64_t i = 0; i < count; ++i)
     set_facing(scene.surfels, i, 1 + 0.001F * static_cast<float>(i), 1, 0.004F);
   scene.directions(0, 2) = 1;
@@ -235,10 +213,7 @@ TEST(Trace, AnyNumberOfHits) {
 
 // Rays side by side share a walk; each on its own must find the same.
 TEST(Trace, RaysTogetherAndAloneAgree) {
-  SceneOptions o;
-  o.surfels = 5000;
-  o.scale_min = 0.02;
-  o.scale_max = 0.2;
+  const SceneOptions o{.surfels = 5000, .scale_min = 0.02, .scale_max = 0.2};
   TestScene scene = random_scene(61, o);
   constexpr int64_t side = 24;
   scene.origins = Tensor<float>({side * side, 3});

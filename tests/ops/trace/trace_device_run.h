@@ -79,12 +79,7 @@ class InOrder {
 
 // Faint surfels and a far cut-off: nothing falls to either side of a threshold.
 inline TestScene smooth_scene(uint64_t seed, int degree, int64_t surfels, int64_t rays) {
-  SceneOptions o;
-  o.surfels = surfels;
-  o.rays = rays;
-  o.sh_degree = degree;
-  o.opacity_max = 0.5;
-  return random_scene(seed, o);
+  return random_scene(seed, {.surfels = surfels, .rays = rays, .sh_degree = degree, .opacity_max = 0.5});
 }
 inline Options smooth_options() {
   Options options;

@@ -1,23 +1,12 @@
 #include <gtest/gtest.h>
 
-#include <limits>
-
+#include "ops/trace/trace_hostile_scenes.h"
 #include "ops/trace/trace_run.h"
 
 namespace traceflow::trace {
 namespace {
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinite = std::numeric_limits<float>::infinity();
-constexpr float largest = std::numeric_limits<float>::max();
-constexpr float smallest = std::numeric_limits<float>::denorm_min();
-
-TestScene clean_scene() {
-  SceneOptions o;
-  o.surfels = 200;
-  o.rays = 100;
-  return random_scene(1, o);
-}
+TestScene clean_scene() { return random_scene(1, {.surfels = 200, .rays = 100}); }
 
 // The set without its first `count` surfels.
 PosedSurfels without_first(const PosedSurfels& from, int64_t count) {
@@ -53,61 +42,32 @@ void expect_left_out(const TestScene& broken, int64_t count) {
 }
 
 TEST(TraceHostile, SurfelsThatAreNotFinite) {
-  int64_t broken = 0;
   TestScene scene = clean_scene();
-  PosedSurfels& s = scene.surfels;
-  for (const float value : {nan, infinite, -infinite}) {
-    s.position(broken++, 1) = value;
-    s.scale(broken++, 0) = value;
-    s.rotation(broken++, 3) = value;
-    s.opacity[broken++] = value;
-    s.sh.row(broken++)[7] = value;
-  }
+  const int64_t broken = make_not_finite(scene.surfels);
   expect_left_out(scene, broken);
 }
 
 TEST(TraceHostile, SurfelsWithoutAreaOrOpacity) {
   TestScene scene = clean_scene();
-  scene.surfels.scale(0, 0) = 0;
-  scene.surfels.scale(1, 1) = -1;
-  scene.surfels.scale(2, 0) = -0.0F;
-  scene.surfels.opacity[3] = 0;
-  scene.surfels.opacity[4] = -1;
-  scene.surfels.opacity[5] = 0.5F / 255;
-  expect_left_out(scene, 6);
+  const int64_t broken = take_area_or_opacity(scene.surfels);
+  expect_left_out(scene, broken);
 }
 
 TEST(TraceHostile, SurfelsBeyondAllMeasure) {
   TestScene scene = clean_scene();
-  scene.surfels.position(0, 0) = largest;
-  scene.surfels.position(1, 2) = -1e20F;
-  scene.surfels.scale(2, 0) = largest;
-  expect_left_out(scene, 3);
+  const int64_t broken = move_beyond_measure(scene.surfels);
+  expect_left_out(scene, broken);
 }
 
 TEST(TraceHostile, ExtremeSurfelsAreFinite) {
   TestScene scene = clean_scene();
-  PosedSurfels& s = scene.surfels;
-  s.position(0, 0) = 1e14F;
-  s.scale(1, 0) = 1e14F;
-  s.scale(2, 0) = smallest;
-  s.scale(3, 0) = s.scale(3, 1) = 1e-30F;
-  for (int k = 0; k < 4; ++k) s.rotation(4, k) = 0;
-  for (int k = 0; k < 4; ++k) s.rotation(5, k) = 1e-30F;
-  for (int k = 0; k < 4; ++k) s.rotation(6, k) = 1e30F;
-  s.opacity[7] = 5;
+  make_extreme(scene.surfels);
   EXPECT_TRUE(all_finite(trace(scene, {})));
 }
 
 TEST(TraceHostile, RaysThatCannotBeTracedSeeTheBackground) {
   TestScene scene = clean_scene();
-  int64_t broken = 0;
-  for (const float value : {nan, infinite, -infinite}) {
-    scene.origins(broken++, 0) = value;
-    scene.directions(broken++, 2) = value;
-  }
-  for (int k = 0; k < 3; ++k) scene.directions(broken, k) = 0;
-  ++broken;
+  const int64_t broken = break_rays(scene);
   Options options;
   options.background = {0.25F, 0.5F, 0.75F};
   const Traced t = trace(scene, options);
@@ -123,16 +83,7 @@ TEST(TraceHostile, RaysThatCannotBeTracedSeeTheBackground) {
 
 TEST(TraceHostile, ExtremeRays) {
   TestScene scene = clean_scene();
-  for (int k = 0; k < 3; ++k) {
-    scene.origins(0, k) = largest;
-    scene.origins(1, k) = 1e20F;
-    scene.directions(2, k) = smallest;
-    scene.directions(3, k) = 1e-30F;
-    scene.directions(4, k) = 1e30F;
-    scene.directions(5, k) = largest;
-  }
-  scene.directions(6, 0) = scene.directions(6, 1) = -0.0F;
-  scene.directions(7, 1) = scene.directions(7, 2) = 0;
+  make_rays_extreme(scene);
   const Traced t = trace(scene, {});
   EXPECT_TRUE(all_finite(t.output.colour));
   EXPECT_TRUE(all_finite(t.output.alpha));
@@ -152,20 +103,13 @@ TEST(TraceHostile, LengthOfTheDirection) {
 }
 
 TEST(TraceHostile, RayInsideAPlane) {
-  TestScene scene{make_surfels(1, 0), Tensor<float>({2, 3}), Tensor<float>({2, 3})};
-  set_facing(scene.surfels, 0, 1, 1, 0.5F);
-  scene.directions(0, 0) = 1;  // parallel to the plane
-  scene.origins(1, 0) = -5;    // in the plane
-  scene.origins(1, 2) = 1;
-  scene.directions(1, 0) = 1;
-  const Traced t = trace(scene, {});
+  const Traced t = trace(rays_inside_a_plane(), {});
   EXPECT_EQ(t.hits, 0);
   EXPECT_TRUE(all_finite(t));
 }
 
 TEST(TraceHostile, NothingToTrace) {
-  const TestScene none{make_surfels(0, 3), Tensor<float>({3, 3}), Tensor<float>({3, 3})};
-  const Traced t = trace(none, {});
+  const Traced t = trace(blank_scene(0, 3, 3), {});
   EXPECT_EQ(t.hits, 0);
   EXPECT_EQ(t.output.alpha.size(), 3);
   EXPECT_EQ(t.output.alpha[2], 0);
@@ -174,33 +118,18 @@ TEST(TraceHostile, NothingToTrace) {
   EXPECT_EQ(trace({{}, {}, {}}, {}).hits, 0);
 }
 
-TEST(TraceHostile, OneSurfel) {
-  TestScene scene{make_surfels(1, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
-  set_facing(scene.surfels, 0, 2, 0.5F, 0.8F);
-  scene.directions(0, 2) = 1;
-  EXPECT_NEAR(trace(scene, {}).output.alpha[0], 0.8F, 1e-6);
-}
+TEST(TraceHostile, OneSurfel) { EXPECT_NEAR(trace(surfels_in_a_row(1), {}).output.alpha[0], 0.8F, 1e-6); }
 
-// All in one place: no plane cuts them apart.
+// No plane cuts them apart.
 TEST(TraceHostile, ManySurfelsInOnePlace) {
-  constexpr int64_t count = 10000;
-  TestScene scene{make_surfels(count, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
-  for (int64_t i = 0; i < count; ++i) set_facing(scene.surfels, i, 1, 1, 0.01F);
-  scene.directions(0, 2) = 1;
-  const Traced t = trace(scene, {});
+  const Traced t = trace(surfels_in_one_place(10000), {});
   EXPECT_GT(t.hits, 900);
   EXPECT_GT(t.output.alpha[0], 0.999F);
 }
 
-// Each surfel half as far as the one before: the tree would grow deep.
+// The tree would grow deep.
 TEST(TraceHostile, SurfelsOfEveryScale) {
-  constexpr int64_t count = 2000;
-  TestScene scene{make_surfels(count, 0), Tensor<float>({1, 3}), Tensor<float>({1, 3})};
-  for (int64_t i = 0; i < count; ++i) {
-    const float depth = std::ldexp(1.0F, static_cast<int>(i % 100) - 90);
-    set_facing(scene.surfels, i, depth, depth * 0.1F, 0.01F);
-  }
-  scene.directions(0, 2) = 1;
+  const TestScene scene = surfels_of_every_scale(2000);
   Options options;
   options.t_min = 0;
   BasicOutput<double> truth;

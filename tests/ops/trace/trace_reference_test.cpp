@@ -69,14 +69,7 @@ void expect_all_gradients(Problem p, uint64_t seed) {
 
 // Few, wide, faint surfels: every ray meets each far from where a hit would come or go.
 SceneOptions smooth_scene(int degree) {
-  SceneOptions o;
-  o.surfels = 6;
-  o.rays = 5;
-  o.sh_degree = degree;
-  o.scale_min = 0.9;
-  o.scale_max = 1.5;
-  o.box = 0.5;
-  return o;
+  return {.surfels = 6, .rays = 5, .sh_degree = degree, .scale_min = 0.9, .scale_max = 1.5, .box = 0.5};
 }
 
 TEST(TraceReference, GradientsMatchCentralDifferencesAtEveryDegree) {

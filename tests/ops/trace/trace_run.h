@@ -29,8 +29,7 @@ inline Traced trace(const TestScene& scene, const Options& options, uint64_t gra
 }
 
 inline bool same_bytes(const Tensor<float>& a, const Tensor<float>& b) {
-  return a.size() == b.size() &&
-         std::memcmp(a.data(), b.data(), static_cast<size_t>(a.size()) * sizeof(float)) == 0;
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.values().size_bytes()) == 0);
 }
 
 inline bool same_bytes(const Output& a, const Output& b) {

@@ -47,14 +47,18 @@ inline PosedSurfels make_surfels(int64_t count, int sh_degree) {
   return s;
 }
 
+// To be filled in: all zeros.
+inline TestScene blank_scene(int64_t surfels, int sh_degree, int64_t rays) {
+  return {make_surfels(surfels, sh_degree), Tensor<float>({rays, 3}), Tensor<float>({rays, 3})};
+}
+
 inline Vec3<double> random_direction(Random& random) {
   return glm::normalize(Vec3<double>(random.normal(), random.normal(), random.normal()));
 }
 
 inline TestScene random_scene(uint64_t seed, const SceneOptions& options = {}) {
   Random random(seed);
-  TestScene scene{make_surfels(options.surfels, options.sh_degree), Tensor<float>({options.rays, 3}),
-                  Tensor<float>({options.rays, 3})};
+  TestScene scene = blank_scene(options.surfels, options.sh_degree, options.rays);
   for (int64_t i = 0; i < options.surfels; ++i) fill_surfel(scene.surfels, i, random, options);
   for (int64_t r = 0; r < options.rays; ++r) {
     const Vec3<double> origin = options.ray_distance * random_direction(random);

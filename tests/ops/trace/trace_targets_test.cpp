@@ -47,11 +47,7 @@ TEST(TraceTargets, EveryInstructionSetMatchesTheReference) {
     SCOPED_TRACE(hwy::TargetName(target));
     const OnlyTarget only(target);
     for (int degree = 0; degree <= 3; ++degree) {
-      SceneOptions o;
-      o.surfels = 100;
-      o.rays = 100;
-      o.sh_degree = degree;
-      o.opacity_max = 0.3;
+      const SceneOptions o{.surfels = 100, .rays = 100, .sh_degree = degree, .opacity_max = 0.3};
       expect_matches_reference(random_scene(static_cast<uint64_t>(degree), o));
     }
   }

@@ -1,8 +1,4 @@
-#include <limits>
-
-#include "../../field/field_scene.h"
-#include "../deform_scene.h"
-#include "ops/deform/deform.h"
+#include "../deform_run.h"
 #include "support/device.h"
 
 namespace traceflow {
@@ -11,37 +7,8 @@ namespace {
 using namespace traceflow::testing;
 using field::Precision;
 
-constexpr NetworkOptions small{.depth = 4, .width = 64, .skip = 2};
-constexpr float test_time = 0.62F;
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
+using Pass = DeformPass;
 using DeformOnDevice = OnDevice;
-
-// One forward and backward pass with a random gradient; what it made, on the host.
-struct Pass {
-  PosedSurfels posed;
-  Surfels grad_stored;
-  Field grad_field;
-};
-
-Pass run(Device device, const Surfels& stored, const Field* field, const Tensor<int32_t>& subset = {},
-         int sh_degree = 3, Precision precision = Precision::fp32, bool frozen = false) {
-  const Surfels there = stored.on(device);
-  const Field field_there = field == nullptr ? Field() : field->on(device);
-  const Field* const evaluated = field == nullptr ? nullptr : &field_there;
-  const Tensor<int32_t> subset_there = subset.on(device);
-  deform::Saved saved;
-  PosedSurfels posed;
-  deform::forward(there, evaluated, test_time, subset_there, sh_degree, precision, posed, &saved);
-  EXPECT_EQ(posed.device(), device);
-  const PosedSurfels grad_posed = random_gradient_like(posed.on(Device::cpu)).on(device);
-  Surfels grad_stored = zeros_like<float>(there);
-  Field grad_field = zeros_like<float>(field_there);
-  deform::backward(there, evaluated, test_time, subset_there, posed, saved, grad_posed, grad_stored,
-                   evaluated == nullptr || frozen ? nullptr : &grad_field);
-  return {posed.on(Device::cpu), grad_stored.on(Device::cpu), grad_field.on(Device::cpu)};
-}
 
 template <class F>
 void for_each_pair(const Pass& found, const Pass& expected, F&& f) {
@@ -59,18 +26,12 @@ void for_each_pair(const Pass& found, const Pass& expected, F&& f) {
 // exponentials by two. A ReLU that sees the other side of its kink may add its share to the field's gradient.
 void expect_agreement(const Surfels& stored, const Field* field, const Tensor<int32_t>& subset,
                       int sh_degree) {
-  const Pass expected = run(Device::cpu, stored, field, subset, sh_degree);
-  const Pass found = run(Device::cuda, stored, field, subset, sh_degree);
+  const Pass expected = run_deform(Device::cpu, stored, field, subset, sh_degree);
+  const Pass found = run_deform(Device::cuda, stored, field, subset, sh_degree);
   for_each_pair(found, expected, [](const std::string& name, const auto& a, const auto& b) {
     expect_close(a, b, 5e-6, name.c_str());
   });
   if (field != nullptr) expect_fields_close(found.grad_field, expected.grad_field, 1e-2, 1e-3);
-}
-
-Tensor<int32_t> some_of(int32_t count) {
-  std::vector<int32_t> subset;
-  for (int32_t i = 3; i < count; i += i % 5 + 1) subset.push_back(i);
-  return tensor_of(subset);
 }
 
 TEST_F(DeformOnDevice, AgreesForMainSurfels) {
@@ -85,19 +46,19 @@ TEST_F(DeformOnDevice, AgreesForEnvironmentSurfels) {
 
 TEST_F(DeformOnDevice, AgreesForASubset) {
   const Field field = random_field(small, residual::main_outputs);
-  expect_agreement(random_surfels(500, true), &field, some_of(500), 2);
+  expect_agreement(random_surfels(500, true), &field, tensor_of(some_of(500)), 2);
 }
 
 TEST_F(DeformOnDevice, AgreesWithoutAField) {
   expect_agreement(random_surfels(100, true), nullptr, {}, 0);
-  expect_agreement(random_surfels(100, false), nullptr, some_of(100), 3);
+  expect_agreement(random_surfels(100, false), nullptr, tensor_of(some_of(100)), 3);
 }
 
 TEST_F(DeformOnDevice, AgreesInBf16WithinItsPrecision) {
   const Field field = random_field(small, residual::main_outputs);
   const Surfels stored = random_surfels(300, true);
-  const Pass expected = run(Device::cpu, stored, &field);
-  const Pass found = run(Device::cuda, stored, &field, {}, 3, Precision::bf16);
+  const Pass expected = run_deform(Device::cpu, stored, &field);
+  const Pass found = run_deform(Device::cuda, stored, &field, {}, 3, Precision::bf16);
   for_each_pair(found, expected, [](const std::string& name, const auto& a, const auto& b) {
     expect_close(a, b, 0.02, name.c_str());
   });
@@ -107,10 +68,10 @@ TEST_F(DeformOnDevice, AgreesInBf16WithinItsPrecision) {
 TEST_F(DeformOnDevice, IsTheSameBytesTwice) {
   const Field field = random_field(small, residual::main_outputs);
   const Surfels stored = random_surfels(700, true);
-  const Tensor<int32_t> subset = some_of(700);
+  const Tensor<int32_t> subset = tensor_of(some_of(700));
   for (const Precision precision : {Precision::fp32, Precision::bf16}) {
-    const Pass once = run(Device::cuda, stored, &field, subset, 3, precision);
-    const Pass twice = run(Device::cuda, stored, &field, subset, 3, precision);
+    const Pass once = run_deform(Device::cuda, stored, &field, subset, 3, precision);
+    const Pass twice = run_deform(Device::cuda, stored, &field, subset, 3, precision);
     for_each_pair(once, twice, [](const std::string& name, const auto& a, const auto& b) {
       EXPECT_TRUE(same_bytes(a, b)) << name;
     });
@@ -121,10 +82,10 @@ TEST_F(DeformOnDevice, IsTheSameBytesTwice) {
 TEST_F(DeformOnDevice, AFrozenFieldGetsNoGradientAndStoredValuesDo) {
   const Field field = random_field(small, residual::main_outputs);
   const Surfels stored = random_surfels(64, true);
-  const Pass frozen = run(Device::cuda, stored, &field, {}, 3, Precision::fp32, true);
+  const Pass frozen = run_deform(Device::cuda, stored, &field, {}, 3, Precision::fp32, true);
   EXPECT_TRUE(same_bytes(frozen.grad_field, zeros_like<float>(field)));
   EXPECT_TRUE(same_bytes(frozen.grad_stored.opacity_logit,
-                         run(Device::cuda, stored, &field).grad_stored.opacity_logit));
+                         run_deform(Device::cuda, stored, &field).grad_stored.opacity_logit));
 }
 
 TEST_F(DeformOnDevice, DisplacedSurfelsAgree) {
@@ -144,25 +105,13 @@ TEST_F(DeformOnDevice, DisplacedSurfelsAgree) {
   }
 }
 
-// Each kind of stored value broken in its own way, in surfel 10·k: hidden where the CPU hides it, to the same
-// bytes, and without a gradient.
+// Hidden where the CPU hides them, to the same bytes, and without a gradient.
 TEST_F(DeformOnDevice, BrokenSurfelsAreHiddenAndPoisonNothing) {
-  Surfels stored = random_surfels(150, true);
-  stored.position(0, 1) = nan;
-  stored.rotation(10, 3) = infinity;
-  stored.log_scale(20, 0) = nan;
-  stored.log_scale(30, 1) = 200;   // overflows
-  stored.log_scale(40, 0) = -200;  // underflows: a disk without extent
-  stored.log_scale(50, 0) = -infinity;
-  stored.opacity_logit[60] = infinity;
-  stored.opacity_logit[70] = nan;
-  stored.sh(80, 15, 2) = nan;
-  stored.tint_logit[90] = -infinity;
-  stored.position(100, 0) = -infinity;
+  Surfels stored = broken_surfels(random_surfels(150, true));
   stored.rotation(110, 0) = stored.rotation(110, 1) = stored.rotation(110, 2) = stored.rotation(110, 3) = 0;
   const Field field = random_field(small, residual::main_outputs);
-  const Pass expected = run(Device::cpu, stored, &field);
-  const Pass found = run(Device::cuda, stored, &field);
+  const Pass expected = run_deform(Device::cpu, stored, &field);
+  const Pass found = run_deform(Device::cuda, stored, &field);
   for_each_pair(found, expected, [](const std::string& name, const auto& a, const auto& b) {
     ASSERT_TRUE(all_finite(a)) << name;
     expect_close(a, b, 5e-6, name.c_str());
@@ -170,7 +119,7 @@ TEST_F(DeformOnDevice, BrokenSurfelsAreHiddenAndPoisonNothing) {
       for (int64_t k = 0; k < a.row_size(); ++k) EXPECT_EQ(a.row(i)[k], b.row(i)[k]) << name << " of " << i;
     }
   });
-  for (int64_t i = 0; i < 150; ++i) EXPECT_EQ(found.posed.opacity[i] == 0, i % 10 == 0 && i <= 100) << i;
+  for (int64_t i = 0; i < 150; ++i) EXPECT_EQ(found.posed.opacity[i] == 0, is_broken(i)) << i;
   found.grad_field.for_each(
       [](const std::string& name, const Tensor<float>& t) { EXPECT_TRUE(all_finite(t)) << name; });
 }
@@ -178,15 +127,15 @@ TEST_F(DeformOnDevice, BrokenSurfelsAreHiddenAndPoisonNothing) {
 TEST_F(DeformOnDevice, ABrokenFieldHidesEverySurfel) {
   Field field = random_field(small, residual::main_outputs);
   field.head_bias[residual::rotation] = nan;
-  const Pass pass = run(Device::cuda, random_surfels(40, true), &field);
+  const Pass pass = run_deform(Device::cuda, random_surfels(40, true), &field);
   for (const float o : pass.posed.opacity.values()) EXPECT_EQ(o, 0);
   EXPECT_TRUE(same_bytes(pass.grad_field, zeros_like<float>(field)));
 }
 
 TEST_F(DeformOnDevice, NoSurfelsAndOneSurfel) {
   const Field field = random_field(small, residual::main_outputs);
-  EXPECT_EQ(run(Device::cuda, random_surfels(0, true), &field).posed.count(), 0);
-  EXPECT_EQ(run(Device::cuda, Surfels(), nullptr).posed.count(), 0);
+  EXPECT_EQ(run_deform(Device::cuda, random_surfels(0, true), &field).posed.count(), 0);
+  EXPECT_EQ(run_deform(Device::cuda, Surfels(), nullptr).posed.count(), 0);
   expect_agreement(random_surfels(1, true), nullptr, {}, 3);
 }
 

@@ -1,8 +1,4 @@
-#include <limits>
-#include <ostream>
-
-#include "../field_scene.h"
-#include "ops/field/field.h"
+#include "../field_run.h"
 #include "ops/field/field_cuda.h"
 #include "ops/field/network_device.h"
 #include "support/device.h"
@@ -13,45 +9,8 @@ namespace {
 using namespace traceflow::testing;
 using field::Precision;
 
-constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr float test_time = 0.37F;
-constexpr int64_t all_memory = int64_t{1} << 29;
-
-struct Pass {
-  Tensor<float> output;
-  Field gradient;
-};
-
-Pass run(Device device, const Field& field, const Tensor<float>& points, const Tensor<float>& grad_output,
-         Precision precision, int64_t memory_limit = all_memory) {
-  const Field there = field.on(device);
-  const Tensor<float> points_there = points.on(device);
-  Pass pass{{}, zeros_like<float>(there)};
-  field::Saved saved;
-  saved.memory_limit = memory_limit;
-  field::forward(there, points_there, test_time, precision, pass.output, &saved);
-  field::backward(there, points_there, test_time, saved, grad_output.on(device), pass.gradient);
-  EXPECT_EQ(pass.output.device(), device);
-  return {pass.output.on(Device::cpu), pass.gradient.on(Device::cpu)};
-}
-
-Tensor<float> random_gradient(int64_t count, int outputs) {
-  Random random(17);
-  return random_tensor<float>({count, outputs}, random, -1, 1);
-}
-
-struct Case {
-  NetworkOptions shape;
-  int outputs;
-  int64_t points;
-};
-
-std::ostream& operator<<(std::ostream& out, const Case& c) {
-  return out << "depth " << c.shape.depth << " width " << c.shape.width << " skip " << c.shape.skip
-             << " octaves " << c.shape.position_frequencies << "+" << c.shape.time_frequencies << " outputs "
-             << c.outputs << " points " << c.points;
-}
+using Pass = FieldPass;
+using Case = FieldCase;
 
 class FieldOnDevice : public OnDevice {
  protected:
@@ -74,8 +33,8 @@ TEST_P(FieldCasesOnDevice, Fp32AgreesWithTheCpu) {
   const Tensor<float> points = random_points(c.points);
   Tensor<float> grad_output = random_gradient(c.points, c.outputs);
   keep_away_from_kinks(field, points, test_time, grad_output);
-  const Pass expected = run(Device::cpu, field, points, grad_output, Precision::fp32);
-  const Pass found = run(Device::cuda, field, points, grad_output, Precision::fp32);
+  const Pass expected = run_field(Device::cpu, field, points, grad_output, Precision::fp32);
+  const Pass found = run_field(Device::cuda, field, points, grad_output, Precision::fp32);
   expect_close(found.output, expected.output, 5e-6, "output");
   expect_fields_close(found.gradient, expected.gradient, 5e-6, 5e-6);
 }
@@ -86,8 +45,8 @@ TEST_P(FieldCasesOnDevice, Bf16AgreesWithinItsPrecision) {
   const Field field = random_field(c.shape, c.outputs);
   const Tensor<float> points = random_points(c.points);
   const Tensor<float> grad_output = random_gradient(c.points, c.outputs);
-  const Pass expected = run(Device::cpu, field, points, grad_output, Precision::fp32);
-  const Pass found = run(Device::cuda, field, points, grad_output, Precision::bf16);
+  const Pass expected = run_field(Device::cpu, field, points, grad_output, Precision::fp32);
+  const Pass found = run_field(Device::cuda, field, points, grad_output, Precision::bf16);
   expect_close(found.output, expected.output, 0.01, "output");
   expect_fields_close(found.gradient, expected.gradient, 0.15, 0.03);
 }
@@ -157,9 +116,9 @@ TEST_F(FieldOnDevice, IsTheSameBytesTwice) {
   const Field field = random_field({.depth = 4, .width = 64, .skip = 2}, 11);
   const Tensor<float> points = random_points(1500);
   const Tensor<float> grad_output = random_gradient(1500, 11);
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
-    const Pass once = run(Device::cuda, field, points, grad_output, precision);
-    const Pass twice = run(Device::cuda, field, points, grad_output, precision);
+  for (const Precision precision : both_precisions) {
+    const Pass once = run_field(Device::cuda, field, points, grad_output, precision);
+    const Pass twice = run_field(Device::cuda, field, points, grad_output, precision);
     EXPECT_TRUE(same_bytes(once.output, twice.output));
     EXPECT_TRUE(same_bytes(once.gradient, twice.gradient));
   }
@@ -171,16 +130,16 @@ TEST_F(FieldOnDevice, SegmentsAreKeptOrComputedAgainToTheSameBytes) {
   const Tensor<float> points = random_points(450);
   Tensor<float> grad_output = random_gradient(450, 11);
   keep_away_from_kinks(field, points, test_time, grad_output);
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
+  for (const Precision precision : both_precisions) {
     field::device::segment_values = int64_t{128} * 64;
-    const Pass kept = run(Device::cuda, field, points, grad_output, precision);
+    const Pass kept = run_field(Device::cuda, field, points, grad_output, precision);
     for (const int64_t limit : {int64_t{0}, int64_t{400} << 10}) {
-      const Pass again = run(Device::cuda, field, points, grad_output, precision, limit);
+      const Pass again = run_field(Device::cuda, field, points, grad_output, precision, limit);
       EXPECT_TRUE(same_bytes(kept.output, again.output));
       EXPECT_TRUE(same_bytes(kept.gradient, again.gradient)) << limit;
     }
     field::device::segment_values = int64_t{1} << 23;
-    const Pass whole = run(Device::cuda, field, points, grad_output, precision);
+    const Pass whole = run_field(Device::cuda, field, points, grad_output, precision);
     expect_close(kept.output, whole.output, 5e-6, "output");
     expect_fields_close(kept.gradient, whole.gradient, 5e-6, 5e-6);
   }
@@ -209,12 +168,12 @@ TEST_F(FieldOnDevice, AgreesWithoutFusedEpilogues) {
   const Tensor<float> points = random_points(200);
   Tensor<float> grad_output = random_gradient(200, 10);
   keep_away_from_kinks(field, points, test_time, grad_output);
-  const Pass expected = run(Device::cpu, field, points, grad_output, Precision::fp32);
+  const Pass expected = run_field(Device::cpu, field, points, grad_output, Precision::fp32);
   cuda::allow_epilogues(false);
-  const Pass fp32 = run(Device::cuda, field, points, grad_output, Precision::fp32);
+  const Pass fp32 = run_field(Device::cuda, field, points, grad_output, Precision::fp32);
   expect_close(fp32.output, expected.output, 5e-6, "output");
   expect_fields_close(fp32.gradient, expected.gradient, 5e-6, 5e-6);
-  const Pass bf16 = run(Device::cuda, field, points, grad_output, Precision::bf16);
+  const Pass bf16 = run_field(Device::cuda, field, points, grad_output, Precision::bf16);
   expect_close(bf16.output, expected.output, 0.015, "output");
   expect_fields_close(bf16.gradient, expected.gradient, 0.2, 0.03);
 }
@@ -234,7 +193,7 @@ TEST_F(FieldOnDevice, WithoutSavingTheOutputIsTheSame) {
   Tensor<float> unsaved;
   field::forward(field.on(Device::cuda), points.on(Device::cuda), test_time, Precision::fp32, unsaved,
                  nullptr);
-  const Pass saved = run(Device::cuda, field, points, random_gradient(300, 11), Precision::fp32);
+  const Pass saved = run_field(Device::cuda, field, points, random_gradient(300, 11), Precision::fp32);
   expect_close_on_host(unsaved, saved.output, 5e-6, "output");
 }
 
@@ -250,82 +209,21 @@ TEST_F(FieldOnDevice, BackwardAddsToTheGradientAndMemoryIsReused) {
     field::backward(field, points, test_time, saved, grad_output, once);
     field::backward(field, points, test_time, saved, grad_output, twice);
     field::backward(field, points, test_time, saved, grad_output, twice);
-    Field doubled = once.on(Device::cpu);
-    doubled.for_each([](const std::string&, Tensor<float>& t) {
-      for (float& v : t.values()) v *= 2;
-    });
-    EXPECT_TRUE(same_bytes(doubled, twice.on(Device::cpu))) << count;
+    EXPECT_TRUE(same_bytes(doubled(once.on(Device::cpu)), twice.on(Device::cpu))) << count;
   }
 }
 
-// Bad points and bad gradients in the middle of good ones: their rows are zero, the other rows and the sums
-// are those of a set in which they have no part.
-TEST_F(FieldOnDevice, BadRowsAreZeroAndPoisonNothing) {
-  const Field field = random_field({.depth = 4, .width = 64, .skip = 2}, 11);
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
-    Tensor<float> points = random_points(400);
-    Tensor<float> grad_output = random_gradient(400, 11);
-    const Tensor<float> clean_output = run(Device::cuda, field, points, grad_output, precision).output;
-    Tensor<float> clean_gradient = grad_output;
-    const float bad_values[] = {nan, infinity, -infinity, 1e30F, -2e6F, std::numeric_limits<float>::max()};
-    std::vector<int64_t> bad;
-    for (size_t k = 0; k < std::size(bad_values); ++k) {
-      bad.push_back(static_cast<int64_t>(10 + 61 * k));
-      points(bad.back(), static_cast<int64_t>(k % 3)) = bad_values[k];
-    }
-    grad_output(7, 3) = nan;
-    grad_output(399, 0) = infinity;
-    for (const int64_t i : bad) std::fill_n(clean_gradient.row(i), 11, 0.0F);
-    for (const int64_t i : {7, 399}) std::fill_n(clean_gradient.row(i), 11, 0.0F);
+TEST_F(FieldOnDevice, BadRowsAreZeroAndPoisonNothing) { expect_bad_rows_poison_nothing(Device::cuda, 400); }
 
-    const Pass found = run(Device::cuda, field, points, grad_output, precision);
-    for (int64_t i = 0; i < 400; ++i) {
-      const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
-      for (int k = 0; k < 11; ++k) ASSERT_EQ(found.output(i, k), is_bad ? 0 : clean_output(i, k)) << i;
-    }
-    const Pass clean = run(Device::cuda, field, points, clean_gradient, precision);
-    EXPECT_TRUE(same_bytes(found.gradient, clean.gradient));
-    for (const auto& t : tensors_of(found.gradient)) EXPECT_TRUE(all_finite(t));
-  }
-}
+TEST_F(FieldOnDevice, PointsAtTheLimitAreFinite) { expect_finite_at_the_limit(Device::cuda); }
 
-TEST_F(FieldOnDevice, PointsAtTheLimitAreFinite) {
-  const Field field = random_field({.depth = 3, .width = 64, .skip = 2, .position_frequencies = 16}, 11);
-  Tensor<float> points(Shape{3, 3});
-  points(0, 0) = field::coordinate_limit;
-  points(1, 1) = -field::coordinate_limit;
-  points(2, 2) = std::numeric_limits<float>::denorm_min();
-  for (const Precision precision : {Precision::fp32, Precision::bf16}) {
-    const Pass pass = run(Device::cuda, field, points, random_gradient(3, 11), precision);
-    EXPECT_TRUE(all_finite(pass.output));
-    for (const auto& t : tensors_of(pass.gradient)) EXPECT_TRUE(all_finite(t));
-  }
-}
+TEST_F(FieldOnDevice, NoPointsGiveNoRowsAndNoGradient) { expect_nothing_of_no_points(Device::cuda); }
 
-TEST_F(FieldOnDevice, NoPointsGiveNoRowsAndNoGradient) {
-  const Field field = random_field({.depth = 3, .width = 64, .skip = 2}, 11);
-  for (const Tensor<float>& points : {Tensor<float>(), Tensor<float>(Shape{0, 3})}) {
-    const Pass pass = run(Device::cuda, field, points, Tensor<float>(Shape{0, 11}), Precision::bf16);
-    EXPECT_EQ(pass.output.shape(), (Shape{0, 11}));
-    EXPECT_TRUE(same_bytes(pass.gradient, zeros_like<float>(field)));
-  }
-}
-
-TEST_F(FieldOnDevice, BrokenParametersAndTimesDoNotCrash) {
-  Field field = random_field({.depth = 3, .width = 64, .skip = 2}, 11);
-  const Tensor<float> points = random_points(10);
-  field.weight[1](0, 0) = nan;
-  field.weight[2](5, 5) = infinity;
-  EXPECT_EQ(run(Device::cuda, field, points, random_gradient(10, 11), Precision::bf16).output.shape(),
-            (Shape{10, 11}));
-  Tensor<float> output;
-  field::forward(field.on(Device::cuda), points.on(Device::cuda), nan, Precision::bf16, output, nullptr);
-  EXPECT_EQ(output.shape(), (Shape{10, 11}));
-}
+TEST_F(FieldOnDevice, BrokenParametersAndTimesDoNotCrash) { expect_no_crash_where_broken(Device::cuda); }
 
 TEST_F(FieldOnDevice, AGradientOfAnotherShapeIsRefused) {
   const Field field = random_field({.depth = 2, .width = 32, .skip = 1}, 4);
-  EXPECT_THROW(run(Device::cuda, field, random_points(10), random_gradient(10, 3), Precision::fp32),
+  EXPECT_THROW(run_field(Device::cuda, field, random_points(10), random_gradient(10, 3), Precision::fp32),
                InternalError);
 }
 

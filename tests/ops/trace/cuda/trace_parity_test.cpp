@@ -71,12 +71,7 @@ void expect_same_but_at_boundaries(const TestScene& scene, const Options& option
 }
 
 TEST_F(TraceOnDevice, AgreesWithTheCpuWithinThresholds) {
-  SceneOptions o;
-  o.surfels = 1500;
-  o.rays = 300;
-  o.scale_min = 0.02;
-  o.scale_max = 0.2;
-  o.opacity_min = 0;
+  SceneOptions o{.surfels = 1500, .rays = 300, .scale_min = 0.02, .scale_max = 0.2, .opacity_min = 0};
   expect_same_but_at_boundaries(random_scene(1, o), {});
   o.ray_distance = 0.3;
   Options from_inside;
@@ -86,12 +81,7 @@ TEST_F(TraceOnDevice, AgreesWithTheCpuWithinThresholds) {
 
 // Where each ray ends among the first of the hits that are held.
 TEST_F(TraceOnDevice, AgreesWithTheCpuWhereEveryRayEndsEarly) {
-  SceneOptions o;
-  o.surfels = 2000;
-  o.rays = 300;
-  o.sh_degree = 1;
-  o.opacity_min = 0.9;
-  o.opacity_max = 1.0;
+  const SceneOptions o{.surfels = 2000, .rays = 300, .sh_degree = 1, .opacity_min = 0.9, .opacity_max = 1.0};
   Options options;
   options.background = {0.1F, 0.2F, 0.3F};
   expect_same_but_at_boundaries(random_scene(3, o), options);
@@ -101,7 +91,7 @@ TEST_F(TraceOnDevice, AgreesWithTheCpuWhereEveryRayEndsEarly) {
 // the order of their index.
 TEST_F(TraceOnDevice, AnyNumberOfHits) {
   constexpr int64_t count = 2000;
-  TestScene scene{make_surfels(count, 0), Tensor<float>({40, 3}), Tensor<float>({40, 3})};
+  TestScene scene = blank_scene(count, 0, 40);
   Random random(7);
   for (int64_t i = 0; i < count; ++i) {
     set_facing(scene.surfels, i, i < 100 ? 5 : 1 + 0.005F * static_cast<float>(i), 1, 0.004F);
@@ -127,7 +117,7 @@ TEST_F(TraceOnDevice, AnyNumberOfHits) {
 // In one plane, but not in one place: the tree's order is not that of the index.
 TEST_F(TraceOnDevice, HitsAtOneDistanceBlendInOrderOfIndex) {
   constexpr int64_t count = 200;
-  TestScene scene{make_surfels(count, 0), Tensor<float>({40, 3}), Tensor<float>({40, 3})};
+  TestScene scene = blank_scene(count, 0, 40);
   Random random(11);
   for (int64_t i = 0; i < count; ++i) {
     set_facing(scene.surfels, i, 1, 1, 0.02F);
