@@ -82,7 +82,8 @@ class VerbsOnDevice : public traceflow::testing::OnDevice {
 };
 
 TEST_F(VerbsOnDevice, TrainEvaluateAndRenderAsOnTheCpu) {
-  ASSERT_EQ(train("run", "auto"), exit_done) << error_;
+  // In bf16 a hidden value that rounds to its other neighbour moves surfels by more than pictures may differ.
+  ASSERT_EQ(train("run", "auto", {"--set", "render.precision=fp32"}), exit_done) << error_;
   EXPECT_THAT(error_, HasSubstr("device: cuda, "));
   EXPECT_THAT(text_of("run/log.jsonl"), HasSubstr(R"("device":"cuda")"));
 
@@ -107,7 +108,7 @@ TEST_F(VerbsOnDevice, TrainEvaluateAndRenderAsOnTheCpu) {
     ASSERT_EQ(found.shape(), expected.shape());
     int64_t differ = 0;
     for (int64_t i = 0; i < found.size(); ++i) differ += std::abs(found[i] - expected[i]) > 1e-3F ? 1 : 0;
-    EXPECT_LE(differ, found.size() / 200) << entry.path();
+    EXPECT_LE(differ, found.size() / 500) << entry.path();
   }
 
   ASSERT_EQ(run_verb({"export", path("run"), "-o", path("ply")}), exit_done) << error_;
