@@ -5,8 +5,8 @@
 #include "base/kernel.h"
 #include "ops/raster/raster_chain.h"
 #include "ops/raster/raster_cuda.h"
-#include "ops/raster/raster_footprint.h"
 #include "ops/raster/raster_prepare.h"
+#include "ops/raster/raster_reach_cuda.h"
 #include "primitives/sort.h"
 #include "primitives/sum_kernels.h"
 
@@ -22,23 +22,6 @@ template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t,
 
 namespace raster::cuda_stage {
 
-struct TileGrid {
-  int columns;
-  int width, height;
-
-  // f(tile) for every tile that the splat may reach.
-  template <class F>
-  __device__ void for_each_reached(const Splat& splat, const Bounds& bounds, F&& f) const {
-    for (int row = bounds.tile_y0; row < bounds.tile_y1; ++row) {
-      for (int column = bounds.tile_x0; column < bounds.tile_x1; ++column) {
-        const float x = static_cast<float>(column * tile_edge) + 0.5F;
-        const float y = static_cast<float>(row * tile_edge) + 0.5F;
-        if (reaches(splat, x, y, x + (tile_edge - 1), y + (tile_edge - 1))) f(row * columns + column);
-      }
-    }
-  }
-};
-
 // How many tiles each surfel reaches, and the key that it is sorted by.
 struct CountTiles {
   TileGrid grid;
@@ -50,15 +33,14 @@ struct CountTiles {
   int64_t count;
 
   __device__ void operator()(int64_t i) const {
-    int32_t tiles = 0;
-    if (i < count && bounds[i].tiles() > 0) {
-      grid.for_each_reached(splats[i], bounds[i], [&](int) { ++tiles; });
-    }
-    counts[i] = tiles;
-    if (i == count) return;
+    const auto surfel = static_cast<uint32_t>(i);
+    const BoundedSurfel mine{i < count ? bounds[i] : Bounds{}, surfel};
+    const int32_t tiles = for_each_reached(grid, splats, mine, [](const BoundedSurfel&, int, int) {});
+    if (i <= count) counts[i] = tiles;
+    if (i >= count) return;
     // Depths are positive, so that their bits sort as they do.
     keys[i] = tiles > 0 && by_depth ? std::bit_cast<uint32_t>(splats[i].z_centre) : 0;
-    surfels[i] = static_cast<uint32_t>(i);
+    surfels[i] = surfel;
   }
 };
 
@@ -82,17 +64,25 @@ struct WriteEntries {
   const int32_t* entry;  // by surfel
   uint32_t *tiles, *places;
   TileEntry* entries;
+  int64_t count;
+
+  struct PlacedSurfel : BoundedSurfel {
+    uint32_t first_entry = 0;
+    uint32_t first_place = 0;
+  };
+
+  __device__ PlacedSurfel nearest(int64_t k) const {
+    const uint32_t surfel = order[k];
+    return {{bounds[surfel], surfel}, static_cast<uint32_t>(entry[surfel]), static_cast<uint32_t>(place[k])};
+  }
 
   __device__ void operator()(int64_t k) const {
-    const uint32_t surfel = order[k];
-    if (bounds[surfel].tiles() == 0) return;
-    int64_t at = place[k];
-    auto own = static_cast<uint32_t>(entry[surfel]);
-    grid.for_each_reached(splats[surfel], bounds[surfel], [&](int tile) {
+    const PlacedSurfel mine = k < count ? nearest(k) : PlacedSurfel{};
+    for_each_reached(grid, splats, mine, [&](const PlacedSurfel& of, int tile, int nth) {
+      const uint32_t at = of.first_place + static_cast<uint32_t>(nth);
       tiles[at] = static_cast<uint32_t>(tile);
-      places[at] = static_cast<uint32_t>(at);
-      entries[at] = {surfel, own++};
-      ++at;
+      places[at] = at;
+      entries[at] = {of.surfel, of.first_entry + static_cast<uint32_t>(nth)};
     });
   }
 };
@@ -121,6 +111,18 @@ struct FindTiles {
 
 namespace {
 
+// f(i) for i < n and for those after it that fill the last block, so that no warp lacks a lane.
+template <class F>
+__global__ void whole_warps_kernel(F f) {
+  f(int64_t{blockIdx.x} * blockDim.x + threadIdx.x);
+}
+
+template <class F>
+void for_each_in_whole_warps(const char* description, int64_t n, const F& f) {
+  constexpr int threads = 8 * cuda::warp_lanes;
+  cuda::launch(description, {cuda::blocks_for(n, threads), threads}, whole_warps_kernel<F>, f);
+}
+
 template <class T>
 T* resized(Tensor<T>& tensor, int64_t size) {
   tensor.place(Device::cuda).resize({size});
@@ -139,13 +141,13 @@ int64_t read_back(const Tensor<int64_t>& tensor) {
 void bin(SortOrder order, Saved& saved) {
   Saved::Scratch& s = saved.scratch;
   const int64_t n = saved.count;
-  const TileGrid grid{saved.tile_columns, saved.width, saved.height};
+  const TileGrid grid{saved.tile_columns};
   int32_t* const counts = resized(s.counts, n + 1);
   uint32_t* const keys = resized(s.depth_keys, n);
   uint32_t* const surfels = resized(s.surfels, n);
-  cuda::for_each_index("raster: count tiles", n + 1,
-                       CountTiles{grid, order == SortOrder::centre, saved.splats.data(), saved.bounds.data(),
-                                  counts, keys, surfels, n});
+  for_each_in_whole_warps("raster: count tiles", n + 1,
+                          CountTiles{grid, order == SortOrder::centre, saved.splats.data(),
+                                     saved.bounds.data(), counts, keys, surfels, n});
   uint32_t* ordered = surfels;
   if (order == SortOrder::centre && n > 0) {
     ordered = resized(s.surfels_sorted, n);
@@ -169,9 +171,9 @@ void bin(SortOrder order, Saved& saved) {
   uint32_t* const places = resized(s.places, entries);
   uint32_t* const places_sorted = resized(s.places_sorted, entries);
   TileEntry* const unsorted = resized(s.unsorted, entries);
-  cuda::for_each_index("raster: write entries", n,
-                       WriteEntries{grid, saved.splats.data(), saved.bounds.data(), ordered, place, entry,
-                                    tiles, places, unsorted});
+  for_each_in_whole_warps("raster: write entries", n,
+                          WriteEntries{grid, saved.splats.data(), saved.bounds.data(), ordered, place, entry,
+                                       tiles, places, unsorted, n});
   TileEntry* const sorted = resized(saved.entries, entries);
   if (entries > 0) {
     const int bits = static_cast<int>(std::bit_width(static_cast<uint64_t>(saved.tiles())));

@@ -183,6 +183,12 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuInLongLists) {
   expect_same_gradients(scene_of(5, 20, 18, o), options(), 0x7f);
 }
 
+// Surfels of one tile and of all of them in the same warp, in more than one warp, of which the last is not
+// full.
+TEST_P(RasterOnDevice, AgreesWithTheCpuForSurfelsOfManySizes) {
+  expect_same_gradients(convert_scene<float>(scene_of_sizes(10, 45)), options(), 0x7f);
+}
+
 TEST_P(RasterOnDevice, HostileSurfelsAreNotDrawn) {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   constexpr float infinity = std::numeric_limits<float>::infinity();
