@@ -95,17 +95,23 @@ struct SortEntries {
   __device__ void operator()(int64_t k) const { sorted[k] = unsorted[places[k]]; }
 };
 
-// Where each tile's list begins: the first entry of a tile marks it and the empty ones before it.
+// Where each tile's list begins: at the first entry that is not of a tile before it.
 struct FindTiles {
   const uint32_t* tiles;  // sorted
-  int64_t entries;
-  int64_t tile_count;
+  uint32_t entries;
   uint32_t* begin;  // tiles + 1
 
-  __device__ void operator()(int64_t k) const {
-    const int64_t from = k == 0 ? 0 : int64_t{tiles[k - 1]} + 1;
-    const int64_t to = k == entries ? tile_count : int64_t{tiles[k]};
-    for (int64_t tile = from; tile <= to; ++tile) begin[tile] = static_cast<uint32_t>(k);
+  __device__ void operator()(int64_t tile) const {
+    uint32_t low = 0, high = entries;
+    while (low < high) {
+      const uint32_t middle = (low + high) / 2;
+      if (tiles[middle] < tile) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    begin[tile] = low;
   }
 };
 
@@ -181,8 +187,8 @@ void bin(SortOrder order, Saved& saved) {
     cuda::for_each_index("raster: sort entries", entries, SortEntries{places_sorted, unsorted, sorted});
   }
   uint32_t* const begin = resized(saved.tile_begin, saved.tiles() + 1);
-  cuda::for_each_index("raster: find tiles", entries + 1,
-                       FindTiles{tiles_sorted, entries, saved.tiles(), begin});
+  cuda::for_each_index("raster: find tiles", saved.tiles() + 1,
+                       FindTiles{tiles_sorted, static_cast<uint32_t>(entries), begin});
 }
 
 }  // namespace raster::cuda_stage
