@@ -67,10 +67,10 @@ __device__ int walk_together(const TileGrid& grid, const Splat* splats, const Su
   const int columns = shared.bounds.tile_x1 - shared.bounds.tile_x0;
   int found = 0;
   for (int first = 0; first < tiles; first += cuda::warp_lanes) {
-    const int mine = first + lane;
-    const int column = shared.bounds.tile_x0 + mine % columns;
-    const int row = shared.bounds.tile_y0 + mine / columns;
-    const bool is_reached = mine < tiles && grid.is_reached(splat, column, row);
+    const int i = first + lane;
+    const int column = shared.bounds.tile_x0 + i % columns;
+    const int row = shared.bounds.tile_y0 + i / columns;
+    const bool is_reached = i < tiles && grid.is_reached(splat, column, row);
     const unsigned lanes = __ballot_sync(cuda::full_warp, is_reached);
     if (is_reached) visit(shared, grid.tile(column, row), found + __popc(lanes & lanes_before));
     found += __popc(lanes);
