@@ -117,18 +117,6 @@ struct FindTiles {
 
 namespace {
 
-// f(i) for i < n and for those after it that fill the last block, so that no warp lacks a lane.
-template <class F>
-__global__ void whole_warps_kernel(F f) {
-  f(int64_t{blockIdx.x} * blockDim.x + threadIdx.x);
-}
-
-template <class F>
-void for_each_in_whole_warps(const char* description, int64_t n, const F& f) {
-  constexpr int threads = 8 * cuda::warp_lanes;
-  cuda::launch(description, {cuda::blocks_for(n, threads), threads}, whole_warps_kernel<F>, f);
-}
-
 template <class T>
 T* resized(Tensor<T>& tensor, int64_t size) {
   tensor.place(Device::cuda).resize({size});

@@ -7,6 +7,9 @@
 // splats that reach none of them.
 namespace traceflow::raster::cuda_stage {
 
+// Where a thread has a surfel, one in more tiles is shared among the lanes of the warp.
+inline constexpr uint32_t tiles_of_one_lane = 32;
+
 // Fills entry_begin, tile_begin and entries. The host waits once, for the number of entries.
 TRACEFLOW_WITH_CUDA void bin(SortOrder order, Saved& saved);
 TRACEFLOW_WITH_CUDA void blend(const Options& options, Output& output, Saved& saved);

@@ -1,18 +1,14 @@
 #pragma once
 
-#include <bit>
 #include <cstdint>
 
-#include "base/kernel.h"
+#include "ops/raster/raster_cuda.h"
 #include "ops/raster/raster_footprint.h"
+#include "ops/raster/raster_warp_cuda.h"
 
-// Which tiles surfels reach, found by the lanes of a warp, a surfel each. Most surfels reach a few tiles and
-// some reach most of the image, so that the large ones are shared among the lanes. The kernels that count
-// tiles and that list them walk by the same functions, and so find the same ones.
+// Which tiles surfels reach, found by the lanes of a warp, a surfel each, the large ones together. The
+// kernels that count tiles and that list them walk by the same functions, and so find the same ones.
 namespace traceflow::raster::cuda_stage {
-
-// A surfel of at most so many tiles in its bounds is left to its lane.
-inline constexpr int64_t tiles_of_one_lane = cuda::warp_lanes;
 
 // What a lane brings. May be extended by what visit() below wants to know.
 struct BoundedSurfel {
@@ -31,19 +27,6 @@ struct TileGrid {
   }
 };
 
-// What another lane brings.
-template <class T>
-__device__ T from_lane(int lane, const T& mine) {
-  struct Words {
-    unsigned word[sizeof(T) / sizeof(unsigned)];
-  };
-  static_assert(sizeof(T) == sizeof(Words));
-  auto words = std::bit_cast<Words>(mine);
-#pragma unroll
-  for (unsigned& word : words.word) word = __shfl_sync(cuda::full_warp, word, lane);
-  return std::bit_cast<T>(words);
-}
-
 // A lane alone.
 template <class Surfel, class Visit>
 __device__ int walk_alone(const TileGrid& grid, const Splat* splats, const Surfel& mine, const Visit& visit) {
@@ -61,7 +44,7 @@ template <class Surfel, class Visit>
 __device__ int walk_together(const TileGrid& grid, const Splat* splats, const Surfel& shared,
                              const Visit& visit) {
   const Splat& splat = splats[shared.surfel];
-  const int lane = static_cast<int>(threadIdx.x) % cuda::warp_lanes;
+  const int lane = lane_of_thread();
   const unsigned lanes_before = (1U << lane) - 1;
   const int tiles = static_cast<int>(shared.bounds.tiles());
   const int columns = shared.bounds.tile_x1 - shared.bounds.tile_x0;
@@ -78,20 +61,18 @@ __device__ int walk_together(const TileGrid& grid, const Splat* splats, const Su
   return found;
 }
 
-// How many tiles a lane's surfel reaches. visit(surfel, tile, k) is called for the k-th of them, row by row;
-// for a surfel that the warp shares by any of its lanes. All lanes of the warp take part, those without a
-// surfel too.
+// How many tiles a lane's surfel reaches; it is shared by the number of tiles in its bounds. visit(surfel,
+// tile, k) is called for the k-th of them, row by row; for a surfel that the warp shares by any of its lanes.
+// All lanes of the warp take part, those without a surfel too.
 template <class Surfel, class Visit>
 __device__ int for_each_reached(const TileGrid& grid, const Splat* splats, const Surfel& mine,
                                 const Visit& visit) {
   const bool is_shared = mine.bounds.tiles() > tiles_of_one_lane;
   int found = is_shared ? 0 : walk_alone(grid, splats, mine, visit);
-  const int lane = static_cast<int>(threadIdx.x) % cuda::warp_lanes;
-  for (unsigned left = __ballot_sync(cuda::full_warp, is_shared); left != 0; left &= left - 1) {
-    const int owner = __ffs(static_cast<int>(left)) - 1;
-    const int of_owner = walk_together(grid, splats, from_lane(owner, mine), visit);
-    if (lane == owner) found = of_owner;
-  }
+  for_each_shared(is_shared, mine, [&](int owner, const Surfel& shared) {
+    const int of_owner = walk_together(grid, splats, shared, visit);
+    if (lane_of_thread() == owner) found = of_owner;
+  });
   return found;
 }
 
