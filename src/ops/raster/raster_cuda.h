@@ -17,5 +17,8 @@ TRACEFLOW_WITH_CUDA void blend(const Options& options, Output& output, Saved& sa
 // slowly.
 TRACEFLOW_WITH_CUDA void blend_backward(const Options& options, const Saved& saved,
                                         const OutputGradient& grad_output);
+// Of surfels with more entries than tiles_of_one_lane: adds up the scratch.gradients of those that were
+// blended, in their order, into the first.
+TRACEFLOW_WITH_CUDA void add_tiles(const Saved& saved);
 
 }  // namespace traceflow::raster::cuda_stage

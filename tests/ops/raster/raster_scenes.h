@@ -73,23 +73,21 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
   return scene;
 }
 
-// Surfels of very different sizes, in turn: in 1, 10 and 33 of the 44 tiles of 16×16 pixels, along the
+// Surfels of very different sizes, in turn: in 1, 32, 33 and 104 of the 112 tiles of 16×16 pixels, along the
 // image's diagonal, and in all of them. The last is the farthest.
-inline constexpr std::array tiles_in_turn{1, 10, 33, 44, 44};
+inline constexpr std::array tiles_in_turn{1, 32, 33, 112, 104, 112};  // in their bounds
 inline TestScene<double> scene_of_sizes(uint64_t seed, int64_t count) {
   struct Size {
     double x, y, half_x, half_y, turn;  // pixels, radians
   };
-  constexpr std::array<Size, tiles_in_turn.size()> sizes{Size{40, 24, 4, 4, 0},
-                                                         {72, 32, 34, 11, 0},
-                                                         {88, 24, 300, 20, 0},
-                                                         {88, 32, 100, 6, 0.35},
-                                                         {88, 32, 600, 600, 0}};
+  constexpr std::array<Size, tiles_in_turn.size()> sizes{Size{40, 24, 4, 4, 0}, {112, 64, 28, 300, 0},
+                                                         {104, 40, 82, 20, 0},  {112, 64, 130, 6, 0.52},
+                                                         {120, 64, 98, 300, 0}, {112, 64, 600, 600, 0}};
   SceneOptions o;
   o.count = count;
   o.depth_max = 4;
   o.rotated_camera = false;
-  TestScene<double> scene = random_scene(seed, 11 * 16, 4 * 16, o);
+  TestScene<double> scene = random_scene(seed, 14 * 16, 8 * 16, o);
   Random random(seed + 1);
   auto& s = scene.surfels;
   for (int64_t i = 0; i < count; ++i) {

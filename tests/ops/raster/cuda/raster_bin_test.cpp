@@ -103,15 +103,16 @@ Lists expect_plain_lists(SortOrder order, const TestScene<double>& scene) {
 
 // More bounds than one warp has lanes for, of all sizes side by side, and the last warp is not full.
 TEST_P(TileListsOnDevice, HoldSurfelsOfManySizes) {
-  const Lists lists = expect_plain_lists(GetParam(), scene_of_sizes(1, 45));
+  const Lists lists = expect_plain_lists(GetParam(), scene_of_sizes(1, 48));
   std::vector<uint32_t> reached;
   for (size_t i = 0; i < lists.bounds.size(); ++i) {
     ASSERT_EQ(lists.bounds[i].tiles(), tiles_in_turn[i % tiles_in_turn.size()]) << i;
     reached.push_back(lists.entry_begin[i + 1] - lists.entry_begin[i]);
   }
+  EXPECT_EQ(reached[1], 32);
   EXPECT_EQ(reached[2], 33);
   EXPECT_LT(reached[3], 32);  // along the diagonal
-  EXPECT_EQ(reached[44], 44);
+  EXPECT_EQ(reached[47], 112);
 }
 
 TEST_P(TileListsOnDevice, HoldAnyNumberOfSurfels) {
