@@ -16,7 +16,6 @@ namespace traceflow {
 
 template void cuda::for_each_index(const char*, int64_t, const raster::Prepare&);
 template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep&);
-template void cuda::for_each_index(const char*, int64_t, const raster::IsVisible&);
 template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t, const raster::CameraShareOf&,
                                                            const raster::KeepCamera&);
 

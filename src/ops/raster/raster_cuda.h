@@ -20,5 +20,7 @@ TRACEFLOW_WITH_CUDA void blend_backward(const Options& options, const Saved& sav
 // Of surfels with more entries than tiles_of_one_lane: adds up the scratch.gradients of those that were
 // blended, in their order, into the first.
 TRACEFLOW_WITH_CUDA void add_tiles(const Saved& saved);
+// Sets the flag of every surfel, 1 where an entry was blended.
+TRACEFLOW_WITH_CUDA void visible(const Saved& saved, Tensor<uint8_t>& flags);
 
 }  // namespace traceflow::raster::cuda_stage

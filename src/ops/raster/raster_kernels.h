@@ -154,12 +154,13 @@ struct IsVisible {
   const uint16_t* touched;
   uint8_t* flags;
 
-  TRACEFLOW_HD void operator()(int64_t i) const {
+  TRACEFLOW_HD bool is_visible(int64_t i) const {
     uint16_t blocks = 0;
     for (uint32_t entry = entry_begin[i]; entry < entry_begin[i + 1]; ++entry)
       blocks = static_cast<uint16_t>(blocks | touched[entry]);
-    flags[i] = blocks != 0 ? 1 : 0;
+    return blocks != 0;
   }
+  TRACEFLOW_HD void operator()(int64_t i) const { flags[i] = is_visible(i) ? 1 : 0; }
 };
 
 // Fills splats and bounds.

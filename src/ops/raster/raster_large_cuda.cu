@@ -18,8 +18,8 @@ __device__ Entries entries_of(const uint32_t* entry_begin, int64_t i, int64_t co
   return i < count ? Entries{entry_begin[i], entry_begin[i + 1]} : Entries{};
 }
 
-// f(first, blended) for every 32 entries, a bit for each that was blended. The marks are read a round
-// ahead. All lanes of the warp take part.
+// f(first, blended) for every 32 entries, a bit for each that was blended, until it returns false. The marks
+// are read a round ahead. All lanes of the warp take part.
 template <class F>
 __device__ void for_each_blended(const uint16_t* touched, const Entries& of, const F& f) {
   const auto mark = [&](uint32_t first) {
@@ -30,7 +30,7 @@ __device__ void for_each_blended(const uint16_t* touched, const Entries& of, con
   for (uint32_t first = of.begin; first < of.end; first += cuda::warp_lanes) {
     const unsigned blended = __ballot_sync(cuda::full_warp, next);
     next = mark(first + cuda::warp_lanes);
-    f(first, blended);
+    if (!f(first, blended)) return;
   }
 }
 
@@ -63,8 +63,29 @@ struct AddTiles {
       }
 #pragma unroll
       for (const float value : row) sum += value;
+      return true;
     });
     if (lane < values) (&gradients[of.begin].u_x)[lane] = sum;
+  }
+};
+
+// IsVisible, with a warp for each surfel that is in many tiles.
+struct FindVisible {
+  IsVisible alone;
+  int64_t count;
+
+  __device__ void operator()(int64_t i) const {
+    const Entries mine = entries_of(alone.entry_begin, i, count);
+    bool visible = !mine.are_shared() && i < count && alone.is_visible(i);
+    for_each_shared(mine.are_shared(), mine, [&](int owner, const Entries& shared) {
+      bool any = false;
+      for_each_blended(alone.touched, shared, [&](uint32_t, unsigned blended) {
+        any = blended != 0;
+        return !any;
+      });
+      if (lane_of_thread() == owner) visible = any;
+    });
+    if (i < count) alone.flags[i] = visible ? 1 : 0;
   }
 };
 
@@ -74,6 +95,12 @@ void add_tiles(const Saved& saved) {
   for_each_in_whole_warps(
       "raster: add tiles", saved.count,
       AddTiles{saved.entry_begin.data(), saved.touched.data(), saved.scratch.gradients.data(), saved.count});
+}
+
+void visible(const Saved& saved, Tensor<uint8_t>& flags) {
+  for_each_in_whole_warps(
+      "raster: visible", saved.count,
+      FindVisible{{saved.entry_begin.data(), saved.touched.data(), flags.data()}, saved.count});
 }
 
 }  // namespace traceflow::raster::cuda_stage

@@ -106,5 +106,25 @@ TEST_F(SurfelSumsOnDevice, AreThoseOfTheTilesInTurn) {
   }
 }
 
+TEST_F(SurfelSumsOnDevice, SurfelsAreVisibleThatATileBlended) {
+  for (const int64_t count : {0, 1, 31, 32, 33, 45, 300}) {
+    SCOPED_TRACE(count);
+    const Entries entries = random_entries(count);
+    Saved saved;
+    place(entries, saved);
+    Tensor<uint8_t> flags;
+    visible(saved, flags);
+    ASSERT_EQ(flags.size(), count);
+    const Tensor<uint8_t> found = flags.on(Device::cpu);
+    for (int64_t i = 0; i < count; ++i) {
+      bool any = false;
+      for (uint32_t entry = entries.begin[i]; entry < entries.begin[i + 1]; ++entry) {
+        any = any || entries.touched[entry] != 0;
+      }
+      ASSERT_EQ(found[i], any ? 1 : 0) << "surfel " << i << " of " << entries.tiles(i) << " tiles";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace traceflow::raster
