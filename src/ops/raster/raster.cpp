@@ -89,8 +89,12 @@ void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Op
 void visible(const Saved& saved, Tensor<uint8_t>& flags) {
   const Device device = saved.splats.device();
   flags.place(device).resize({saved.count});
-  parallel_for(device, "raster: visible", saved.count,
-               IsVisible{saved.entry_begin.data(), saved.touched.data(), flags.data()});
+  if (device == Device::cuda) {
+    cuda_stage::visible(saved, flags);
+  } else {
+    parallel_for("raster: visible", saved.count,
+                 IsVisible{saved.entry_begin.data(), saved.touched.data(), flags.data()});
+  }
 }
 
 Work work(const Saved& saved) {

@@ -5,8 +5,8 @@
 #include "base/kernel.h"
 #include "ops/raster/raster_chain.h"
 #include "ops/raster/raster_cuda.h"
-#include "ops/raster/raster_footprint.h"
 #include "ops/raster/raster_prepare.h"
+#include "ops/raster/raster_reach_cuda.h"
 #include "primitives/sort.h"
 #include "primitives/sum_kernels.h"
 
@@ -16,28 +16,10 @@ namespace traceflow {
 
 template void cuda::for_each_index(const char*, int64_t, const raster::Prepare&);
 template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep&);
-template void cuda::for_each_index(const char*, int64_t, const raster::IsVisible&);
 template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t, const raster::CameraShareOf&,
                                                            const raster::KeepCamera&);
 
 namespace raster::cuda_stage {
-
-struct TileGrid {
-  int columns;
-  int width, height;
-
-  // f(tile) for every tile that the splat may reach.
-  template <class F>
-  __device__ void for_each_reached(const Splat& splat, const Bounds& bounds, F&& f) const {
-    for (int row = bounds.tile_y0; row < bounds.tile_y1; ++row) {
-      for (int column = bounds.tile_x0; column < bounds.tile_x1; ++column) {
-        const float x = static_cast<float>(column * tile_edge) + 0.5F;
-        const float y = static_cast<float>(row * tile_edge) + 0.5F;
-        if (reaches(splat, x, y, x + (tile_edge - 1), y + (tile_edge - 1))) f(row * columns + column);
-      }
-    }
-  }
-};
 
 // How many tiles each surfel reaches, and the key that it is sorted by.
 struct CountTiles {
@@ -50,15 +32,14 @@ struct CountTiles {
   int64_t count;
 
   __device__ void operator()(int64_t i) const {
-    int32_t tiles = 0;
-    if (i < count && bounds[i].tiles() > 0) {
-      grid.for_each_reached(splats[i], bounds[i], [&](int) { ++tiles; });
-    }
-    counts[i] = tiles;
-    if (i == count) return;
+    const auto surfel = static_cast<uint32_t>(i);
+    const BoundedSurfel mine{i < count ? bounds[i] : Bounds{}, surfel};
+    const int32_t tiles = for_each_reached(grid, splats, mine, [](const BoundedSurfel&, int, int) {});
+    if (i <= count) counts[i] = tiles;
+    if (i >= count) return;
     // Depths are positive, so that their bits sort as they do.
     keys[i] = tiles > 0 && by_depth ? std::bit_cast<uint32_t>(splats[i].z_centre) : 0;
-    surfels[i] = static_cast<uint32_t>(i);
+    surfels[i] = surfel;
   }
 };
 
@@ -82,17 +63,25 @@ struct WriteEntries {
   const int32_t* entry;  // by surfel
   uint32_t *tiles, *places;
   TileEntry* entries;
+  int64_t count;
+
+  struct PlacedSurfel : BoundedSurfel {
+    uint32_t first_entry = 0;
+    uint32_t first_place = 0;
+  };
+
+  __device__ PlacedSurfel nearest(int64_t k) const {
+    const uint32_t surfel = order[k];
+    return {{bounds[surfel], surfel}, static_cast<uint32_t>(entry[surfel]), static_cast<uint32_t>(place[k])};
+  }
 
   __device__ void operator()(int64_t k) const {
-    const uint32_t surfel = order[k];
-    if (bounds[surfel].tiles() == 0) return;
-    int64_t at = place[k];
-    auto own = static_cast<uint32_t>(entry[surfel]);
-    grid.for_each_reached(splats[surfel], bounds[surfel], [&](int tile) {
+    const PlacedSurfel mine = k < count ? nearest(k) : PlacedSurfel{};
+    for_each_reached(grid, splats, mine, [&](const PlacedSurfel& of, int tile, int nth) {
+      const uint32_t at = of.first_place + static_cast<uint32_t>(nth);
       tiles[at] = static_cast<uint32_t>(tile);
-      places[at] = static_cast<uint32_t>(at);
-      entries[at] = {surfel, own++};
-      ++at;
+      places[at] = at;
+      entries[at] = {of.surfel, of.first_entry + static_cast<uint32_t>(nth)};
     });
   }
 };
@@ -105,17 +94,23 @@ struct SortEntries {
   __device__ void operator()(int64_t k) const { sorted[k] = unsorted[places[k]]; }
 };
 
-// Where each tile's list begins: the first entry of a tile marks it and the empty ones before it.
+// Where each tile's list begins: at the first entry that is not of a tile before it.
 struct FindTiles {
   const uint32_t* tiles;  // sorted
-  int64_t entries;
-  int64_t tile_count;
+  uint32_t entries;
   uint32_t* begin;  // tiles + 1
 
-  __device__ void operator()(int64_t k) const {
-    const int64_t from = k == 0 ? 0 : int64_t{tiles[k - 1]} + 1;
-    const int64_t to = k == entries ? tile_count : int64_t{tiles[k]};
-    for (int64_t tile = from; tile <= to; ++tile) begin[tile] = static_cast<uint32_t>(k);
+  __device__ void operator()(int64_t tile) const {
+    uint32_t low = 0, high = entries;
+    while (low < high) {
+      const uint32_t middle = (low + high) / 2;
+      if (tiles[middle] < tile) {
+        low = middle + 1;
+      } else {
+        high = middle;
+      }
+    }
+    begin[tile] = low;
   }
 };
 
@@ -139,13 +134,13 @@ int64_t read_back(const Tensor<int64_t>& tensor) {
 void bin(SortOrder order, Saved& saved) {
   Saved::Scratch& s = saved.scratch;
   const int64_t n = saved.count;
-  const TileGrid grid{saved.tile_columns, saved.width, saved.height};
+  const TileGrid grid{saved.tile_columns};
   int32_t* const counts = resized(s.counts, n + 1);
   uint32_t* const keys = resized(s.depth_keys, n);
   uint32_t* const surfels = resized(s.surfels, n);
-  cuda::for_each_index("raster: count tiles", n + 1,
-                       CountTiles{grid, order == SortOrder::centre, saved.splats.data(), saved.bounds.data(),
-                                  counts, keys, surfels, n});
+  for_each_in_whole_warps("raster: count tiles", n + 1,
+                          CountTiles{grid, order == SortOrder::centre, saved.splats.data(),
+                                     saved.bounds.data(), counts, keys, surfels, n});
   uint32_t* ordered = surfels;
   if (order == SortOrder::centre && n > 0) {
     ordered = resized(s.surfels_sorted, n);
@@ -169,9 +164,9 @@ void bin(SortOrder order, Saved& saved) {
   uint32_t* const places = resized(s.places, entries);
   uint32_t* const places_sorted = resized(s.places_sorted, entries);
   TileEntry* const unsorted = resized(s.unsorted, entries);
-  cuda::for_each_index("raster: write entries", n,
-                       WriteEntries{grid, saved.splats.data(), saved.bounds.data(), ordered, place, entry,
-                                    tiles, places, unsorted});
+  for_each_in_whole_warps("raster: write entries", n,
+                          WriteEntries{grid, saved.splats.data(), saved.bounds.data(), ordered, place, entry,
+                                       tiles, places, unsorted, n});
   TileEntry* const sorted = resized(saved.entries, entries);
   if (entries > 0) {
     const int bits = static_cast<int>(std::bit_width(static_cast<uint64_t>(saved.tiles())));
@@ -179,8 +174,8 @@ void bin(SortOrder order, Saved& saved) {
     cuda::for_each_index("raster: sort entries", entries, SortEntries{places_sorted, unsorted, sorted});
   }
   uint32_t* const begin = resized(saved.tile_begin, saved.tiles() + 1);
-  cuda::for_each_index("raster: find tiles", entries + 1,
-                       FindTiles{tiles_sorted, entries, saved.tiles(), begin});
+  cuda::for_each_index("raster: find tiles", saved.tiles() + 1,
+                       FindTiles{tiles_sorted, static_cast<uint32_t>(entries), begin});
 }
 
 }  // namespace raster::cuda_stage

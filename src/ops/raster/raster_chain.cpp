@@ -1,8 +1,10 @@
 #include "ops/raster/raster_chain.h"
 
+#include <limits>
 #include <vector>
 
 #include "base/parallel.h"
+#include "ops/raster/raster_cuda.h"
 #include "primitives/sums.h"
 
 namespace traceflow::raster {
@@ -27,6 +29,7 @@ CameraShare run_on_cpu(const Chain& chain, int64_t n) {
 CameraShare run_on_device(const Chain& chain, int64_t n, bool wants_camera, const Saved& saved) {
   Tensor<CameraShare>& shares = saved.scratch.camera;
   shares.place(Device::cuda).resize({wants_camera ? n + 1 : 0});  // the last is their sum
+  cuda_stage::add_tiles(saved);
   parallel_for(Device::cuda, "raster: chain", n, ChainStep{chain, wants_camera ? shares.data() : nullptr});
   CameraShare total;
   if (wants_camera) {
@@ -53,10 +56,17 @@ void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved
   g.tint.place(device).resize(surfels.tint.shape());
   gradient.screen_gradient.place(device).resize({n});
 
-  const Chain chain{view_of(surfels),     convert<double>(camera),
-                    saved.splats.data(),  saved.entry_begin.data(),
-                    saved.touched.data(), saved.scratch.gradients.data(),
-                    view_of(g),           gradient.screen_gradient.data()};
+  const uint32_t tiles_walked =
+      device == Device::cpu ? std::numeric_limits<uint32_t>::max() : cuda_stage::tiles_of_one_lane;
+  const Chain chain{view_of(surfels),
+                    convert<double>(camera),
+                    saved.splats.data(),
+                    saved.entry_begin.data(),
+                    saved.touched.data(),
+                    saved.scratch.gradients.data(),
+                    tiles_walked,
+                    view_of(g),
+                    gradient.screen_gradient.data()};
   const CameraShare total =
       device == Device::cpu ? run_on_cpu(chain, n) : run_on_device(chain, n, gradient.wants_camera, saved);
   gradient.camera = {};

@@ -19,6 +19,7 @@ struct Chain {
   const uint32_t* entry_begin;
   const uint16_t* touched;
   const SplatGradient* gradients;  // by entry
+  uint32_t tiles_walked;           // a surfel of more entries has the sum of all in its first
   MutablePosedSurfelsView to;
   float* screen_gradient;
 
@@ -54,10 +55,16 @@ struct Chain {
     screen_gradient[i] = 0;
   }
 
-  // Adds the tiles that blended the surfel, in their order; false if there are none.
+  // Adds the tiles that blended the surfel, in their order; false if there is nothing to chain.
   TRACEFLOW_HD bool add_tiles(int64_t i, SplatGradient& sums) const {
+    const uint32_t begin = entry_begin[i];
+    const uint32_t end = entry_begin[i + 1];
+    if (end - begin > tiles_walked) {
+      sums = gradients[begin];
+      return !is_zero(sums);
+    }
     bool any = false;
-    for (uint32_t entry = entry_begin[i]; entry < entry_begin[i + 1]; ++entry) {
+    for (uint32_t entry = begin; entry < end; ++entry) {
       if (touched[entry] == 0) continue;
       any = true;
       const float* const from = &gradients[entry].u_x;
@@ -65,6 +72,14 @@ struct Chain {
       for (size_t k = 0; k < sizeof(SplatGradient) / sizeof(float); ++k) sum[k] += from[k];
     }
     return any;
+  }
+
+  static TRACEFLOW_HD bool is_zero(const SplatGradient& sums) {
+    const float* const sum = &sums.u_x;
+    for (size_t k = 0; k < sizeof(SplatGradient) / sizeof(float); ++k) {
+      if (sum[k] != 0) return false;
+    }
+    return true;
   }
 
   TRACEFLOW_HD void chain(int64_t i, const SplatGradient& sums,

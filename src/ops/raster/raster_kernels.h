@@ -53,8 +53,9 @@ struct Bounds {
 // A surfel in a tile's list.
 struct TileEntry {
   uint32_t surfel;
-  uint32_t
-      entry;  // its place when entries are counted surfel by surfel: entry_begin[surfel] + tile within bounds
+  // Its place when entries are counted surfel by surfel: entry_begin[surfel] + which of the surfel's tiles,
+  // row by row.
+  uint32_t entry;
 };
 
 // dL/d what the tiles of one surfel add up to. The order in which backward's kernel reduces its sums.
@@ -77,13 +78,14 @@ struct SavedBlock {
   alignas(64) float transmittance[pixels_per_block];
   alignas(64) float alpha[pixels_per_block];
   alignas(64) float depth[pixels_per_block];
-  alignas(64) float m[pixels_per_block];          // Σ w m', m' = far·near/(far-near) · (1/z_first - 1/z)
-  alignas(64) float m2[pixels_per_block];         // Σ w m'²
-  alignas(64) float inverse_z[pixels_per_block];  // 1/z_first: m is measured from the first hit, else squares
-                                                  // cancel
-  alignas(
-      64) int32_t last[pixels_per_block];  // place in the tile's list of the last blended hit, -1 for none
-  alignas(64) int32_t median[pixels_per_block];  // place of the median hit, -1 for none
+  // Σ w m' and Σ w m'², m' = far·near/(far-near) · (1/z_first - 1/z): measured from the first hit, else
+  // squares cancel.
+  alignas(64) float m[pixels_per_block];
+  alignas(64) float m2[pixels_per_block];
+  alignas(64) float inverse_z[pixels_per_block];  // 1/z_first
+  // Places in the tile's list of the last blended hit and of the median hit, -1 for none.
+  alignas(64) int32_t last[pixels_per_block];
+  alignas(64) int32_t median[pixels_per_block];
 };
 
 struct Saved {
@@ -152,12 +154,13 @@ struct IsVisible {
   const uint16_t* touched;
   uint8_t* flags;
 
-  TRACEFLOW_HD void operator()(int64_t i) const {
+  TRACEFLOW_HD bool is_visible(int64_t i) const {
     uint16_t blocks = 0;
     for (uint32_t entry = entry_begin[i]; entry < entry_begin[i + 1]; ++entry)
       blocks = static_cast<uint16_t>(blocks | touched[entry]);
-    flags[i] = blocks != 0 ? 1 : 0;
+    return blocks != 0;
   }
+  TRACEFLOW_HD void operator()(int64_t i) const { flags[i] = is_visible(i) ? 1 : 0; }
 };
 
 // Fills splats and bounds.

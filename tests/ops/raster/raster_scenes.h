@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -68,6 +69,43 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
     s.opacity[i] = random.uniform(o.opacity_min, o.opacity_max);
     for (int64_t c = 0; c < 3 * k; ++c) s.sh.row(i)[c] = (c < 3 ? 0.8 : 0.2) * random.normal();
     if (o.has_tint) s.tint[i] = random.uniform();
+  }
+  return scene;
+}
+
+// Surfels of very different sizes, in turn: in 1, 32, 33 and 104 of the 112 tiles of 16×16 pixels, along the
+// image's diagonal, and in all of them. The last is the farthest.
+inline constexpr std::array tiles_in_turn{1, 32, 33, 112, 104, 112};  // in their bounds
+inline TestScene<double> scene_of_sizes(uint64_t seed, int64_t count) {
+  struct Size {
+    double x, y, half_x, half_y, turn;  // pixels, radians
+  };
+  constexpr std::array<Size, tiles_in_turn.size()> sizes{Size{40, 24, 4, 4, 0}, {112, 64, 28, 300, 0},
+                                                         {104, 40, 82, 20, 0},  {112, 64, 130, 6, 0.52},
+                                                         {120, 64, 98, 300, 0}, {112, 64, 600, 600, 0}};
+  SceneOptions o;
+  o.count = count;
+  o.depth_max = 4;
+  o.rotated_camera = false;
+  TestScene<double> scene = random_scene(seed, 14 * 16, 8 * 16, o);
+  Random random(seed + 1);
+  auto& s = scene.surfels;
+  for (int64_t i = 0; i < count; ++i) {
+    const Size& size = sizes[static_cast<size_t>(i) % sizes.size()];
+    const double z = i + 1 < count ? s.position(i, 2) : o.depth_max + 1;
+    const Vec2<double> pixel(z / scene.camera.focal_x, z / scene.camera.focal_y);
+    s.position(i, 0) = (size.x - scene.camera.centre_x) * pixel.x;
+    s.position(i, 1) = (size.y - scene.camera.centre_y) * pixel.y;
+    s.position(i, 2) = z;
+    s.opacity[i] = random.uniform(0.1, 0.3);
+    const double radius = std::sqrt(2 * std::log(255 * s.opacity[i]));
+    s.scale(i, 0) = size.half_x * pixel.x / radius;
+    s.scale(i, 1) = size.half_y * pixel.y / radius;
+    const double tilt = 0.005;
+    s.rotation(i, 0) = std::cos(size.turn / 2);
+    s.rotation(i, 1) = tilt * random.normal();
+    s.rotation(i, 2) = tilt * random.normal();
+    s.rotation(i, 3) = std::sin(size.turn / 2);
   }
   return scene;
 }

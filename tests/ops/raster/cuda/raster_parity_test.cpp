@@ -183,6 +183,12 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuInLongLists) {
   expect_same_gradients(scene_of(5, 20, 18, o), options(), 0x7f);
 }
 
+// Surfels of one tile and of all of them in the same warp, in more than one warp, of which the last is not
+// full.
+TEST_P(RasterOnDevice, AgreesWithTheCpuForSurfelsOfManySizes) {
+  expect_same_gradients(convert_scene<float>(scene_of_sizes(10, 48)), options(), 0x7f);
+}
+
 TEST_P(RasterOnDevice, HostileSurfelsAreNotDrawn) {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -212,26 +218,49 @@ TEST_P(RasterOnDevice, NothingIsTheBackground) {
     ASSERT_EQ(colour[i], options().background[static_cast<int>(i % 3)]);
 }
 
+std::vector<Tensor<float>> gradients_on_host(const InputGradient& gradient) {
+  std::vector<Tensor<float>> all{gradient.screen_gradient.on(Device::cpu)};
+  for_each_group(gradient.surfels,
+                 [&](const char*, const Tensor<float>& t) { all.push_back(t.on(Device::cpu)); });
+  return all;
+}
+
+void expect_same_bytes(const std::vector<Tensor<float>>& a, const std::vector<Tensor<float>>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    ASSERT_EQ(a[i].shape(), b[i].shape()) << i;
+    EXPECT_EQ(std::memcmp(a[i].data(), b[i].data(), a[i].values().size_bytes()), 0) << i;
+  }
+}
+
+// Drawn twice, and from one picture two gradients with another between them.
+void expect_same_bytes_every_time(const TestScene<float>& scene, const Options& options) {
+  const OutputGradient grad_output =
+      random_output_gradient<float>(9, scene.camera.width, scene.camera.height);
+  const OutputGradient of_colour =
+      random_output_gradient<float>(10, scene.camera.width, scene.camera.height, 0x01);
+  std::array<Drawn, 2> drawn;
+  std::array<std::vector<Tensor<float>>, 2> outputs, gradients;
+  for (size_t run = 0; run < 2; ++run) {
+    draw(scene, options, Device::cuda, drawn[run]);
+    for (const Tensor<float>* layer : outputs_of(drawn[run].output)) {
+      outputs[run].push_back(layer->on(Device::cpu));
+    }
+    gradients[run] = gradients_on_host(gradient_of(scene, options, Device::cuda, drawn[run], grad_output));
+  }
+  expect_same_bytes(outputs[0], outputs[1]);
+  expect_same_bytes(gradients[0], gradients[1]);
+  gradient_of(scene, options, Device::cuda, drawn[0], of_colour);
+  expect_same_bytes(gradients_on_host(gradient_of(scene, options, Device::cuda, drawn[0], grad_output)),
+                    gradients[0]);
+}
+
 TEST_P(RasterOnDevice, TheSameBytesEveryTime) {
   cuda::set_deterministic(true);
   SceneOptions o;
   o.count = 100;
-  const TestScene<float> scene = scene_of(8, 40, 24, o);
-  const OutputGradient grad_output = random_output_gradient<float>(9, 40, 24);
-  const auto run = [&] {
-    Drawn drawn;
-    draw(scene, options(), Device::cuda, drawn);
-    const InputGradient gradient = gradient_of(scene, options(), Device::cuda, drawn, grad_output);
-    std::vector<Tensor<float>> all;
-    for (const Tensor<float>* layer : outputs_of(drawn.output)) all.push_back(layer->on(Device::cpu));
-    for_each_group(gradient.surfels,
-                   [&](const char*, const Tensor<float>& t) { all.push_back(t.on(Device::cpu)); });
-    return all;
-  };
-  const auto first = run(), second = run();
-  for (size_t i = 0; i < first.size(); ++i) {
-    EXPECT_EQ(std::memcmp(first[i].data(), second[i].data(), first[i].values().size_bytes()), 0) << i;
-  }
+  expect_same_bytes_every_time(scene_of(8, 40, 24, o), options());
+  expect_same_bytes_every_time(convert_scene<float>(scene_of_sizes(11, 6)), options());
   cuda::set_deterministic(false);
 }
 
