@@ -42,14 +42,14 @@ if(TRACEFLOW_SANITIZE)
 endif()
 
 # traceflow_library(ops_raster LINKS base math scene [SYSTEM packages...])
-# One library per folder: all .cpp files beside the CMakeLists.txt. LINKS are the rooms below that it may include; SYSTEM
+# One library per folder: all .cpp files beside the CMakeLists.txt and in its cpu/ and cuda/. LINKS are the rooms below that it may include; SYSTEM
 # are outside packages. A header of a room that is not linked is still found by the compiler, but its code will not link.
 # Its .cu files are noted for the CUDA code, which is one library for all rooms (traceflow_cuda, below): a room's
 # own library calls it by weak names, which stay null in programs that are not linked with it.
 function(traceflow_library name)
   cmake_parse_arguments(ARG "" "" "LINKS;SYSTEM" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
-  file(GLOB device_sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cu)
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp cpu/*.cpp cuda/*.cpp)
+  file(GLOB device_sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*.cu ${CMAKE_CURRENT_SOURCE_DIR}/cuda/*.cu)
   set_property(GLOBAL APPEND PROPERTY TRACEFLOW_DEVICE_SOURCES ${device_sources})
   list(TRANSFORM ARG_LINKS PREPEND traceflow_)
   if(sources)

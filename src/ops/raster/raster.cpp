@@ -6,7 +6,7 @@
 #include <string>
 
 #include "base/parallel.h"
-#include "ops/raster/raster_cuda.h"
+#include "ops/raster/cuda/stages.h"
 #include "ops/raster/raster_kernels.h"
 
 namespace traceflow::raster {

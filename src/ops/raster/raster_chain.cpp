@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "ops/raster/raster_cuda.h"
+#include "ops/raster/cuda/stages.h"
 #include "primitives/sums.h"
 
 namespace traceflow::raster {

@@ -4,7 +4,7 @@
 
 #include "ops/raster/raster_kernels.h"
 
-// A splat at one pixel: what the vector kernels of the CPU do for many (raster_simd-inl.h), for devices with
+// A splat at one pixel: what the vector kernels of the CPU do for many (cpu/simd-inl.h), for devices with
 // a thread a pixel. Several kernels must come to the same decisions here: which tiles a splat is listed in,
 // which hits a pixel has. So every fused operation is written out; a compiler could else fuse differently
 // where it inlines.

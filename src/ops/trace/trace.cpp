@@ -1,8 +1,8 @@
 #include "ops/trace/trace.h"
 
+#include "ops/trace/cpu/trace.h"
+#include "ops/trace/cuda/trace.h"
 #include "ops/trace/trace_bvh.h"
-#include "ops/trace/trace_cpu.h"
-#include "ops/trace/trace_cuda.h"
 #include "ops/trace/trace_kernels.h"
 
 namespace traceflow::trace {

@@ -18,7 +18,7 @@ struct Options {
   float alpha_max = 0.99F;
   float transmittance_min = 1e-4F;
   // k: hits gathered between two looks at whether the ray has ended. Changes speed, never the image. On the
-  // CUDA device k is fixed (trace_walk_cuda.h).
+  // CUDA device k is fixed (cuda/walk.h).
   int hits_per_pass = 64;
   Vec3<float> background{0};
 

@@ -12,7 +12,7 @@ struct HitGradient {
 };
 
 // Sets the parts of one hit, and adds what its place does to the ray: dL/d of the origin, and of the
-// direction as a change of a unit vector. The CPU does 16 hits at once (trace_geometry-inl.h).
+// direction as a change of a unit vector. The CPU does 16 hits at once (cpu/geometry-inl.h).
 TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& ray, const HitGradient& hit,
                                         float* parts, Vec3<float>& grad_origin, Vec3<float>& grad_direction) {
   const Vec3<float> x = ray.origin - f.position + hit.distance * ray.direction;

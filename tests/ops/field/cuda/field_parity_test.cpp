@@ -1,6 +1,6 @@
 #include "../field_run.h"
-#include "ops/field/field_cuda.h"
-#include "ops/field/network_device.h"
+#include "ops/field/cuda/column_sums.h"
+#include "ops/field/cuda/network.h"
 #include "support/device.h"
 
 namespace traceflow {

@@ -2,7 +2,7 @@
 #include <cstring>
 #include <limits>
 
-#include "ops/lpips/lpips_device.h"
+#include "ops/lpips/cuda/distance.h"
 #include "primitives/products.h"
 #include "support/device.h"
 #include "support/narrow_lpips.h"

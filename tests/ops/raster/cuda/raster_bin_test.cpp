@@ -2,7 +2,7 @@
 #include <numeric>
 
 #include "../raster_scenes.h"
-#include "ops/raster/raster_cuda.h"
+#include "ops/raster/cuda/stages.h"
 #include "ops/raster/raster_footprint.h"
 #include "support/device.h"
 

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "base/random.h"
-#include "ops/raster/raster_cuda.h"
+#include "ops/raster/cuda/stages.h"
 #include "support/device.h"
 
 // What a surfel's tiles add up to, against a loop over its entries on the host.

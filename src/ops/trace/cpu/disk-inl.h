@@ -1,0 +1,77 @@
+// Rays and disks, a vector of either against one of the other. Compiled once per target.
+#if defined(TRACEFLOW_TRACE_DISK_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef TRACEFLOW_TRACE_DISK_INL_H
+#undef TRACEFLOW_TRACE_DISK_INL_H
+#else
+#define TRACEFLOW_TRACE_DISK_INL_H
+#endif
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include <cmath>
+
+#include "math/blend.h"
+#include "ops/trace/cpu/tree-inl.h"
+#include "ops/trace/trace_bvh.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace traceflow::trace::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// What decides whether a hit counts.
+struct DiskRules {
+  BlendRules<float> blend;
+  float log_alpha_min;
+  float near;
+  size_t hits_per_look;  // hits gathered before it is asked whether a ray has ended
+
+  explicit DiskRules(const Options& o)
+      : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
+        log_alpha_min(std::log(o.alpha_min)),
+        near(o.t_min),
+        hits_per_look(static_cast<size_t>(o.hits_per_pass)) {}
+};
+
+struct RayVec {
+  Vec ox, oy, oz, dx, dy, dz;
+};
+
+struct DiskHit {
+  Vec distance, exponent;  // of the opacity at the hit
+  hn::Mask<Tag> mask;
+};
+
+HWY_INLINE Vec dot(Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
+  return hn::MulAdd(az, bz, hn::MulAdd(ay, by, hn::Mul(ax, bx)));
+}
+
+// load(row) gives a vector of one of the leaf's rows: 16 disks, or one disk in all lanes. A lane's result is
+// the same to the bit whichever it is.
+template <class LoadRow>
+HWY_INLINE DiskHit meet_disk(const RayVec& ray, const DiskRules& rules, Vec far, LoadRow&& load,
+                             const BvhLeaf& leaf) {
+  const Tag d;
+  const Vec qx = hn::Sub(ray.ox, load(leaf.position[0]));
+  const Vec qy = hn::Sub(ray.oy, load(leaf.position[1]));
+  const Vec qz = hn::Sub(ray.oz, load(leaf.position[2]));
+  const Vec nx = load(leaf.normal[0]), ny = load(leaf.normal[1]), nz = load(leaf.normal[2]);
+  const Vec t = hn::Neg(hn::Div(dot(nx, ny, nz, qx, qy, qz), dot(nx, ny, nz, ray.dx, ray.dy, ray.dz)));
+  const Vec x = hn::MulAdd(t, ray.dx, qx), y = hn::MulAdd(t, ray.dy, qy), z = hn::MulAdd(t, ray.dz, qz);
+  const Vec u = dot(load(leaf.u[0]), load(leaf.u[1]), load(leaf.u[2]), x, y, z);
+  const Vec v = dot(load(leaf.v[0]), load(leaf.v[1]), load(leaf.v[2]), x, y, z);
+  const Vec radius2 = hn::MulAdd(u, u, hn::Mul(v, v));
+  const Vec exponent = hn::NegMulAdd(radius2, hn::Set(d, 0.5F), load(leaf.log_opacity));
+  const auto mask = hn::And(hn::Ge(exponent, hn::Set(d, rules.log_alpha_min)),
+                            hn::And(hn::Ge(t, hn::Set(d, rules.near)), hn::Le(t, far)));
+  return {t, exponent, mask};
+}
+
+HWY_INLINE Vec disk_alpha(const DiskHit& hit, const DiskRules& rules) {
+  const Tag d;
+  return hn::Min(hn::Exp(d, hit.exponent), hn::Set(d, rules.blend.alpha_max));
+}
+
+}  // namespace traceflow::trace::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <cstring>
+
+#include "base/kernel.h"
+#include "math/blend.h"
+#include "ops/trace/cuda/trace.h"
+
+// Steps of the tracer on the device that its .cu files share.
+namespace traceflow::trace::cuda {
+
+// What lies at an address that no one writes to meanwhile, 16 bytes at a time.
+template <class T>
+__device__ T load_quads(const T& at) {
+  constexpr size_t count = sizeof(T) / sizeof(float4);
+  static_assert(count * sizeof(float4) == sizeof(T));
+  float4 quads[count];
+  for (size_t i = 0; i < count; ++i) quads[i] = __ldg(reinterpret_cast<const float4*>(&at) + i);
+  T value;
+  std::memcpy(&value, quads, sizeof(T));
+  return value;
+}
+template <class T>
+__device__ void store_quads(const T& value, T& at) {
+  constexpr size_t count = sizeof(T) / sizeof(float4);
+  static_assert(count * sizeof(float4) == sizeof(T));
+  float4 quads[count];
+  std::memcpy(quads, &value, sizeof(T));
+  for (size_t i = 0; i < count; ++i) reinterpret_cast<float4*>(&at)[i] = quads[i];
+}
+
+struct WalkRules {
+  BlendRules<float> blend;
+  float log_alpha_min;
+  float t_min;
+
+  WalkRules() = default;
+  explicit WalkRules(const Options& o)
+      : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
+        log_alpha_min(std::log(o.alpha_min)),
+        t_min(o.t_min) {}
+};
+
+// Rays [first, last) in the tracer's order, and what is traced. `nodes` is null where there is nothing.
+struct RayInput {
+  const Node* nodes;
+  const Disk* disks;
+  const float* sh;
+  const float *origins, *directions;
+  const uint32_t* order;  // the caller's index of each ray; null where that is the tracer's
+  int64_t first, last;
+  WalkRules rules;
+  Vec3<float> background;
+
+  // The ray of this thread.
+  __device__ int64_t own() const { return first + int64_t{blockIdx.x} * blockDim.x + threadIdx.x; }
+  __device__ int64_t callers(int64_t i) const { return order ? int64_t{order[i]} : i; }
+};
+
+// Where rays go that are traced; null where they are traced for their hits only.
+struct RayOutput {
+  float *colour, *alpha, *distance;
+};
+
+// Where hits are kept. Those that find no room are left out, but counted in `used`.
+struct RecordStore {
+  bool keep;  // else nothing here is touched
+  Record* records;
+  uint64_t capacity;
+  unsigned long long* used;
+  uint32_t* last_head;
+  // Null where rays are traced again.
+  uint32_t* hits;
+  RaySums* sums;
+};
+
+// The order of all rays, of which there is one and a surfel. Equal ones stay in the caller's order.
+const uint32_t* sort_rays(const RayInput& input, int64_t surfels, SortedRays& rays);
+
+void trace_rays(int degree, const RayInput& rays, const RayOutput& output, const RecordStore& store);
+
+// What backward has beside the rays. Hits are those in `records`.
+struct BackwardTask {
+  RayInput rays;
+  const Record* records;
+  const uint32_t* last_head;
+  const RaySums* sums;
+  const BackwardFrame* frames;
+  const float *grad_colour, *grad_alpha, *grad_distance;  // null means zero
+  float *grad_origins, *grad_directions;
+  // Sums of all hits, added to as they come ...
+  SurfelSums* surfel_sums;
+  float* grad_sh;
+  // ... or, where they are to be added in a fixed order, what each hit brings: by the place of its record.
+  // The key sorts hits by surfel and ray.
+  HitParts* parts;
+  uint64_t* keys;
+  uint32_t* places;
+  float* basis;
+  int ray_bits;
+  uint64_t head_key;
+};
+
+void trace_backward(int degree, const BackwardTask& task);
+
+// Adds the hits in the first `records` places of `hits` to the sums of their surfels, in the order of the
+// rays. `surfels`: how many there are.
+void sum_in_order(int degree, int64_t records, uint32_t surfels, int ray_bits, SavedHits& hits,
+                  SurfelSums* sums, float* grad_sh);
+
+}  // namespace traceflow::trace::cuda

@@ -1,0 +1,197 @@
+#pragma once
+
+#include "math/blend.h"
+#include "ops/trace/cuda/forward.h"
+#include "ops/trace/trace_bvh.h"
+
+// How one thread finds the next hits of one ray. Included by .cu files only.
+namespace traceflow::trace::cuda {
+
+inline constexpr int walk_threads = 128;
+// k: hits that are held at a time. Where more exist the ray walks again, from the last one on.
+inline constexpr int held_hits = 16;
+// A tree is no deeper than its keys have bits: 64, and 30 of the index where keys are equal. Each of its
+// nodes leaves one child waiting.
+inline constexpr int walk_stack = 96;
+
+// A place in a ray's order of hits.
+struct HitPlace {
+  float distance;
+  uint32_t surfel;
+  __device__ bool before(float d, uint32_t s) const { return distance < d || (distance == d && surfel < s); }
+};
+
+// A block's hits, one column a thread.
+struct HitColumns {
+  float distance[held_hits][walk_threads];
+  uint32_t surfel[held_hits][walk_threads];
+  float alpha[held_hits][walk_threads];
+};
+
+// The nearest hits of this thread's ray behind `after`, in order: at most held_hits, and fewer where the ray
+// ends among them.
+class HeldHits {
+ public:
+  __device__ HeldHits(HitColumns& columns, const BlendRules<float>& rules, float transmittance,
+                      HitPlace after)
+      : columns_(columns),
+        rules_(rules),
+        transmittance_(transmittance),
+        remaining_(transmittance),
+        after_(after) {}
+
+  __device__ int count() const { return count_; }
+  __device__ float& distance(int i) { return columns_.distance[i][threadIdx.x]; }
+  __device__ uint32_t& surfel(int i) { return columns_.surfel[i][threadIdx.x]; }
+  __device__ float& alpha(int i) { return columns_.alpha[i][threadIdx.x]; }
+  // No hit from here on can matter.
+  __device__ float far() const { return far_; }
+
+  __device__ bool takes(float d, uint32_t s) {
+    if (!after_.before(d, s) || !(d <= far_)) return false;
+    return !closed_ || d < far_ || s < surfel(count_ - 1);
+  }
+  __device__ void insert(float d, uint32_t s, float a) {
+    if (count_ == held_hits) {
+      remaining_ /= 1 - alpha(count_ - 1);
+    } else {
+      ++count_;
+    }
+    int place = count_ - 1;
+    for (; place > 0 && !HitPlace{distance(place - 1), surfel(place - 1)}.before(d, s); --place) {
+      distance(place) = distance(place - 1);
+      surfel(place) = surfel(place - 1);
+      alpha(place) = alpha(place - 1);
+    }
+    distance(place) = d;
+    surfel(place) = s;
+    alpha(place) = a;
+    remaining_ *= 1 - a;
+    if (remaining_ < rules_.transmittance_min) cut();
+    closed_ = closed_ || count_ == held_hits;
+    if (closed_) far_ = distance(count_ - 1);
+  }
+
+ private:
+  // Drops what lies behind the hit at which the ray ends. That hit stays: more hits in front can only end the
+  // ray sooner.
+  __device__ void cut() {
+    remaining_ = transmittance_;
+    for (int i = 0; i < count_; ++i) {
+      const bool ends = blend_ends(rules_, remaining_, alpha(i));
+      remaining_ *= 1 - alpha(i);
+      if (!ends) continue;
+      count_ = i + 1;
+      closed_ = true;
+      return;
+    }
+  }
+
+  HitColumns& columns_;
+  const BlendRules<float>& rules_;
+  float transmittance_, remaining_;  // in front of the first, and about what all of them leave
+  HitPlace after_;
+  int count_ = 0;
+  float far_ = farthest_distance;
+  bool closed_ = false;  // nothing behind the last one matters
+};
+
+// A ray prepared for boxes, which are taken to be wider by what rounding may move a hit of a far origin. It
+// passes a plane at t = plane · reciprocal - offset.
+struct BoxRay {
+  float reciprocal[3], near_offset[3], far_offset[3];
+
+  __device__ explicit BoxRay(const UnitRay& ray) {
+    const Vec3<float> o = glm::abs(ray.origin);
+    const float radius = 2e-6F * std::fmax(o.x, std::fmax(o.y, o.z));
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) {
+      const float d = ray.direction[axis];
+      const float sign = std::copysign(1.0F, d);
+      reciprocal[axis] = sign / std::fmax(std::abs(d), 1e-10F);
+      near_offset[axis] = (ray.origin[axis] + sign * radius) * reciprocal[axis];
+      far_offset[axis] = (ray.origin[axis] - sign * radius) * reciprocal[axis];
+    }
+  }
+  // Where the ray enters the box of a node's child, at or after `near`; infinite where it leaves it before
+  // that, or enters it behind `far`.
+  template <int side>
+  __device__ float enter(const Node& node, float near, float far) const {
+    float leave = far;
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) {
+      const float lower = node.box[axis][2 * side], upper = node.box[axis][2 * side + 1];
+      const bool forwards = reciprocal[axis] > 0;
+      near = std::fmax(near, std::fma(forwards ? lower : upper, reciprocal[axis], -near_offset[axis]));
+      leave = std::fmin(leave, std::fma(forwards ? upper : lower, reciprocal[axis], -far_offset[axis]));
+    }
+    return near <= leave * 1.000001F ? near : INFINITY;
+  }
+};
+
+// Sums in the order in which the CPU's vectors have them, so that hits at equal distances are the same.
+__device__ inline float dot_fused(const Vec3<float>& a, const Vec3<float>& b) {
+  return std::fma(a.z, b.z, std::fma(a.y, b.y, a.x * b.x));
+}
+
+__device__ inline void meet_disk(const Disk& disk, const UnitRay& ray, const WalkRules& rules,
+                                 HeldHits& hits) {
+  const DiskPlane plane = load_quads(disk.plane);
+  const Vec3<float> q = ray.origin - plane.position;
+  // The sum turns -0 into 0, which is a distance.
+  const float t = -(dot_fused(plane.normal, q) / dot_fused(plane.normal, ray.direction)) + 0.0F;
+  if (!(t >= rules.t_min) || !hits.takes(t, plane.surfel)) return;
+  const DiskAxes axes = load_quads(disk.axes);
+  const Vec3<float> x(std::fma(t, ray.direction.x, q.x), std::fma(t, ray.direction.y, q.y),
+                      std::fma(t, ray.direction.z, q.z));
+  const float u = dot_fused(axes.u, x), v = dot_fused(axes.v, x);
+  const float exponent = std::fma(-std::fma(u, u, v * v), 0.5F, plane.log_opacity);
+  if (!(exponent >= rules.log_alpha_min)) return;
+  hits.insert(t, plane.surfel, std::fmin(std::exp(exponent), rules.blend.alpha_max));
+}
+
+// Boxes that wait, nearest on top.
+class WalkStack {
+ public:
+  __device__ void push(float near, uint32_t child) { waiting_[depth_++] = {near, child}; }
+  // The next one that is entered before `far`, or no_child.
+  __device__ uint32_t pop(float far) {
+    while (depth_ > 0) {
+      const Entry entry = waiting_[--depth_];
+      if (entry.near <= far * 1.000001F) return entry.child;
+    }
+    return no_child;
+  }
+
+ private:
+  struct alignas(8) Entry {
+    float near;  // where the ray enters the box
+    uint32_t child;
+  };
+  Entry waiting_[walk_stack];
+  int depth_ = 0;
+};
+
+// Meets all disks of the tree that can have a hit for `hits`, none of which is before `near`; near boxes
+// first.
+__device__ inline void walk(const RayInput& input, const UnitRay& ray, float near, HeldHits& hits) {
+  const BoxRay box_ray(ray);
+  WalkStack stack;
+  for (uint32_t at = 0; at != no_child; at = stack.pop(hits.far())) {
+    // Down to a disk. no_child has the disk's bit too.
+    while ((at & disk_bit) == 0) {
+      const Node node = load_quads(input.nodes[at]);
+      const float left = box_ray.enter<0>(node, near, hits.far());
+      const float right = box_ray.enter<1>(node, near, hits.far());
+      const bool swapped = right < left;
+      const uint32_t first = swapped ? node.child[1] : node.child[0];
+      const uint32_t second = swapped ? node.child[0] : node.child[1];
+      if (std::fmax(left, right) < INFINITY) stack.push(std::fmax(left, right), second);
+      at = std::fmin(left, right) < INFINITY ? first : stack.pop(hits.far());
+    }
+    if (at == no_child) return;
+    meet_disk(input.disks[at & ~disk_bit], ray, input.rules, hits);
+  }
+}
+
+}  // namespace traceflow::trace::cuda
