@@ -1,5 +1,5 @@
 #include <array>
-#include <cstring>
+#include <bit>
 #include <limits>
 
 #include "base/random.h"
@@ -80,7 +80,8 @@ SplatGradient sum_in_turn(const Entries& entries, int64_t i) {
 }
 
 bool same_bytes(const SplatGradient& a, const SplatGradient& b) {
-  return std::memcmp(&a, &b, sizeof(SplatGradient)) == 0;
+  using Bits = std::array<uint32_t, sizeof(SplatGradient) / sizeof(uint32_t)>;
+  return std::bit_cast<Bits>(a) == std::bit_cast<Bits>(b);
 }
 
 // The same bytes as those of a thread that adds one tile after the other, in the first entry of the surfels
