@@ -29,7 +29,8 @@ class Scope {
 };
 
 // Off at the start. Scopes opened inside a parallel region are not recorded. While it is on, work on the CUDA
-// device is waited for kernel by kernel (base/kernel.h): each time is its own, and the whole takes longer.
+// device is waited for kernel by kernel (base/kernel.h, base/device_memory.cpp): each time is its own, and
+// the whole takes longer.
 void enable(bool on);
 bool is_on();
 // All entries since the last clear(), in the order in which their names were first seen.

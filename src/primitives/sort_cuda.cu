@@ -17,9 +17,11 @@ void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t
                                         stream()),
         "a sort's scratch memory");
   scratch.place(Device::cuda).resize({static_cast<int64_t>(bytes)});
+  const profile::Scope scope("sort");
   check(cub::DeviceRadixSort::SortPairs(scratch.data(), bytes, keys, sorted_keys, values, sorted_values, n, 0,
                                         bits, stream()),
         "a sort");
+  if (profile::is_on()) synchronise();
 }
 
 template <class T>
@@ -28,7 +30,9 @@ void sum(const T* in, T* out, int64_t n, Tensor<uint8_t>& scratch) {
   size_t bytes = 0;
   check(cub::DeviceScan::ExclusiveSum(nullptr, bytes, in, out, n, stream()), "the memory of a running sum");
   scratch.place(Device::cuda).resize({static_cast<int64_t>(bytes)});
+  const profile::Scope scope("running sum");
   check(cub::DeviceScan::ExclusiveSum(scratch.data(), bytes, in, out, n, stream()), "a running sum");
+  if (profile::is_on()) synchronise();
 }
 
 }  // namespace

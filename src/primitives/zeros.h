@@ -24,7 +24,7 @@ TRACEFLOW_WITH_CUDA void zero(std::vector<Range>& ranges);
 // of its own.
 class Zeros {
  public:
-  // The tensor's content becomes zeros with fill(); until then it keeps its memory.
+  // The tensor must be neither resized nor released before fill(). One of the host is zero at once.
   template <class T>
   void add(Tensor<T>& tensor) {
     if (tensor.device() == Device::cpu) {

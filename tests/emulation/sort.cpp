@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "base/profile.h"
 #include "emulation/device.h"
 
 namespace traceflow::cuda {
@@ -15,6 +16,7 @@ template <class Key>
 void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t* values,
           uint32_t* sorted_values) {
   require(n == 0 || (keys != sorted_keys && values != sorted_values), "a sort has room for its results");
+  const profile::Scope scope("sort");
   const emulation::DeviceAccess access;
   const Key mask = bits >= static_cast<int>(8 * sizeof(Key)) ? ~Key{0} : (Key{1} << bits) - 1;
   std::vector<int64_t> order(static_cast<size_t>(n));
@@ -30,6 +32,7 @@ void sort(int64_t n, int bits, const Key* keys, Key* sorted_keys, const uint32_t
 template <class T>
 void sum(const T* in, T* out, int64_t n, Tensor<uint8_t>& scratch) {
   scratch.place(Device::cuda).resize({1});
+  const profile::Scope scope("running sum");
   const emulation::DeviceAccess access;
   T so_far = 0;
   for (int64_t i = 0; i < n; ++i) {

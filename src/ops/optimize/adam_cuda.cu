@@ -39,7 +39,9 @@ __global__ void __launch_bounds__(threads) step(const __grid_constant__ AdamTabl
   __shared__ float rates[most_rates];
   const auto thread = static_cast<int>(threadIdx.x), block = static_cast<int>(blockIdx.x);
   const int k = traceflow::cuda::part_of(table.tensor.data(), table.tensors, block);
-  const AdamTensor& t = table.tensor[static_cast<size_t>(k)];
+  // A copy: what the compiler reads through the table it does not know apart from what it writes, and then it
+  // stores number by number.
+  const AdamTensor t = table.tensor[static_cast<size_t>(k)];
   const Setting setting{table.options, t.inverse_correction1, t.inverse_correction2, table.left_alone + k};
   if (thread < t.columns) rates[thread] = table.rate[static_cast<size_t>(t.first_rate + thread)];
   __syncthreads();
@@ -48,7 +50,7 @@ __global__ void __launch_bounds__(threads) step(const __grid_constant__ AdamTabl
   const int64_t block_end = std::min<int64_t>(t.count, block_begin + block_entries);
   for (int64_t begin = block_begin + thread * group_entries; begin < block_end;
        begin += threads * group_entries) {
-    int32_t column = static_cast<int32_t>(begin % t.columns);
+    int32_t column = static_cast<int32_t>(begin) % t.columns;
     const auto next_rate = [&] {
       const float rate = rates[column];
       column = column + 1 == t.columns ? 0 : column + 1;
