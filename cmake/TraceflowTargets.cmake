@@ -23,14 +23,11 @@ target_compile_options(traceflow_settings INTERFACE
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # GCC 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
   target_compile_options(traceflow_settings INTERFACE -Wno-restrict)
-  # GCC 13 sees copies beyond the end in fmt 9's buffers, and references that dangle wherever a function that returns one
-  # is given a temporary (GCC bug 109642).
+  # GCC 13 sees copies beyond the end in fmt 9's buffers, references that dangle wherever a function that returns one is
+  # given a temporary (GCC bug 109642), and vectors of floats in memory that was not allocated.
   if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
-    target_compile_options(traceflow_settings INTERFACE -Wno-array-bounds -Wno-stringop-overflow -Wno-dangling-reference)
-  endif()
-  # GCC 14 takes vectors of floats for memory that was not allocated.
-  if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 14)
-    target_compile_options(traceflow_settings INTERFACE -Wno-free-nonheap-object)
+    target_compile_options(traceflow_settings INTERFACE
+      -Wno-array-bounds -Wno-stringop-overflow -Wno-dangling-reference -Wno-free-nonheap-object)
   endif()
 endif()
 if(TRACEFLOW_WERROR)
