@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "render/cloud.h"
+#include "render/frame_kernels.h"
 #include "render/visibility.h"
 
 namespace traceflow {
@@ -28,6 +29,16 @@ TEST(Renderer, CullingChangesNoPixel) {
   ASSERT_LT(culled.main.count(), f.scene.main.count() * 9 / 10) << "the view leaves something out";
   expect_equal(colour, culled.colour, "colour");
   expect_equal(depth, culled.raster.depth, "depth");
+}
+
+TEST(Renderer, TheReachGrowsAtOnceAndShrinksSlowly) {
+  float found = 2, reach = 1;
+  const FollowReach follow{&found, &reach};
+  follow(0);
+  EXPECT_EQ(reach, 2);
+  found = 0.5F;
+  follow(0);
+  EXPECT_EQ(reach, 0.995F * 2);
 }
 
 TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {

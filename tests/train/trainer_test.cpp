@@ -20,6 +20,14 @@ TEST(Trainer, LearnsTheCapture) {
   EXPECT_GT(end.psnr, before + 1.5) << "from " << before;
 }
 
+// What view culling allows for: nothing before anything moved, then as far as the field moved a surfel.
+TEST(Trainer, CullingLearnsHowFarTheFieldMoves) {
+  Trainer trainer = make_trainer(small_run(12), "reach");
+  EXPECT_EQ(trainer.scene().main_reach[0], 0);
+  for (int i = 0; i < 10; ++i) trainer.step();
+  EXPECT_GT(trainer.scene().main_reach[0], 0);
+}
+
 TEST(Trainer, PhasesAndDensityControlAreToldAndTheCapsHold) {
   Trainer trainer = make_trainer(small_run(40), "events");
   std::vector<std::string> phases;
