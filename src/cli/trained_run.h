@@ -3,14 +3,14 @@
 #include <filesystem>
 #include <string>
 
-#include "eval/subject.h"
+#include "show/subject.h"
 #include "train/options.h"
 
 namespace traceflow::cli {
 
 // A run's folder as eval, render and export see it.
 struct TrainedRun {
-  eval::Subject subject;  // takes part as far as the run has come (method §7.1–§7.3)
+  show::Subject subject;  // takes part as far as the run has come (method §7.1–§7.3)
   TrainOptions options;
   std::string capture;                   // its name
   std::filesystem::path capture_folder;  // where it was when the run was trained

@@ -7,10 +7,10 @@
 #include "cli/device_arguments.h"
 #include "cli/trained_run.h"
 #include "cli/verbs.h"
-#include "eval/camera_file.h"
-#include "eval/contact_sheet.h"
-#include "eval/layer_files.h"
 #include "eval/report.h"
+#include "show/camera_file.h"
+#include "show/contact_sheet.h"
+#include "show/layer_files.h"
 
 namespace traceflow::cli {
 
@@ -42,13 +42,13 @@ std::optional<lpips::Network> read_lpips(const std::string& path) {
 }
 
 void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
-  const std::vector<eval::Layer> layers =
-      a.layers == "none" ? std::vector<eval::Layer>{} : eval::parse_layers(a.layers);
+  const std::vector<show::Layer> layers =
+      a.layers == "none" ? std::vector<show::Layer>{} : show::parse_layers(a.layers);
   TrainedRun run = read_run(a.run);
   if (!run.note.empty()) fmt::print(stderr, "{}\n", run.note);
   const Capture capture = capture_of(run, a.capture, a.downscale);
   const std::vector<View>& views = views_of(capture, a.split);
-  for (const View& view : views) eval::check_name(capture.folder.string(), "view id", view.id);
+  for (const View& view : views) show::check_name(capture.folder.string(), "view id", view.id);
   std::optional<lpips::Network> network = read_lpips(a.lpips);
   const Device device = devices.choose();
   run.subject.scene.move_to(device);
@@ -56,8 +56,8 @@ void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
 
   const std::filesystem::path folder = std::filesystem::path(a.run) / "eval" / a.split;
   std::filesystem::create_directories(folder);
-  eval::LayerFiles files(folder, layers, eval::ImageFormat::png, run.subject.scene.normalisation.scale);
-  eval::ContactSheet sheet(a.sheet_width);
+  show::LayerFiles files(folder, layers, show::ImageFormat::png, run.subject.scene.normalisation.scale);
+  show::ContactSheet sheet(a.sheet_width);
   eval::Report report;
   report.capture = capture.name;
   report.split = a.split;

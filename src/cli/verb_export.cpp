@@ -27,7 +27,7 @@ void run_export(const ExportArguments& a) {
         "this run's reflections are a cube map, which a .ply cannot hold: main.ply alone is written\n");
   }
   const std::optional<float> time = a.undeformed ? std::nullopt : std::optional(a.time);
-  for (const auto& path : eval::export_subject(run.subject, time, a.output))
+  for (const auto& path : show::export_subject(run.subject, time, a.output))
     fmt::print("{}\n", path.string());
 }
 

@@ -7,10 +7,10 @@
 #include "cli/option_arguments.h"
 #include "cli/trained_run.h"
 #include "cli/verbs.h"
-#include "eval/camera_file.h"
-#include "eval/layer_files.h"
-#include "eval/orbit.h"
-#include "eval/video.h"
+#include "show/camera_file.h"
+#include "show/layer_files.h"
+#include "show/orbit.h"
+#include "show/video.h"
 
 namespace traceflow::cli {
 
@@ -28,16 +28,16 @@ struct RenderArguments {
 
 // A scene to render and, when it comes from a run, what else is known of it.
 struct Loaded {
-  eval::Subject subject;
+  show::Subject subject;
   std::optional<TrainedRun> run;
 };
 
 Loaded load(const RenderArguments& a) {
   const std::filesystem::path path(a.scene);
   if (std::filesystem::is_regular_file(path))
-    return {eval::read_ply_subject(path, a.environment), std::nullopt};
+    return {show::read_ply_subject(path, a.environment), std::nullopt};
   if (std::filesystem::is_regular_file(path / "main.ply")) {
-    return {eval::read_ply_subject(path / "main.ply", a.environment), std::nullopt};
+    return {show::read_ply_subject(path / "main.ply", a.environment), std::nullopt};
   }
   if (!std::filesystem::exists(path)) {
     throw InputError(path.string(), "", "no such file or folder", "a run's folder or a .ply");
@@ -46,7 +46,7 @@ Loaded load(const RenderArguments& a) {
     throw InputError("option", "environment", "a run, which has its own", "a .ply to go with");
   }
   TrainedRun run = read_run(path);
-  eval::Subject subject = std::move(run.subject);
+  show::Subject subject = std::move(run.subject);
   subject.warning = run.note;
   return {std::move(subject), std::move(run)};
 }
@@ -69,26 +69,26 @@ Camera<float> camera_for(const Loaded& loaded, const Capture& capture, Camera<fl
   return camera;
 }
 
-std::vector<eval::Shot> split_shots(const RenderArguments& a, const Loaded& loaded) {
+std::vector<show::Shot> split_shots(const RenderArguments& a, const Loaded& loaded) {
   const Capture capture = capture_for(a, loaded);
-  std::vector<eval::Shot> shots;
+  std::vector<show::Shot> shots;
   for (const View& view : views_of(capture, a.split.empty() ? "test" : a.split)) {
-    eval::check_name(capture.folder.string(), "view id", view.id);
+    show::check_name(capture.folder.string(), "view id", view.id);
     shots.push_back({view.id, view.time, camera_for(loaded, capture, view.camera)});
   }
   return shots;
 }
 
-std::vector<eval::Shot> orbit_shots(const RenderArguments& a, const Loaded& loaded) {
+std::vector<show::Shot> orbit_shots(const RenderArguments& a, const Loaded& loaded) {
   if (!loaded.run && a.capture.empty()) {
-    return eval::orbit_around_points(loaded.subject.scene.main.position, a.size.first, a.size.second,
+    return show::orbit_around_points(loaded.subject.scene.main.position, a.size.first, a.size.second,
                                      a.frames);
   }
   const Capture capture = capture_for(a, loaded);
   std::vector<Camera<float>> cameras;
   for (const View& view : views_of(capture, "train"))
     cameras.push_back(camera_for(loaded, capture, view.camera));
-  std::vector<eval::Shot> shots = eval::orbit_around_cameras(cameras, a.frames);
+  std::vector<show::Shot> shots = show::orbit_around_cameras(cameras, a.frames);
   // The scene moves while the camera does, once from beginning to end.
   for (size_t i = 0; i < shots.size(); ++i) {
     shots[i].time =
@@ -97,8 +97,8 @@ std::vector<eval::Shot> orbit_shots(const RenderArguments& a, const Loaded& load
   return shots;
 }
 
-std::vector<eval::Shot> choose_shots(const RenderArguments& a, const Loaded& loaded) {
-  if (!a.cameras.empty()) return eval::read_cameras(a.cameras, loaded.subject.scene.normalisation);
+std::vector<show::Shot> choose_shots(const RenderArguments& a, const Loaded& loaded) {
+  if (!a.cameras.empty()) return show::read_cameras(a.cameras, loaded.subject.scene.normalisation);
   return a.orbit ? orbit_shots(a, loaded) : split_shots(a, loaded);
 }
 
@@ -108,36 +108,36 @@ void check_arguments(const RenderArguments& a) {
   }
   // The parser's range lets "nan" through.
   if (a.time) check_option(*a.time >= 0 && *a.time <= 1, "time", *a.time, "0 to 1");
-  if (!a.video.empty()) eval::Video::prepare(a.video);
+  if (!a.video.empty()) show::Video::prepare(a.video);
 }
 
 void run_render(const RenderArguments& a, const OptionArguments& options, const DeviceArguments& devices) {
   check_arguments(a);
-  const std::vector<eval::Layer> layers = eval::parse_layers(a.layers);
+  const std::vector<show::Layer> layers = show::parse_layers(a.layers);
   Loaded loaded = load(a);
-  eval::Subject& subject = loaded.subject;
+  show::Subject& subject = loaded.subject;
   options.apply(option_fields(subject.render));
   subject.render.validate();
-  const std::vector<eval::Shot> shots = choose_shots(a, loaded);
-  if (!(subject.scene.extent > 0)) subject.scene.extent = eval::extent_seen_from(subject.scene.main, shots);
+  const std::vector<show::Shot> shots = choose_shots(a, loaded);
+  if (!(subject.scene.extent > 0)) subject.scene.extent = show::extent_seen_from(subject.scene.main, shots);
   if (!subject.warning.empty()) fmt::print(stderr, "{}\n", subject.warning);
 
   subject.scene.move_to(devices.choose());
 
   const double scale = subject.scene.normalisation.scale;
-  eval::LayerFiles files(a.output, layers,
-                         a.format == "npy" ? eval::ImageFormat::npy : eval::ImageFormat::png, scale);
-  eval::Video video(a.video, a.frames_per_second);
-  eval::Painter painter;
+  show::LayerFiles files(a.output, layers,
+                         a.format == "npy" ? show::ImageFormat::npy : show::ImageFormat::png, scale);
+  show::Video video(a.video, a.frames_per_second);
+  show::Painter painter;
   Renderer renderer(subject.render);
-  for (const eval::Shot& shot : shots) {
+  for (const show::Shot& shot : shots) {
     FrameRequest request = subject.request;
     request.camera = shot.camera;
     request.time = a.time ? *a.time : shot.time.value_or(0.0F);
     const Frame& frame = renderer.forward(subject.scene, request);
     if (!a.output.empty()) files.write(shot.name, frame);
     if (!a.video.empty()) {
-      video.add(eval::in_colour(painter.paint(layers[0], eval::layer_values(frame, layers[0], scale))));
+      video.add(show::in_colour(painter.paint(layers[0], show::layer_values(frame, layers[0], scale))));
     }
   }
   video.finish();

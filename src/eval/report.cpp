@@ -36,7 +36,7 @@ std::string table_line(const std::string& label, size_t width, const Metrics& m)
 
 }  // namespace
 
-void evaluate(const Subject& subject, const Capture& capture, const std::vector<View>& views,
+void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report) {
   using Clock = std::chrono::steady_clock;
   report.main_surfels = subject.scene.main.count();

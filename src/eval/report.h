@@ -6,7 +6,7 @@
 
 #include "capture/capture.h"
 #include "eval/metrics.h"
-#include "eval/subject.h"
+#include "show/subject.h"
 
 namespace traceflow::eval {
 
@@ -33,7 +33,7 @@ struct Report {
 using ViewListener = std::function<void(const View& view, const ViewImages& images, const Frame& frame)>;
 
 // Renders every view, measures it, and adds it to the report; sets render_fps and the surfel counts.
-void evaluate(const Subject& subject, const Capture& capture, const std::vector<View>& views,
+void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report);
 
 // The report as JSON text: figures that cannot be had are null.

@@ -1,7 +1,6 @@
 #include <array>
 #include <limits>
 
-#include "eval/layers.h"
 #include "eval/metrics.h"
 #include "support/device.h"
 
@@ -143,31 +142,6 @@ TEST_F(MetricsOnDevice, PicturesApartAreRefused) {
   EXPECT_THROW(psnr(there, there, c.mask), InternalError);
   EXPECT_THROW(normal_mae_deg(normal_there, c.true_normal, {}), InternalError);
   EXPECT_THROW(normal_mae_deg(normal_there, normal_there, c.mask), InternalError);
-}
-
-// The layers of a frame on the device reach the host.
-TEST_F(MetricsOnDevice, LayersOfAFrameComeToTheHost) {
-  Random random(2);
-  const auto noise = [&](const Shape& shape) {
-    return random_tensor<float>(shape, random, 0, 1).on(Device::cuda);
-  };
-  Frame frame;
-  for (Tensor<float>* image : {&frame.colour, &frame.raster.colour, &frame.raster.normal})
-    *image = noise({6, 7, 3});
-  for (Tensor<float>* plane : {&frame.raster.alpha, &frame.raster.tint, &frame.raster.depth,
-                               &frame.raster.median_depth, &frame.raster.distortion}) {
-    *plane = noise({6, 7});
-  }
-  frame.specular_rays.resize({0, 3});
-  for (size_t i = 0; i < layer_names.size(); ++i) {
-    const auto layer = static_cast<Layer>(i);
-    if (layer == Layer::specular) continue;  // Frame makes it
-    const Tensor<float> values = layer_values(frame, layer, 1);
-    EXPECT_EQ(values.device(), Device::cpu) << layer_names[i];
-    EXPECT_TRUE(all_finite(values)) << layer_names[i];
-  }
-  const Tensor<float> depth = frame.raster.depth.on(Device::cpu);
-  EXPECT_EQ(layer_values(frame, Layer::depth, 0.5)[3], static_cast<float>(depth[3] / 0.5));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 
 #include "math/camera.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // One picture to be taken: from where, when, and the name of its files.
 struct Shot {
@@ -15,4 +15,4 @@ struct Shot {
   Camera<float> camera;       // in the scene's units
 };
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

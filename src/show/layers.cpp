@@ -1,9 +1,9 @@
-#include "eval/layers.h"
+#include "show/layers.h"
 
 #include <algorithm>
 #include <sstream>
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -59,4 +59,4 @@ Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
   return {};
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -1,4 +1,4 @@
-#include "eval/picture.h"
+#include "show/picture.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,10 +6,10 @@
 
 #include <limits>
 
-#include "eval/contact_sheet.h"
 #include "files/png.h"
+#include "show/contact_sheet.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 namespace {
 
 TEST(Layers, AreParsedOnceInTheGivenOrder) {
@@ -117,4 +117,4 @@ TEST(ContactSheet, HasNinePicturesARow) {
 }
 
 }  // namespace
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -1,4 +1,4 @@
-#include "eval/contact_sheet.h"
+#include "show/contact_sheet.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include "files/png.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -90,4 +90,4 @@ void ContactSheet::write(const std::filesystem::path& path) const {
   write_png(path, sheet);
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -4,11 +4,11 @@
 #include <optional>
 #include <vector>
 
-#include "eval/shot.h"
 #include "render/renderer.h"
 #include "scene/scene.h"
+#include "show/shot.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // What pictures are made of: a scene with all that its pictures depend on beside camera and time.
 struct Subject {
@@ -32,4 +32,4 @@ float extent_seen_from(const Surfels& surfels, const std::vector<Shot>& shots);
 std::vector<std::filesystem::path> export_subject(const Subject& subject, std::optional<float> time,
                                                   const std::filesystem::path& folder);
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -6,7 +6,7 @@
 
 #include "render/frame.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // The pictures that a frame is made of, as they are named in flags and folders.
 enum class Layer { rgb, diffuse, specular, tint, alpha, normal, depth, median_depth, distortion };
@@ -22,4 +22,4 @@ std::vector<Layer> parse_layers(const std::string& list);
 // gives the capture's units. On the host, wherever the frame is.
 Tensor<float> layer_values(const Frame& frame, Layer layer, double scale);
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

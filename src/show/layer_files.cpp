@@ -1,10 +1,10 @@
-#include "eval/layer_files.h"
+#include "show/layer_files.h"
 
 #include "base/parallel.h"
 #include "files/npy.h"
 #include "files/png.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 void LayerFiles::write(const std::string& name, const Frame& frame) {
   std::vector<Tensor<float>> values(layers_.size());
@@ -18,7 +18,7 @@ void LayerFiles::write(const std::string& name, const Frame& frame) {
     std::filesystem::create_directories(paths[i].parent_path());
   }
   parallel_for(
-      "eval: write layers", static_cast<int64_t>(layers_.size()),
+      "show: write layers", static_cast<int64_t>(layers_.size()),
       [&](int64_t i) {
         const auto k = static_cast<size_t>(i);
         if (format_ == ImageFormat::png) {
@@ -30,4 +30,4 @@ void LayerFiles::write(const std::string& name, const Frame& frame) {
       1);
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

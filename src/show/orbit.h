@@ -1,9 +1,9 @@
 #pragma once
 
 #include "base/tensor.h"
-#include "eval/shot.h"
+#include "show/shot.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // A path of `frames` cameras around what the given cameras look at, named 00000, 00001, …, without times. It
 // keeps to the side from which the scene was seen: it swings over the angle that the given cameras span, as
@@ -15,4 +15,4 @@ std::vector<Shot> orbit_around_cameras(const std::vector<Camera<float>>& cameras
 // down as reconstructions from photographs have it.
 std::vector<Shot> orbit_around_points(const Tensor<float>& points, int width, int height, int frames);
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

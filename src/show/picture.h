@@ -2,9 +2,9 @@
 
 #include <optional>
 
-#include "eval/layers.h"
+#include "show/layers.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // Turns layers into 8-bit pictures for the eye. Colours, tint and alpha are shown as they are; normals as (n
 // + 1)/2 of world x, y, z; depths from near (bright) to far (dark) by inverse depth, distortion from none
@@ -33,4 +33,4 @@ Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width);
 // Grey (H×W) to three channels; three stay.
 Tensor<uint8_t> in_colour(const Tensor<uint8_t>& image);
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

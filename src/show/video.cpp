@@ -1,4 +1,4 @@
-#include "eval/video.h"
+#include "show/video.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -15,7 +15,7 @@
 
 extern char** environ;
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -111,4 +111,4 @@ Video::~Video() {
   if (process_ >= 0) wait_for(process_);
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -6,7 +6,7 @@
 
 #include "base/tensor.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // A film written by ffmpeg, which is fed frames through a pipe.
 class Video {
@@ -37,4 +37,4 @@ class Video {
   int pipe_ = -1;
 };
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

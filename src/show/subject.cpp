@@ -1,4 +1,4 @@
-#include "eval/subject.h"
+#include "show/subject.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,7 @@
 #include "scene/ply.h"
 #include "scene/rows.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -142,4 +142,4 @@ std::vector<std::filesystem::path> export_subject(const Subject& subject, std::o
   return written;
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -2,10 +2,10 @@
 
 #include <filesystem>
 
-#include "eval/shot.h"
 #include "scene/scene.h"
+#include "show/shot.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // The cameras.json of 3DGS and 2DGS: a list of {width, height, position, rotation (world_from_camera, rows),
 // fx, fy} with, optionally, cx, cy (else the middle of the image), time (0 to 1) and img_name (else id, else
@@ -18,4 +18,4 @@ std::vector<Shot> read_cameras(const std::filesystem::path& path, const SceneNor
 // Throws InputError unless the name stays inside the folder that it is put in.
 void check_name(const std::string& where, const std::string& field, const std::string& name);
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

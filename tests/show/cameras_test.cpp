@@ -7,10 +7,10 @@
 #include <limits>
 #include <numbers>
 
-#include "eval/camera_file.h"
-#include "eval/orbit.h"
+#include "show/camera_file.h"
+#include "show/orbit.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 namespace {
 
 using testing::HasSubstr;
@@ -195,4 +195,4 @@ TEST(Orbit, AroundPointsSeesTheirMiddle) {
 }
 
 }  // namespace
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

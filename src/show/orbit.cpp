@@ -1,4 +1,4 @@
-#include "eval/orbit.h"
+#include "show/orbit.h"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -166,4 +166,4 @@ std::vector<Shot> orbit_around_points(const Tensor<float>& points, int width, in
   return path(like, circle, frames);
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -2,9 +2,9 @@
 
 #include <filesystem>
 
-#include "eval/picture.h"
+#include "show/picture.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 // One picture of everything: a row for each view, with photograph, render, difference (three times as
 // strong), diffuse, specular, tint, normal, depth and alpha side by side under their names.
@@ -24,4 +24,4 @@ class ContactSheet {
   std::vector<std::vector<Tensor<uint8_t>>> rows_;
 };
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -1,4 +1,4 @@
-#include "eval/camera_file.h"
+#include "show/camera_file.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 #include "files/input_file.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -173,4 +173,4 @@ std::vector<Shot> read_cameras(const std::filesystem::path& path, const SceneNor
   return shots;
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "eval/picture.h"
+#include "show/picture.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 enum class ImageFormat { png, npy };
 
@@ -29,4 +29,4 @@ class LayerFiles {
   Painter painter_;
 };
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show

@@ -1,4 +1,4 @@
-#include "eval/picture.h"
+#include "show/picture.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 
 #include "files/png.h"
 
-namespace traceflow::eval {
+namespace traceflow::show {
 
 namespace {
 
@@ -117,4 +117,4 @@ Tensor<uint8_t> in_colour(const Tensor<uint8_t>& image) {
   return result;
 }
 
-}  // namespace traceflow::eval
+}  // namespace traceflow::show
