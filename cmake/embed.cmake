@@ -1,0 +1,15 @@
+# The script behind traceflow_embed. MADE: the source file to write; NAMESPACE: of its table; FILES: what goes in.
+set(text "#include \"base/embedded_file.h\"\n\n#include <array>\n\nnamespace ${NAMESPACE} {\nnamespace {\n")
+set(entries "")
+set(count 0)
+foreach(file IN LISTS FILES)
+  get_filename_component(name ${file} NAME)
+  file(READ ${file} bytes HEX)
+  string(REGEX REPLACE "(..)" "0x\\1," bytes "${bytes}")
+  string(APPEND text "constexpr unsigned char file_${count}[] = {${bytes}};\n")
+  string(APPEND entries "    traceflow::EmbeddedFile{\"${name}\", file_${count}},\n")
+  math(EXPR count "${count} + 1")
+endforeach()
+string(APPEND text "constexpr std::array<traceflow::EmbeddedFile, ${count}> files = {\n${entries}};\n}  // namespace\n"
+  "std::span<const traceflow::EmbeddedFile> embedded_files() { return files; }\n}  // namespace ${NAMESPACE}\n")
+file(WRITE ${MADE} "${text}")
