@@ -14,6 +14,11 @@ inline constexpr std::array<const char*, 9> layer_names = {
     "rgb", "diffuse", "specular", "tint", "alpha", "normal", "depth", "median-depth", "distortion"};
 inline const char* to_string(Layer layer) { return layer_names[static_cast<size_t>(layer)]; }
 
+// Whether a layer's numbers are colours or normals (H×W×3), not one number a pixel.
+inline bool has_colours(Layer layer) {
+  return layer == Layer::rgb || layer == Layer::diffuse || layer == Layer::specular || layer == Layer::normal;
+}
+
 // "rgb,normal" → layers, each once, in the order given; "all" is all of them. Throws InputError.
 std::vector<Layer> parse_layers(const std::string& list);
 
@@ -21,5 +26,8 @@ std::vector<Layer> parse_layers(const std::string& list);
 // renormalised; depths along the camera's z in units of 1/`scale` scene units, so that the capture's scale
 // gives the capture's units. On the host, wherever the frame is.
 Tensor<float> layer_values(const Frame& frame, Layer layer, double scale);
+
+// H×W: |photograph − render|, the mean of the three channels. The photograph is H×W×3 on the host.
+Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph);
 
 }  // namespace traceflow::show
