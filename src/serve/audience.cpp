@@ -72,7 +72,7 @@ void Audience::enter(uint64_t number, Send send) {
   guest.send = std::move(send);
   if (!hello_.empty()) send_to(guest, hello_);
   send_to(guest, events_text(history_.lines(), true));
-  if (!trouble_.empty()) send_to(guest, dump({{"type", "trouble"}, {"text", trouble_}}));
+  if (!troubles_.empty()) send_to(guest, trouble_text());
   send_to_all(state_text());
 }
 
@@ -140,6 +140,7 @@ void Audience::answer(Guest& guest, const Request& request) {
 
 void Audience::greet_with(std::string hello) {
   const std::lock_guard lock(mutex_);
+  if (hello == hello_) return;
   hello_ = std::move(hello);
   send_to_all(hello_);
 }
@@ -162,11 +163,22 @@ void Audience::tell(const std::vector<std::string>& events, bool reset) {
   }
 }
 
-void Audience::tell_trouble(const std::string& text) {
+std::string Audience::trouble_text() const {
+  std::string all;
+  for (const auto& [about, text] : troubles_) all += (all.empty() ? "" : " ") + text;
+  return dump({{"type", "trouble"}, {"text", all}});
+}
+
+void Audience::tell_trouble(const std::string& about, const std::string& text) {
   const std::lock_guard lock(mutex_);
-  if (text == trouble_) return;
-  trouble_ = text;
-  send_to_all(dump({{"type", "trouble"}, {"text", text}}));
+  const auto known = troubles_.find(about);
+  if (text == (known == troubles_.end() ? "" : known->second)) return;
+  if (text.empty()) {
+    troubles_.erase(known);
+  } else {
+    troubles_[about] = text;
+  }
+  send_to_all(trouble_text());
 }
 
 void Audience::scene_changed(Clock::duration refresh) {

@@ -67,8 +67,8 @@ class Audience : public Room {
   void set_state(const State& state);
   // Adds lines of a training log (train/event_log.h) to what pages know. reset: they replace what was known.
   void tell(const std::vector<std::string>& events, bool reset = false);
-  // Something is wrong, in words; empty: it is over.
-  void tell_trouble(const std::string& text);
+  // Something is wrong, in words; empty: it is over. about: which trouble it is; there may be several.
+  void tell_trouble(const std::string& about, const std::string& text);
   // The scene is another one from now on, or at another state; pages at rest see it at the next refresh,
   // which comes when `refresh` has gone by since their last frame.
   void scene_changed(Clock::duration refresh);
@@ -118,12 +118,14 @@ class Audience : public Room {
   void send_to(Guest& guest, const std::string& text);
   void send_to_all(const std::string& text);
   std::string state_text() const;
+  std::string trouble_text() const;
 
   std::function<void(Do)> on_command_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<uint64_t, Guest> guests_;
-  std::string hello_, trouble_;
+  std::string hello_;
+  std::map<std::string, std::string> troubles_;
   State state_;
   History history_;
   int64_t scene_ = 0;

@@ -38,6 +38,12 @@ std::vector<std::string> History::lines() const {
   return texts;
 }
 
+std::vector<std::string> lines_of(const std::vector<LoggedEvent>& events) {
+  std::vector<std::string> lines;
+  for (const LoggedEvent& event : events) lines.push_back(event.line);
+  return lines;
+}
+
 std::string events_text(const std::vector<std::string>& lines, bool reset) {
   std::string text = R"({"type":"events","events":[)";
   for (const std::string& line : lines) text += (&line == &lines.front() ? "" : ",") + line;

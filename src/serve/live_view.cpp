@@ -1,7 +1,5 @@
 #include "serve/live_view.h"
 
-#include "base/error.h"
-#include "base/option_fields.h"
 #include "train/event_log.h"
 
 namespace traceflow::serve {
@@ -21,7 +19,7 @@ double seconds(std::chrono::steady_clock::duration d) { return std::chrono::dura
 }  // namespace
 
 void ViewOptions::validate() const {
-  check_option(share > 0 && share < 1, "share", share, "above 0 and under 1");
+  check_option(share > 0 && share < 1, "view-share", share, "above 0 and under 1");
 }
 
 LiveView::LiveView(const ViewOptions& options, Setting setting, TrainingHooks hooks)
@@ -84,7 +82,7 @@ void LiveView::on_step(const events::Step& step) {
     if (!serve()) break;
     credit_ -= seconds(Clock::now() - start);
   }
-  projector_.forget(hooks_.stage().scene.device());
+  projector_.scene_changed(hooks_.stage().scene.device());
   if (save_.exchange(false)) hooks_.save();
   if (pause_) serve_while_paused();
   returned_ = Clock::now();
@@ -102,7 +100,7 @@ void LiveView::serve_while_paused() {
   state_.paused = false;
   hooks_.emit(events::Paused{state_.iteration, false});
   flush_events();
-  projector_.forget(hooks_.stage().scene.device());
+  projector_.scene_changed(hooks_.stage().scene.device());
 }
 
 bool LiveView::serve() {

@@ -11,12 +11,8 @@
 namespace traceflow::serve {
 
 struct ViewOptions {
-  double share = 0.25;
+  double share = 0.25;  // of the training's time that pages may take while somebody looks, above 0 and under 1
 
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.field("share", share, "", "Share of the training's time that pages may take while somebody looks.");
-  }
   void validate() const;
 };
 
@@ -39,9 +35,10 @@ class LiveView {
   // Whom the server talks to.
   Room& room() { return audience_; }
 
-  // Lines of the log of a run that is resumed.
-  void recall(const std::vector<std::string>& lines) { audience_.tell(lines, true); }
+  // The log of a run that is resumed.
+  void recall(const std::vector<LoggedEvent>& events) { audience_.tell(lines_of(thinned(events)), true); }
   void operator()(const events::Event& event);
+  bool is_alone() { return audience_.viewers() == 0; }
   // After the training: goes on until the last page has left, or the stop flag is raised.
   void stay();
 

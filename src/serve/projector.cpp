@@ -18,6 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
+constexpr const char* about_memory = "memory";  // what a trouble is about
 constexpr int photo_quality = 90;
 // How fast the ranges of depth and distortion follow the picture: settled after some ten frames.
 constexpr float follow = 0.25F;
@@ -43,12 +44,38 @@ show::Layer layer_named(const std::string& name) {
 
 Json vector_json(const Vec3<float>& v) { return to_json(Vec3<double>(v)); }
 
+Json to_json(int64_t id, const std::optional<show::ProbeResult>& found) {
+  Json json = {{"type", "probe"}, {"id", id}, {"hit", found.has_value()}};
+  if (!found) return json;
+  json["surface"] = vector_json(found->surface);
+  json["normal"] = vector_json(found->normal);
+  json["depth"] = found->depth;
+  json["alpha"] = found->alpha;
+  json["tint"] = found->tint;
+  json["colour"] = vector_json(found->colour);
+  json["diffuse"] = vector_json(found->diffuse);
+  json["specular"] = vector_json(found->specular);
+  if (found->mirrored) {
+    json["mirrored"] = {{"direction", vector_json(found->mirrored->direction)},
+                        {"end", vector_json(found->mirrored->end)},
+                        {"distance", found->mirrored->distance},
+                        {"alpha", found->mirrored->alpha}};
+  }
+  return json;
+}
+
 }  // namespace
 
 void Projector::greet(const Stage& stage) { audience_.greet_with(hello_text(stage, setting_)); }
 
-void Projector::forget(Device device) {
-  if (device == Device::cuda) renderer_ = nullptr;
+void Projector::scene_changed(Device device) {
+  posed_ = false;
+  if (device == Device::cuda) forget();
+}
+
+void Projector::forget() {
+  renderer_ = nullptr;
+  posed_ = false;
 }
 
 Renderer& Projector::renderer(const Stage& stage) {
@@ -59,13 +86,13 @@ Renderer& Projector::renderer(const Stage& stage) {
 void Projector::answer(const Job& job, const Stage& stage) {
   try {
     std::visit([&](const auto& what) { answer(job, what, stage); }, job.what);
-    audience_.tell_trouble("");
+    audience_.tell_trouble(about_memory, "");
   } catch (const memory::OutOfMemory& error) {
-    renderer_ = nullptr;
-    audience_.tell_trouble(std::string("No memory for pictures: ") + error.what());
+    forget();
+    audience_.tell_trouble(about_memory, std::string("No memory for pictures: ") + error.what());
   } catch (const std::bad_alloc&) {
-    renderer_ = nullptr;
-    audience_.tell_trouble("No memory for pictures on this machine.");
+    forget();
+    audience_.tell_trouble(about_memory, "No memory for pictures on this machine.");
   } catch (const std::exception& error) {
     audience_.refuse(job, error.what());
   }
@@ -75,6 +102,7 @@ FrameRequest Projector::request_for(const Look& look, const Stage& stage, double
   FrameRequest request = stage.request;
   request.camera = camera_of(look, setting_, stage.scene.normalisation, divisor);
   request.time = look.time;
+  request.reuse_pose = posed_;
   return request;
 }
 
@@ -95,6 +123,7 @@ Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request
   const show::Layer layer = difference ? show::Layer::rgb : layer_named(look.layer);
 
   const Frame& frame = renderer(stage).forward(stage.scene, request);
+  posed_ = true;
   if (!difference) {
     return show::in_colour(
         painter.paint(layer, show::layer_values(frame, layer, stage.scene.normalisation.scale)));
@@ -166,14 +195,12 @@ void Projector::answer(const Job& job, const Path& path, const Stage& stage) {
 }
 
 void Projector::answer(const Job& job, const ProbeJob& probe, const Stage& stage) {
-  const SceneNormalisation& normalisation = stage.scene.normalisation;
   const FrameRequest request = request_for(probe.look, stage, 1);
-  const auto found = show::probe(stage.scene, request,
-                                 {static_cast<float>(probe.probe.x * request.camera.width),
-                                  static_cast<float>(probe.probe.y * request.camera.height)},
-                                 renderer(stage));
-  Json reply = {{"type", "probe"}, {"id", probe.probe.id}, {"hit", found.has_value()}};
-  audience_.reply(job.guest, text_message(dump(reply)));
+  const double x = probe.probe.x * request.camera.width, y = probe.probe.y * request.camera.height;
+  std::optional<show::ProbeResult> found = show::probe(renderer(stage), stage.scene, request, x, y);
+  posed_ = true;
+  if (found) found = show::in_capture(*found, stage.scene.normalisation);
+  audience_.reply(job.guest, text_message(dump(to_json(probe.probe.id, found))));
 }
 
 }  // namespace traceflow::serve

@@ -33,4 +33,8 @@ struct Setting {
   std::vector<CapturedCamera> train, test;
 };
 
+// capture: may be null; else it outlives the setting, and its cameras are taken to the scene's units.
+Setting make_setting(std::string source, std::string name, const Capture* capture,
+                     const SceneNormalisation& scene);
+
 }  // namespace traceflow::serve
