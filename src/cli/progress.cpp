@@ -150,6 +150,9 @@ void Progress::show(const events::Saved& e) {
   print_line(fmt::format("saved {} at iteration {}", e.path.string(), e.iteration));
 }
 
+// For the log alone.
+void Progress::show(const events::Measured&) {}
+
 void Progress::show(const events::Finished& e) {
   print_line(fmt::format("{} after {} iterations and {}: PSNR {:.2f} dB over the last views, {}{}",
                          ending_text(e.ending), e.iteration, duration_text(e.seconds), e.psnr,

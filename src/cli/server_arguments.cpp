@@ -30,13 +30,15 @@ ServerArguments::ServerArguments(CLI::App& verb, CLI::Option* needs) : state_(st
   for_viewer(verb.add_option("--port", state_->port, "Port of the viewer's page; 0 for any [7180, or any]"))
       ->check(CLI::Range(0, 65535))
       ->option_text("PORT");
-  for_viewer(verb.add_option("--bind", state_->bind,
-                             "Address to listen on; others than 127.0.0.1 can be reached from other machines"))
+  for_viewer(
+      verb.add_option("--bind", state_->bind,
+                      "Address to listen on; others than 127.0.0.1 can be reached from other machines"))
       ->option_text("ADDRESS")
       ->capture_default_str();
-  for_viewer(verb.add_option("--allow-host", state_->allowed_hosts,
-                             "NAME:PORT that the page is opened under, where it is reached by another way; may be "
-                             "repeated"))
+  for_viewer(
+      verb.add_option("--allow-host", state_->allowed_hosts,
+                      "NAME:PORT that the page is opened under, where it is reached by another way; may be "
+                      "repeated"))
       ->option_text("NAME:PORT");
 }
 

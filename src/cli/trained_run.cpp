@@ -33,6 +33,10 @@ double metadata_number(const Safetensors& file, const std::string& where, const 
 
 }  // namespace
 
+std::string run_name(const std::filesystem::path& folder) {
+  return (std::filesystem::absolute(folder) / "").lexically_normal().parent_path().filename().string();
+}
+
 TrainedRun read_run(const std::filesystem::path& folder) {
   const RunFolder files{folder};
   const std::string where = files.checkpoint().string();

@@ -1,15 +1,16 @@
 #include <fmt/core.h>
 
-#include <atomic>
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <memory>
+#include <optional>
 
 #include "cli/device_arguments.h"
 #include "cli/error_boundary.h"
 #include "cli/option_arguments.h"
 #include "cli/progress.h"
 #include "cli/server_arguments.h"
+#include "cli/stop_signal.h"
+#include "cli/trained_run.h"
 #include "cli/verbs.h"
 #include "files/options_json.h"
 #include "serve/live_view.h"
@@ -20,15 +21,6 @@
 namespace traceflow::cli {
 
 namespace {
-
-// Set by Ctrl-C and SIGTERM: the run saves after its current iteration and ends. A second Ctrl-C ends it at
-// once.
-std::atomic<bool> stop_requested{false};
-
-void request_stop(int signal_number) {
-  stop_requested = true;
-  std::signal(signal_number, SIG_DFL);
-}
 
 struct TrainArguments {
   std::string data;
@@ -75,12 +67,13 @@ std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& argument
 // A training and those who watch it in a browser.
 class Watched {
  public:
-  Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where)
+  Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where,
+          std::atomic<bool>& stop)
       : view_(arguments.view_options,
               serve::make_setting("training", run_name(arguments.output), &trainer.capture(),
                                   trainer.scene().normalisation),
               {[&trainer] { return stage_of(trainer); }, [&trainer] { trainer.save(); },
-               [&trainer](const events::Event& event) { trainer.stream().emit(event); }, &stop_requested}) {
+               [&trainer](const events::Event& event) { trainer.stream().emit(event); }, &stop}) {
     view_.recall(read_log(RunFolder{arguments.output}.log()));
     server_ = where.start(view_.room());
     trainer.stream().listen([this](const events::Event& event) { view_(event); });
@@ -88,15 +81,15 @@ class Watched {
 
   // After the training, for as long as somebody looks.
   void stay(bool quiet) {
-    if (view_.is_alone() || stop_requested) return;
+    if (view_.is_alone()) return;
     if (!quiet) fmt::print(stderr, "still shown to those who look; Ctrl-C ends it\n");
     view_.stay();
   }
 
  private:
   static serve::Stage stage_of(const Trainer& trainer) {
-    return {trainer.scene(), trainer.options().render, picture_request(trainer.options(), trainer.iteration()),
-            trainer.iteration()};
+    return {trainer.scene(), trainer.options().render,
+            picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
   }
 
   serve::LiveView view_;
@@ -120,13 +113,12 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
   trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
   if (checkpoint) trainer.resume();
+  std::atomic<bool>& stop = stop_on_signals();
   std::optional<Watched> watched;
-  if (arguments.view) watched.emplace(trainer, arguments, where);
+  if (arguments.view) watched.emplace(trainer, arguments, where, stop);
 
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
-  const events::Finished end = trainer.run(stop_requested);
-  if (watched) watched->stay(arguments.quiet);
+  const events::Finished end = trainer.run(stop);
+  if (watched && !stop) watched->stay(arguments.quiet);
   if (end.ending == events::Ending::diverged) end_with(exit_diverged, arguments, end);
   if (end.ending == events::Ending::out_of_memory) end_with(exit_memory, arguments, end);
   if (end.ending == events::Ending::interrupted) end_with(exit_interrupted, arguments, end);
@@ -148,7 +140,8 @@ void add_train(CLI::App& program) {
       ->capture_default_str();
   verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint");
   verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
-  CLI::Option* view = verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
+  CLI::Option* view =
+      verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
   verb->add_option("--view-share", arguments->view_options.share,
                    "Share of the time that the page may take while somebody looks")
       ->needs(view)

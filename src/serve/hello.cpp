@@ -5,6 +5,7 @@
 #include "base/version.h"
 #include "serve/look_camera.h"
 #include "show/aim.h"
+#include "show/colour_map.h"
 #include "show/layers.h"
 #include "show/orbit.h"
 

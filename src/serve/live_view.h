@@ -11,7 +11,8 @@
 namespace traceflow::serve {
 
 struct ViewOptions {
-  double share = 0.25;  // of the training's time that pages may take while somebody looks, above 0 and under 1
+  double share =
+      0.25;  // of the training's time that pages may take while somebody looks, above 0 and under 1
 
   void validate() const;
 };

@@ -8,7 +8,6 @@
 #include "files/png.h"
 #include "serve/hello.h"
 #include "serve/look_camera.h"
-#include "show/camera_path.h"
 #include "show/probe.h"
 
 namespace traceflow::serve {
@@ -184,14 +183,8 @@ void Projector::answer(const Job& job, const Photo& photo, const Stage&) {
 
 void Projector::answer(const Job& job, const Path& path, const Stage& stage) {
   const SceneNormalisation& normalisation = stage.scene.normalisation;
-  Json shots = Json::array();
-  for (const show::Shot& shot :
-       show::shots_of(show::parse_camera_path(path.path, "camera path"), normalisation)) {
-    shots.push_back(
-        {{"camera", to_json(free_camera(shot.camera, normalisation))}, {"time", shot.time.value_or(0.0F)}});
-  }
-  audience_.reply(job.guest,
-                  text_message(dump({{"type", "path"}, {"id", path.id}, {"shots", std::move(shots)}})));
+  static_cast<void>(normalisation);
+  audience_.refuse(job.guest, "path", path.id, "not yet");
 }
 
 void Projector::answer(const Job& job, const ProbeJob& probe, const Stage& stage) {

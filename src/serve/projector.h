@@ -20,8 +20,8 @@ class Projector {
   void greet(const Stage& stage);
   // One job of the audience. What goes wrong is told to the pages in words; nothing is thrown.
   void answer(const Job& job, const Stage& stage);
-  // The scene is about to change, or is another one: what is remembered of it is forgotten, and memory given back that a
-  // training may need, on the CUDA device.
+  // The scene is about to change, or is another one: what is remembered of it is forgotten, and memory given
+  // back that a training may need, on the CUDA device.
   void scene_changed(Device device);
   // It is another scene from now on.
   void forget();
@@ -43,7 +43,7 @@ class Projector {
   Audience& audience_;
   Setting setting_;
   std::unique_ptr<Renderer> renderer_;
-  bool posed_ = false;  // the renderer has seen the scene as it is now
+  bool posed_ = false;                          // the renderer has seen the scene as it is now
   std::map<uint64_t, show::Painter> painters_;  // of every page, whose ranges follow what it sees
 };
 

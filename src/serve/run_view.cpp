@@ -14,7 +14,8 @@ constexpr auto between_looks = 1s;
 
 }  // namespace
 
-RunView::RunView(Setting setting, Shown shown) : setting_(setting), projector_(audience_, std::move(setting)) {
+RunView::RunView(Setting setting, Shown shown)
+    : setting_(setting), projector_(audience_, std::move(setting)) {
   take(std::move(shown));
 }
 
@@ -27,7 +28,8 @@ void RunView::take(Shown shown) {
   shown_ = std::move(shown);
   projector_.greet(stage());
   const Scene& scene = shown_.subject.scene;
-  audience_.set_state({false, true, shown_.iteration, shown_.iterations, scene.main.count(), scene.environment.count()});
+  audience_.set_state(
+      {false, true, shown_.iteration, shown_.iterations, scene.main.count(), scene.environment.count()});
   audience_.scene_changed({});
 }
 
@@ -42,18 +44,19 @@ void RunView::look_after_run() {
   if (!watch_ || Audience::Clock::now() - looked_ < between_looks) return;
   looked_ = Audience::Clock::now();
   const RunWatch::Change change = watch_->look();
-  std::string trouble;
+  if (change.returned) trouble_.clear();
   if (change.vanished) {
-    trouble = "The run is gone from " + folder_.folder.string() + ". What is shown was read before.";
+    trouble_ = "The run is gone from " + folder_.folder.string() + ". What is shown was read before.";
   } else if (change.saved) {
     try {
       take(reread_());
+      trouble_.clear();
     } catch (const InputError& error) {
-      trouble = std::string("The run cannot be read any more. ") + error.what();
+      trouble_ = std::string("The run cannot be read any more. ") + error.what();
     }
   }
   if (change.logged) audience_.tell(lines_of(thinned(read_log(folder_.log()))), true);
-  audience_.tell_trouble("the run", trouble);
+  audience_.tell_trouble("the run", trouble_);
 }
 
 void RunView::run(const std::atomic<bool>& stop) {

@@ -10,8 +10,8 @@
 
 namespace traceflow::serve {
 
-// Shows a scene that is not being trained by this program. A run that another process trains is followed: its newest
-// checkpoint is shown and its log goes on.
+// Shows a scene that is not being trained by this program. A run that another process trains is followed: its
+// newest checkpoint is shown and its log goes on.
 class RunView {
  public:
   // What is shown and how far it was trained.

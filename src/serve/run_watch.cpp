@@ -18,6 +18,8 @@ RunWatch::Change RunWatch::look() {
   const Version checkpoint = version_of(run_.checkpoint());
   // While a checkpoint is renamed to the one before, only that one is there.
   change.vanished = checkpoint.size < 0 && version_of(run_.previous_checkpoint()).size < 0;
+  change.returned = gone_ && !change.vanished;
+  gone_ = change.vanished;
   change.saved = checkpoint.size >= 0 && checkpoint != checkpoint_;
   if (checkpoint.size >= 0) checkpoint_ = checkpoint;
   const Version log = version_of(run_.log());

@@ -18,6 +18,7 @@ class RunWatch {
 
   struct Change {
     bool vanished = false;  // the run's checkpoints are not there
+    bool returned = false;  // they are there again
     bool saved = false;     // there is another checkpoint than the last time
     bool logged = false;    // the log has become longer, or another one
   };
@@ -34,6 +35,7 @@ class RunWatch {
 
   RunFolder run_;
   Version checkpoint_, log_;
+  bool gone_ = false;
 };
 
 }  // namespace traceflow::serve

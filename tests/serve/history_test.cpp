@@ -49,16 +49,19 @@ TEST(History, ThinsTheStepsOfALongRunAndNothingElse) {
 
 TEST(History, PassesByWhatIsNoEvent) {
   History history;
-  for (const char* line : {"", "x", "{}", "[1]", R"({"event":"step"})", R"({"event":"step","iteration":"1"})"})
+  for (const char* line :
+       {"", "x", "{}", "[1]", R"({"event":"step"})", R"({"event":"step","iteration":"1"})"})
     history.add(line);
   EXPECT_TRUE(history.lines().empty());
 }
 
 TEST(History, TellsAMessageOfItsLines) {
   EXPECT_EQ(json::parse(events_text({step(1), step(2)}, true)),
-            json::parse(R"({"type":"events","events":[{"event":"step","iteration":1},{"event":"step","iteration":2}],
+            json::parse(
+                R"({"type":"events","events":[{"event":"step","iteration":1},{"event":"step","iteration":2}],
                 "reset":true})"));
-  EXPECT_EQ(json::parse(events_text({}, false)), json::parse(R"({"type":"events","events":[],"reset":false})"));
+  EXPECT_EQ(json::parse(events_text({}, false)),
+            json::parse(R"({"type":"events","events":[],"reset":false})"));
 }
 
 }  // namespace
