@@ -1,6 +1,5 @@
 #include "serve/net/connection.h"
 
-#include <array>
 #include <boost/asio/write.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/read.hpp>
@@ -83,17 +82,10 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
     read();
   }
 
-  // Closing while the other side still sends would take the answer from it: read on for a moment.
   void on_sent_last(error_code error) {
     if (error) return end();
-    stream_.shutdown(Stream::shutdown_send, error);
     deadline_.set(common_.limits.linger, weak_from_this());
-    drain({});
-  }
-
-  void drain(error_code error) {
-    if (error) return end();
-    stream_.async_read_some(asio::buffer(unheard_), step(*this, &Connection::drain));
+    farewell_.begin(*this, stream_);
   }
 
   Stream stream_;
@@ -102,7 +94,7 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
   boost::beast::flat_buffer buffer_;
   std::optional<Parser> parser_;
   std::string out_;
-  std::array<char, 4096> unheard_{};
+  Farewell<Connection> farewell_;
   bool full_;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <boost/asio/basic_stream_socket.hpp>
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/io_context.hpp>
@@ -16,10 +17,15 @@
 // Boost's headers are many: this one is for the files that carry connections alone.
 namespace traceflow::serve {
 
-// Any stream of bytes: TCP, or what tests put in its place. Bound to the one thread that runs everything
-// here.
+// Everything here runs on the one thread of an io_context.
 using Executor = boost::asio::io_context::executor_type;
-using Stream = boost::asio::basic_stream_socket<boost::asio::generic::stream_protocol, Executor>;
+
+// Any stream of bytes: TCP, or what stands in for it. A class of its own, so that async_teardown() of
+// socket.cpp is found.
+class Stream : public boost::asio::basic_stream_socket<boost::asio::generic::stream_protocol, Executor> {
+ public:
+  using basic_stream_socket::basic_stream_socket;
+};
 using Timer =
     boost::asio::basic_waitable_timer<std::chrono::steady_clock,
                                       boost::asio::wait_traits<std::chrono::steady_clock>, Executor>;
@@ -61,6 +67,30 @@ class Deadline {
 
  private:
   Timer timer_;
+};
+
+// After the last words of a connection: what the other side still sends is read for a moment, as closing the
+// connection at once would take those words from it.
+template <class Session>
+class Farewell {
+ public:
+  void begin(Session& session, Stream& stream) {
+    boost::system::error_code ignored;
+    stream.shutdown(Stream::shutdown_send, ignored);
+    read(session, stream);
+  }
+
+ private:
+  void read(Session& session, Stream& stream) {
+    stream.async_read_some(
+        boost::asio::buffer(unheard_),
+        [this, &stream, self = session.shared_from_this()](const boost::system::error_code& error, size_t) {
+          if (error) return self->end();
+          read(*self, stream);
+        });
+  }
+
+  std::array<char, 4096> unheard_{};
 };
 
 }  // namespace traceflow::serve

@@ -11,6 +11,14 @@
 
 namespace traceflow::serve {
 
+// Beast's last step on a connection that is over. Its own would wait for the other side without end; see
+// Farewell.
+template <class Handler>
+void async_teardown(boost::beast::role_type /*role*/, Stream& stream, Handler&& handler) {
+  boost::asio::post(stream.get_executor(),
+                    [done = std::forward<Handler>(handler)]() mutable { done(boost::system::error_code()); });
+}
+
 namespace {
 
 namespace asio = boost::asio;
@@ -31,7 +39,7 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
 
   void start() {
     websocket::stream_base::timeout times{};
-    times.handshake_timeout = common_.limits.request;  // of closing too
+    times.handshake_timeout = common_.limits.request;
     times.idle_timeout = common_.limits.silence;
     times.keep_alive_pings = true;
     stream_.set_option(times);
@@ -72,7 +80,7 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
   void read() { stream_.async_read(heard_, step(*this, &Socket::on_heard)); }
 
   void on_heard(error_code error) {
-    if (error) return end();
+    if (error) return say_farewell();
     if (!mailbox_) return;
     if (stream_.got_binary()) return close(websocket::close_code::unknown_data, "messages are text");
     const std::string_view text(static_cast<const char*>(heard_.data().data()), heard_.size());
@@ -82,8 +90,9 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
   }
 
   void flush(error_code /*none*/) {
-    if (!mailbox_ || sending_.bytes) return;
+    if (!mailbox_) return;
     if (mailbox_->overflowed()) return end();
+    if (sending_.bytes) return;
     auto next = mailbox_->take();
     if (!next) return;
     sending_ = std::move(*next);
@@ -101,9 +110,9 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
   }
 
   void on_sent(error_code error) {
+    if (!mailbox_) return;
     deadline_.clear();
     if (error) return end();
-    if (!mailbox_) return;
     if (sent_ < sending_.bytes->size()) return send_piece();
     sending_ = {};
     flush({});
@@ -123,7 +132,7 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
 
   void close(websocket::close_code code, std::string_view why) {
     leave();
-    deadline_.clear();
+    deadline_.set(common_.limits.linger, weak_from_this());
     websocket::close_reason reason(code);
     size_t size = std::min(why.size(), reason.reason.max_size());
     // Not in the middle of a character.
@@ -132,7 +141,13 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
     stream_.async_close(reason, step(*this, &Socket::on_closed));
   }
 
-  void on_closed(error_code /*any*/) { end(); }
+  void on_closed(error_code /*any*/) { say_farewell(); }
+
+  void say_farewell() {
+    leave();
+    deadline_.set(common_.limits.linger, weak_from_this());
+    farewell_.begin(*this, stream_.next_layer());
+  }
 
   void leave() {
     if (!mailbox_) return;
@@ -146,7 +161,8 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
 
   websocket::stream<Stream, false> stream_;  // false: without compression, as pictures are compressed already
   Common& common_;
-  Deadline deadline_;
+  Deadline deadline_;  // of a piece, then of the end
+  Farewell<Socket> farewell_;
   ParsedRequest request_;
   boost::beast::flat_buffer heard_;
   uint64_t guest_ = 0;

@@ -179,7 +179,9 @@ TEST(Server, TurnsAwayMoreThanItsConnections) {
 }
 
 TEST(Server, ManyConnectionsAtOnceEndNothing) {
-  const House house;
+  Limits limits;
+  limits.linger = milliseconds(100);
+  const House house(limits);
   std::vector<Client> crowd;
   for (int i = 0; i < 100; ++i) crowd.emplace_back(house.server.port());
   int ended = 0;

@@ -15,6 +15,14 @@ Outgoing outgoing(std::string text, bool binary = false) {
   return {std::make_shared<const std::string>(std::move(text)), binary};
 }
 
+// No limit of time but those that a test sets: what else would end a connection must not.
+Limits patient() {
+  Limits limits;
+  limits.request = limits.piece = limits.silence = std::chrono::hours(1);
+  limits.linger = milliseconds(100);
+  return limits;
+}
+
 int close_code(const std::optional<Frame>& frame) {
   if (!frame || frame->opcode != 8 || frame->payload.size() < 2) return 0;
   return static_cast<unsigned char>(frame->payload[0]) << 8 | static_cast<unsigned char>(frame->payload[1]);
@@ -120,7 +128,7 @@ TEST(Socket, CarriesBigPictures) {
 }
 
 TEST(Socket, KeepsTheOrderOfThousandsFromSeveralThreads) {
-  Limits limits;
+  Limits limits = patient();
   limits.waiting_messages = 100'000;
   House house(limits);
   SocketClient guest = house.guest();
@@ -184,7 +192,7 @@ TEST(Socket, RefusesMessagesThatAreNotText) {
 }
 
 TEST(Socket, RefusesWhatBreaksTheProtocol) {
-  House house;
+  House house(patient());
   const auto code_after = [&](auto send) {
     SocketClient guest = house.guest();
     send(guest);
@@ -235,7 +243,7 @@ TEST(Socket, SendingIsHarmlessWhenTheServerIsGone) {
 }
 
 TEST(Socket, DropsAGuestThatDoesNotAnswerPings) {
-  Limits limits;
+  Limits limits = patient();
   limits.silence = milliseconds(200);
   House house(limits);
   SocketClient deaf = house.guest();
@@ -247,7 +255,7 @@ TEST(Socket, DropsAGuestThatDoesNotAnswerPings) {
 }
 
 TEST(Socket, DropsAGuestThatDoesNotRead) {
-  Limits limits;
+  Limits limits = patient();
   limits.piece = milliseconds(200);
   House house(limits);
   SocketClient idle = house.guest();
@@ -257,7 +265,7 @@ TEST(Socket, DropsAGuestThatDoesNotRead) {
 }
 
 TEST(Socket, DropsAGuestForWhomTooMuchWaits) {
-  Limits limits;
+  Limits limits = patient();
   limits.waiting_messages = 10;
   House house(limits);
   SocketClient slow = house.guest();
@@ -270,7 +278,7 @@ TEST(Socket, DropsAGuestForWhomTooMuchWaits) {
 }
 
 TEST(Socket, DropsAHandshakeThatTricklesIn) {
-  Limits limits;
+  Limits limits = patient();
   limits.request = milliseconds(200);
   const House house(limits);
   Client slow(house.server.port());
