@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "base/parallel.h"
+#include "show/ellipses.h"
 
 namespace traceflow::show {
 
@@ -15,6 +16,14 @@ Tensor<float> divided(Tensor<float> depth, double scale) {
 }
 
 }  // namespace
+
+bool has_colours(Layer layer) {
+  constexpr std::array<Layer, 5> colours = {Layer::rgb, Layer::diffuse, Layer::specular, Layer::normal,
+                                            Layer::surfels};
+  return std::find(colours.begin(), colours.end(), layer) != colours.end();
+}
+
+bool needs_reflections(Layer layer) { return layer == Layer::rgb || layer == Layer::specular; }
 
 std::vector<Layer> parse_layers(const std::string& list) {
   std::vector<Layer> layers;
@@ -57,6 +66,8 @@ Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
       return divided(frame.raster.median_depth.on(Device::cpu), scale);
     case Layer::distortion:
       return frame.raster.distortion.on(Device::cpu);
+    case Layer::surfels:
+      return surfel_ellipses(frame.main, frame.camera, frame.drawn_with);
   }
   return {};
 }

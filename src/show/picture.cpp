@@ -89,6 +89,7 @@ Tensor<uint8_t> Painter::paint(Layer layer, const Tensor<float>& values) {
     case Layer::rgb:
     case Layer::diffuse:
     case Layer::specular:
+    case Layer::surfels:
       break;
   }
   if (options_.exposure == 0) return to_8bit(values);
