@@ -17,8 +17,8 @@ using serve::testing::Received;
 void make_frame(Audience& audience, const Job& job) {
   const FrameJob& frame = std::get<FrameJob>(job.what);
   const double divisor = frame.coarseness.divisor;
-  audience.show_frame(job, {{"type", "frame"}, {"look", frame.look.id}, {"final", frame.coarseness.final}}, "picture",
-                      96 * 64 / (divisor * divisor), 1e-4);
+  audience.show_frame(job, {{"type", "frame"}, {"look", frame.look.id}, {"final", frame.coarseness.final}},
+                      "picture", 96 * 64 / (divisor * divisor), 1e-4);
 }
 
 // Serves a page until nothing is left to do; returns the frames' coarseness.
@@ -46,10 +46,12 @@ TEST(Audience, TellsANewcomerWhatThereIs) {
   audience.set_state({false, false, 4, 10, 100, 20});
   const FakePage page(audience, 1);
   EXPECT_THAT(types(page), ::testing::ElementsAre("hello", "events", "trouble", "state"));
-  EXPECT_EQ(page.of("events")[0].json, json::parse(R"({"type":"events","events":[{"event":"saved","iteration":4}],
+  EXPECT_EQ(page.of("events")[0].json,
+            json::parse(R"({"type":"events","events":[{"event":"saved","iteration":4}],
       "reset":true})"));
   EXPECT_EQ(page.of("trouble")[0].json["text"], "It is full.");
-  EXPECT_EQ(page.of("state")[0].json, json::parse(R"({"type":"state","paused":false,"over":false,"iteration":4,
+  EXPECT_EQ(page.of("state")[0].json,
+            json::parse(R"({"type":"state","paused":false,"over":false,"iteration":4,
       "iterations":10,"surfels":{"main":100,"environment":20},"viewers":1})"));
 }
 

@@ -47,9 +47,9 @@ class FakePage {
   bool wait_for(const std::string& type, size_t count) {
     std::unique_lock lock(mutex_);
     return changed_.wait_for(lock, std::chrono::seconds(60), [&] {
-      return std::count_if(received_.begin(), received_.end(),
-                           [&](const Received& r) { return r.json["type"] == type; }) >=
-             static_cast<std::ptrdiff_t>(count);
+      return std::count_if(received_.begin(), received_.end(), [&](const Received& r) {
+               return r.json["type"] == type;
+             }) >= static_cast<std::ptrdiff_t>(count);
     });
   }
   // Says that all frames so far have been shown.
@@ -65,7 +65,8 @@ class FakePage {
     const std::string& bytes = *message.bytes;
     if (message.binary) {
       size_t length = 0;
-      for (size_t i = 0; i < 4; ++i) length |= static_cast<size_t>(static_cast<unsigned char>(bytes.at(i))) << (8 * i);
+      for (size_t i = 0; i < 4; ++i)
+        length |= static_cast<size_t>(static_cast<unsigned char>(bytes.at(i))) << (8 * i);
       received.json = nlohmann::json::parse(bytes.substr(4, length));
       received.picture = bytes.substr(4 + length);
     } else {
@@ -85,17 +86,17 @@ class FakePage {
 };
 
 inline nlohmann::json look(int64_t id, bool moving = false) {
-  return {{"type", "look"},
-          {"id", id},
-          {"camera",
-           {{"position", {0, 0, -3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {"fov_y", 45}}},
-          {"time", 0},
-          {"width", 96},
-          {"height", 64},
-          {"layer", "rgb"},
-          {"exposure", 0},
-          {"map", "viridis"},
-          {"moving", moving}};
+  return {
+      {"type", "look"},
+      {"id", id},
+      {"camera", {{"position", {0, 0, -3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {"fov_y", 45}}},
+      {"time", 0},
+      {"width", 96},
+      {"height", 64},
+      {"layer", "rgb"},
+      {"exposure", 0},
+      {"map", "viridis"},
+      {"moving", moving}};
 }
 
 }  // namespace traceflow::serve::testing
