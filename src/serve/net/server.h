@@ -17,7 +17,7 @@ struct ServerOptions {
   int port = 0;                    // 0: any that is free
   std::vector<std::string>
       allowed_hosts;     // NAME:PORT that the page may be asked for under, beside the bound address
-  int connections = 16;  // at a time; a page takes one, and a few more while it loads
+  int connections = 32;  // at a time; a page takes one, and a few more while it loads
 
   // Throws InputError.
   void validate() const;
