@@ -115,7 +115,7 @@ if (source === 'training') {
     publish(training.advance());
     if (training.iteration === before) return;
     tell_state();
-    guests.forEach((guest) => guest.refresh());
+    if (training.iteration % 100 === 0) guests.forEach((guest) => guest.refresh());
   }, 400);
 }
 

@@ -83,13 +83,12 @@ function Rays() {
 }
 
 function Pin({ ray, name }: { ray: Ray; name: string }) {
-  const reach = ray.mirrored && ray.mirrored.distance > 0 ? figure(ray.mirrored.distance) : '–';
+  const reach = ray.mirrored && ray.mirrored.distance > 0 ? `meets at ${figure(ray.mirrored.distance)}` : 'meets nothing';
   return (
     <li>
       <b>{name}</b>
-      <span title="Depth">{ray.depth === undefined ? '–' : figure(ray.depth)} deep</span>
-      <span title="Tint">tint {ray.tint === undefined ? '–' : ray.tint.toFixed(2)}</span>
-      <span title="Length of the mirrored ray">{reach} on</span>
+      <span>tint {ray.tint === undefined ? '–' : ray.tint.toFixed(2)}</span>
+      <span>{reach}</span>
       <Button id="unpin" label={`Take ${name} away`} icon="close" kind="quiet" iconOnly onPress={() => unpin(ray)} />
     </li>
   );
