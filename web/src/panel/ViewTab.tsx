@@ -1,10 +1,9 @@
-import { Button, Choice, Section, Segments, Slider } from '../parts/controls.tsx';
-import { signed, title } from '../parts/format.ts';
+import { Button, Choice, Section, Segments, Slider, Switch } from '../parts/controls.tsx';
+import { figure, signed, title } from '../parts/format.ts';
 import { comparing, exposure, hello, layer, map, rays_on } from '../state/store.ts';
 import { pinned, toggle_rays, unpin, unpin_all, type Ray } from '../state/rays.ts';
 import { size_of, still_size, still_sizes, still_wanted, take_still, type StillSize } from '../state/still.ts';
 import { moving } from '../stage/looking.ts';
-import { figure } from '../parts/format.ts';
 
 export function ViewTab() {
   return (
@@ -62,7 +61,7 @@ function Rays() {
   return (
     <Section
       title="Reflection rays"
-      aside={<Button id="rays-panel" label={rays_on.value ? 'On' : 'Off'} pressed={rays_on.value} keys="T" onPress={toggle_rays} />}
+      aside={<Switch id="rays-panel" label="Show" on={rays_on.value} onChange={toggle_rays} />}
     >
       {pinned.value.length === 0 ? (
         <p class="hint">

@@ -39,8 +39,7 @@ export function StatusLine() {
             </span>
           )}
           <span>
-            <b>{count(s.surfels.main)}</b>
-            {s.surfels.environment > 0 && <b> + {count(s.surfels.environment)}</b>} surfels
+            <b>{[s.surfels.main, s.surfels.environment].filter((n) => n > 0).map(count).join(' + ') || '0'}</b> surfels
           </span>
           <span>
             <b>{s.viewers}</b> {s.viewers === 1 ? 'viewer' : 'viewers'}
