@@ -8,6 +8,7 @@
 #include "base/option_fields.h"
 #include "base/parallel.h"
 #include "base/profile.h"
+#include "base/version.h"
 #include "cli/error_boundary.h"
 #include "cli/option_page.h"
 #include "cli/verbs.h"
@@ -24,7 +25,7 @@ struct GlobalArguments {
 };
 
 void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
-  program.set_version_flag("--version", "traceflow " TRACEFLOW_VERSION);
+  program.set_version_flag("--version", std::string("traceflow ") + version());
   program.add_flag("--help-options", arguments.help_options,
                    "Print every option of --set and --config, and exit");
   program

@@ -26,7 +26,9 @@ class Progress {
   void show(const events::PhaseEntered& e);
   void show(const events::Evaluated& e);
   void show(const events::Warning& e);
+  void show(const events::Paused& e);
   void show(const events::Saved& e);
+  void show(const events::Measured& e);
   void show(const events::Finished& e);
   // A line of its own, above the redrawn one.
   void print_line(const std::string& text);

@@ -117,7 +117,7 @@ class PngReader {
 };
 
 struct PngSink {
-  std::vector<std::byte> bytes;
+  std::string bytes;
   std::string error;
 };
 
@@ -130,8 +130,7 @@ void write_bytes(png_structp png, png_bytep bytes, size_t count) {
   auto* sink = static_cast<PngSink*>(png_get_io_ptr(png));
   bool ok = true;
   try {
-    const auto* begin = reinterpret_cast<const std::byte*>(bytes);
-    sink->bytes.insert(sink->bytes.end(), begin, begin + count);
+    sink->bytes.append(reinterpret_cast<const char*>(bytes), count);
   } catch (const std::exception&) {
     ok = false;
   }
@@ -150,16 +149,8 @@ bool encode(png_structp png, png_infop info, png_uint_32 width, png_uint_32 heig
   return true;
 }
 
-}  // namespace
-
-Tensor<uint8_t> read_png(const std::filesystem::path& path) {
-  PngReader reader(path);
-  return reader.read_pixels(reader.read_header());
-}
-
-PngSize read_png_size(const std::filesystem::path& path) { return PngReader(path).read_header(); }
-
-void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels) {
+// where: for errors.
+std::string encoded(const std::string& where, const Tensor<uint8_t>& pixels) {
   const int rank = pixels.shape().rank();
   require(rank == 2 || (rank == 3 && pixels.dim(2) >= 1 && pixels.dim(2) <= 4),
           "an image is H×W or H×W×C, C ≤ 4", pixels.shape().to_string());
@@ -183,9 +174,24 @@ void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels)
   const bool ok = encode(png, info, static_cast<png_uint_32>(pixels.dim(1)),
                          static_cast<png_uint_32>(pixels.dim(0)), colour_types[channels - 1], rows.data());
   png_destroy_write_struct(&png, &info);
-  if (!ok) throw InputError(path.string(), "", sink.error, "an image of at most 32,768 pixels a side");
-  write_atomically(path, sink.bytes);
+  if (!ok) throw InputError(where, "", sink.error, "an image of at most 32,768 pixels a side");
+  return std::move(sink.bytes);
 }
+
+}  // namespace
+
+Tensor<uint8_t> read_png(const std::filesystem::path& path) {
+  PngReader reader(path);
+  return reader.read_pixels(reader.read_header());
+}
+
+PngSize read_png_size(const std::filesystem::path& path) { return PngReader(path).read_header(); }
+
+void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels) {
+  write_atomically(path, std::string_view(encoded(path.string(), pixels)));
+}
+
+std::string png_bytes(const Tensor<uint8_t>& pixels) { return encoded("PNG", pixels); }
 
 Tensor<uint8_t> to_8bit(const Tensor<float>& image) {
   Tensor<uint8_t> result;

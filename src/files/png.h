@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 
 #include "base/tensor.h"
 #include "files/eight_bit.h"
@@ -19,6 +20,8 @@ struct PngSize {
 PngSize read_png_size(const std::filesystem::path& path);
 // pixels: H×W (grey) or H×W×C. Written atomically.
 void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels);
+// The file's bytes. Throws InputError for more than 32,768 pixels a side.
+std::string png_bytes(const Tensor<uint8_t>& pixels);
 
 // Whole images, on the host.
 Tensor<uint8_t> to_8bit(const Tensor<float>& image);

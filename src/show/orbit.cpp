@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "show/aim.h"
+
 namespace traceflow::show {
 
 namespace {
@@ -21,55 +23,19 @@ struct Circle {
   double swing = pi;  // largest angle to either side; pi goes round
 };
 
-V unit(const V& v, const V& otherwise) {
-  const double length = std::sqrt(dot(v, v));
-  return length > 1e-9 && std::isfinite(length) ? v / length : otherwise;
-}
-
 // Any unit vector at right angles to the unit vector v.
 V perpendicular(const V& v) {
   const V axis = std::abs(v.x) < 0.5 ? V{1, 0, 0} : V{0, 0, 1};
   return unit(cross(v, cross(axis, v)), V{0, 0, 1});
 }
 
-// Rows of camera_from_world are the camera's axes in world.
-V axis_of(const Camera<float>& camera, int row) {
-  const Mat3<float>& r = camera.camera_from_world;
-  return {r[0][row], r[1][row], r[2][row]};
-}
-
-// The point nearest to all optical axes in the least-squares sense; a little ridge keeps parallel axes
-// solvable.
-V point_looked_at(const std::vector<Camera<float>>& cameras, double spread) {
-  Mat3<double> a(1e-6);
-  V middle(0), b(0);
-  for (const Camera<float>& c : cameras) middle += V(c.position) / static_cast<double>(cameras.size());
-  V forward(0);
-  for (const Camera<float>& c : cameras) {
-    const V d = axis_of(c, 2);
-    const Mat3<double> project = Mat3<double>(1.0) - outerProduct(d, d);
-    a += project;
-    b += project * (V(c.position) - middle);
-    forward += d;
-  }
-  const V point = middle + inverse(a) * b;
-  double ahead = 0;
-  for (const Camera<float>& c : cameras) ahead += dot(point - V(c.position), axis_of(c, 2));
-  if (ahead > 0 && std::isfinite(ahead)) return point;
-  return middle + unit(forward, V{0, 0, 1}) * spread;
-}
-
 Circle circle_from(const std::vector<Camera<float>>& cameras) {
-  V middle(0), down(0);
-  for (const Camera<float>& c : cameras) {
-    middle += V(c.position) / static_cast<double>(cameras.size());
-    down += axis_of(c, 1);
-  }
-  double spread = 0;
-  for (const Camera<float>& c : cameras) spread = std::max(spread, length(V(c.position) - middle));
+  V middle(0);
+  for (const Camera<float>& c : cameras) middle += V(c.position) / static_cast<double>(cameras.size());
+  const Aim aim = aim_of(cameras);
   Circle circle;
-  circle.up = unit(-down, V{0, -1, 0});
-  circle.target = point_looked_at(cameras, std::max(1.0, spread));
+  circle.up = aim.up;
+  circle.target = aim.target;
 
   double radius = 0, height = 0;
   for (const Camera<float>& c : cameras) {
@@ -117,23 +83,6 @@ std::vector<Shot> path(const Camera<float>& like, const Circle& circle, int fram
   return shots;
 }
 
-// Middle value per axis, which a few strays do not move.
-V median_point(const Tensor<float>& points) {
-  V median(0);
-  std::vector<float> values;
-  for (int axis = 0; axis < 3; ++axis) {
-    values.clear();
-    for (int64_t i = 0; i < points.dim(0); ++i) {
-      if (std::isfinite(points(i, axis))) values.push_back(points(i, axis));
-    }
-    if (values.empty()) continue;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
-  }
-  return median;
-}
-
 }  // namespace
 
 std::vector<Shot> orbit_around_cameras(const std::vector<Camera<float>>& cameras, int frames) {
@@ -143,7 +92,7 @@ std::vector<Shot> orbit_around_cameras(const std::vector<Camera<float>>& cameras
 
 std::vector<Shot> orbit_around_points(const Tensor<float>& points, int width, int height, int frames) {
   Circle circle;
-  circle.target = points.empty() ? V(0) : median_point(points);
+  circle.target = median_point(points);
   std::vector<double> distances;
   for (int64_t i = 0; i < (points.empty() ? 0 : points.dim(0)); ++i) {
     const double d = length(load3<double>(points.row(i)) - circle.target);

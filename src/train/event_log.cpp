@@ -15,6 +15,14 @@ Json to_json(const events::SurfelCounts& counts) {
   return {{"main", counts.main}, {"environment", counts.environment}};
 }
 
+Json to_json(const Machine& machine) {
+  return {{"processor", machine.processor},
+          {"threads", machine.threads},
+          {"memory_bytes", machine.memory_bytes},
+          {"system", machine.system},
+          {"gpu", machine.gpu}};
+}
+
 Json to_json(const events::Started& e) {
   return {{"event", "started"},
           {"capture", e.capture},
@@ -25,7 +33,9 @@ Json to_json(const events::Started& e) {
           {"threads", e.threads},
           {"seed", e.seed},
           {"surfels", to_json(e.surfels)},
-          {"forecast_bytes", e.forecast_bytes}};
+          {"forecast_bytes", e.forecast_bytes},
+          {"version", e.version},
+          {"machine", to_json(e.machine)}};
 }
 
 Json to_json(const events::Step& e) {
@@ -40,7 +50,8 @@ Json to_json(const events::Step& e) {
           {"psnr", e.psnr},
           {"seconds", e.seconds},
           {"rate", e.rate},
-          {"surfels", to_json(e.surfels)}};
+          {"surfels", to_json(e.surfels)},
+          {"memory_bytes", e.memory_bytes}};
 }
 
 Json to_json(const events::DensityChanged& e) {
@@ -69,8 +80,24 @@ Json to_json(const events::Warning& e) {
   return {{"event", "warning"}, {"iteration", e.iteration}, {"text", e.text}};
 }
 
+Json to_json(const events::Paused& e) {
+  return {{"event", "paused"}, {"iteration", e.iteration}, {"paused", e.paused}};
+}
+
 Json to_json(const events::Saved& e) {
   return {{"event", "saved"}, {"iteration", e.iteration}, {"path", e.path.string()}, {"seconds", e.seconds}};
+}
+
+Json to_json(const events::Measured& e) {
+  Json steps = Json::array();
+  for (const profile::Entry& step : e.steps) {
+    steps.push_back({{"name", step.name}, {"calls", step.calls}, {"seconds", step.seconds}});
+  }
+  return {{"event", "measured"},
+          {"iteration", e.iteration},
+          {"phase", e.phase},
+          {"iterations", e.iterations},
+          {"steps", std::move(steps)}};
 }
 
 const char* name(events::Ending ending) {

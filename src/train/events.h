@@ -8,6 +8,9 @@
 #include <variant>
 #include <vector>
 
+#include "base/machine.h"
+#include "base/profile.h"
+
 // What happens during training, told as it happens. The progress bar, the JSON-lines log and the web viewer
 // listen; training itself prints nothing and knows none of them. Events come from the training thread, in
 // order.
@@ -35,6 +38,8 @@ struct Started {
   uint64_t seed = 0;
   SurfelCounts surfels;
   int64_t forecast_bytes = 0;  // memory that the run takes at most, by its shapes
+  std::string version;         // of the program
+  Machine machine;
 };
 
 // One iteration is done.
@@ -45,9 +50,10 @@ struct Step {
   double loss = 0;          // weighted sum of the terms
   std::vector<Term> terms;  // unweighted
   double psnr = 0;          // dB, of this iteration's view, smoothed over the last ones
-  double seconds = 0;       // of training so far, earlier sessions of a resumed run included
-  double rate = 0;          // iterations a second, over the last ones
+  double seconds = 0;       // of steps and saves so far, earlier sessions of a resumed run included
+  double rate = 0;          // steps a second, over the last ones
   SurfelCounts surfels;
+  int64_t memory_bytes = 0;  // in use: resident, or on the device where training is on CUDA
 };
 
 // Density control has run on one set. Counts are split by cause.
@@ -83,11 +89,26 @@ struct Warning {
   std::string text;  // one line
 };
 
+// Somebody who watches has stopped the training for a while, or lets it go on.
+struct Paused {
+  int64_t iteration = 0;
+  bool paused = false;
+};
+
 // The state of the run is on disk.
 struct Saved {
   int64_t iteration = 0;
   std::filesystem::path path;
   double seconds = 0;  // that saving took
+};
+
+// Where the time of the iterations since the last of these went. On the CPU all are measured; on CUDA, where
+// measuring waits for every kernel, one in a hundred.
+struct Measured {
+  int64_t iteration = 0;
+  std::string phase;                  // that they were of
+  int64_t iterations = 0;             // measured
+  std::vector<profile::Entry> steps;  // of those alone
 };
 
 enum class Ending { completed, interrupted, diverged, out_of_memory };
@@ -96,13 +117,14 @@ enum class Ending { completed, interrupted, diverged, out_of_memory };
 struct Finished {
   Ending ending = Ending::completed;
   int64_t iteration = 0;
-  double seconds = 0;  // of training, earlier sessions of a resumed run included
+  double seconds = 0;  // of steps and saves, earlier sessions of a resumed run included
   double psnr = 0;     // as in the last Step
   SurfelCounts surfels;
   std::string reason;  // one line where the ending is not `completed`
 };
 
-using Event = std::variant<Started, Step, DensityChanged, PhaseEntered, Evaluated, Warning, Saved, Finished>;
+using Event = std::variant<Started, Step, DensityChanged, PhaseEntered, Evaluated, Warning, Paused, Saved,
+                           Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
 // Hands every event to every listener, in the order in which they were added.
@@ -116,13 +138,5 @@ class Stream {
  private:
   std::vector<Listener> listeners_;
 };
-
-// For std::visit with one lambda per kind of event: std::visit(Overloaded{[](const Step& s) {…}, …}, event).
-template <class... Visitors>
-struct Overloaded : Visitors... {
-  using Visitors::operator()...;
-};
-template <class... Visitors>
-Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
 }  // namespace traceflow::events

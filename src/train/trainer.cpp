@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/version.h"
 #include "files/options_json.h"
 #include "ops/loss/rigidity.h"
 #include "render/frame_kernels.h"
@@ -101,7 +102,8 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       cloud_radius_(cloud_radius(capture_.points)),
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
-      renderer_(options.render, memory_.kept) {
+      renderer_(options.render, memory_.kept),
+      meter_(device) {
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
 
@@ -135,6 +137,7 @@ const View& Trainer::draw_view() {
 }
 
 LossTerms Trainer::step() {
+  density_changes_.clear();
   const View& view = draw_view();
   const ViewImages& target = targets_.of(capture_, view);
   const FrameRequest request = request_for(view);
@@ -185,7 +188,7 @@ void Trainer::control_density(int done) {
   const auto tell = [&](events::DensityChanged change, bool reset) {
     change.iteration = done;
     change.opacity_reset = reset;
-    stream_.emit(change);
+    density_changes_.push_back(std::move(change));
   };
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
@@ -209,7 +212,9 @@ void Trainer::control_density(int done) {
   }
 }
 
-events::Step Trainer::step_event(const LossTerms& terms, double seconds) {
+events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
+  const double now = 1.0 / std::max(1e-9, step_seconds);
+  rate_ = rate_ > 0 ? 0.95 * rate_ + 0.05 * now : now;
   events::Step event;
   event.iteration = iteration_;
   event.iterations = options_.iterations;
@@ -223,67 +228,80 @@ events::Step Trainer::step_event(const LossTerms& terms, double seconds) {
                  {"rigidity", terms.rigidity}};
   if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
   event.psnr = health_.smoothed_psnr();
-  event.seconds = seconds;
+  event.seconds = seconds_;
+  event.rate = rate_;
   event.surfels = counts();
+  event.memory_bytes = memory_in_use(device_);
   return event;
 }
 
-events::Finished Trainer::finish(events::Ending ending, const std::string& reason, double seconds) {
-  events::Finished event{ending, iteration_, seconds, health_.smoothed_psnr(), counts(), reason};
+events::Finished Trainer::finish(events::Ending ending, const std::string& reason) {
+  events::Finished event{ending, iteration_, seconds_, health_.smoothed_psnr(), counts(), reason};
   stream_.emit(event);
   return event;
 }
 
-events::Finished Trainer::run(const std::atomic<bool>& stop) {
+void Trainer::tell_measured() {
+  const Phase phase = schedule_.phase(std::max(0, iteration_ - 1));
+  if (const auto measured = meter_.take(iteration_, to_string(phase))) stream_.emit(*measured);
+}
+
+void Trainer::tell_start() {
   stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations,
                                std::string(name_of(device_)), thread_count(),
-                               static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes});
+                               static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes,
+                               version(), this_machine(device_)});
   for (const std::string& warning : capture_.warnings) stream_.emit(events::Warning{iteration_, warning});
   if (memory_.caps.lowered) {
     stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(memory_.caps.main) +
                                                  " main and " + std::to_string(memory_.caps.environment) +
                                                  " environment surfels at most"});
   }
-  const Clock::time_point start = Clock::now();
-  const double before = seconds_;
-  double rate = 0;
-  Clock::time_point last = start;
+}
+
+void Trainer::tell_density() {
+  for (const events::DensityChanged& change : density_changes_) stream_.emit(change);
+  density_changes_.clear();
+}
+
+events::Finished Trainer::run(const std::atomic<bool>& stop) {
+  tell_start();
   while (iteration_ < options_.iterations && !stop) {
     const Phase phase = schedule_.phase(iteration_);
     if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
+      tell_measured();
       stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
     }
     const Draws before_step{random_, views_, iteration_};
     LossTerms terms;
+    const Clock::time_point start = Clock::now();
     try {
+      const StepMeter::Iteration measured(meter_, iteration_);
       terms = step();
     } catch (const std::bad_alloc& error) {
-      seconds_ = before + seconds_since(start);
+      seconds_ += seconds_since(start);
+      tell_density();
       save_after_failure(before_step);
-      return finish(events::Ending::out_of_memory, error.what(), seconds_);
+      return finish(events::Ending::out_of_memory, error.what());
     }
     const std::string trouble = health_.check(terms, non_finite_);
-    seconds_ = before + seconds_since(start);
-
-    events::Step event = step_event(terms, seconds_);
-    const double now = 1.0 / std::max(1e-9, seconds_since(last));
-    last = Clock::now();
-    rate = rate > 0 ? 0.95 * rate + 0.05 * now : now;
-    event.rate = rate;
-    stream_.emit(event);
+    const double step_seconds = seconds_since(start);
+    seconds_ += step_seconds;
+    tell_density();
+    stream_.emit(step_event(terms, step_seconds));
 
     if (!trouble.empty()) {
       // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
       // still good.
       if (health_.sound() || !std::filesystem::exists(run_.checkpoint())) save();
-      return finish(events::Ending::diverged, trouble, seconds_);
+      return finish(events::Ending::diverged, trouble);
     }
     if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && health_.sound()) save();
   }
   save();
   const bool done = iteration_ >= options_.iterations;
   return finish(done ? events::Ending::completed : events::Ending::interrupted,
-                done ? "" : "stopped on request", seconds_);
+                done ? "" : "stopped on request");
 }
 
 Safetensors Trainer::checkpoint() const {
@@ -312,12 +330,15 @@ Safetensors Trainer::checkpoint() const {
 }
 
 void Trainer::save() {
+  tell_measured();
   const Clock::time_point start = Clock::now();
   std::filesystem::create_directories(run_.folder);
   Safetensors file = checkpoint();
   file.metadata["train_seconds"] = std::to_string(seconds_);
   write_checkpoint(run_, file);
-  stream_.emit(events::Saved{iteration_, run_.checkpoint(), seconds_since(start)});
+  const double took = seconds_since(start);
+  seconds_ += took;
+  stream_.emit(events::Saved{iteration_, run_.checkpoint(), took});
 }
 
 void Trainer::save_after_failure(const Draws& before_step) {

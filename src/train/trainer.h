@@ -16,6 +16,7 @@
 #include "train/objective.h"
 #include "train/optimiser.h"
 #include "train/schedule.h"
+#include "train/step_meter.h"
 #include "train/targets.h"
 
 namespace traceflow {
@@ -55,8 +56,13 @@ class Trainer {
   // One iteration of the loop, without saving; returns the loss.
   LossTerms step();
 
+  // Saves what stands. May be called between two iterations, so by a listener.
+  void save();
+
   events::Stream& stream() { return stream_; }
   const Scene& scene() const { return scene_; }
+  const Capture& capture() const { return capture_; }
+  const TrainOptions& options() const { return options_; }
   int iteration() const { return iteration_; }
 
  private:
@@ -69,7 +75,10 @@ class Trainer {
   void learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done);
   SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
-  void save();
+  void tell_start();
+  // Tells what was measured up to here, in the phase of the last iteration.
+  void tell_measured();
+  void tell_density();
   // What a step draws from.
   struct Draws {
     Random random;
@@ -81,8 +90,8 @@ class Trainer {
   void save_after_failure(const Draws& before_step);
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
-  events::Step step_event(const LossTerms& terms, double seconds);
-  events::Finished finish(events::Ending ending, const std::string& reason, double seconds);
+  events::Step step_event(const LossTerms& terms, double step_seconds);
+  events::Finished finish(events::Ending ending, const std::string& reason);
 
   TrainOptions options_;
   Device device_;
@@ -107,8 +116,11 @@ class Trainer {
   LossMeans means_;
   NonFiniteGradients non_finite_;
   events::Stream stream_;
-  int iteration_ = 0;   // done so far
-  double seconds_ = 0;  // of training, earlier sessions included
+  StepMeter meter_;
+  std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
+  int iteration_ = 0;                                    // done so far
+  double seconds_ = 0;  // of steps and saves, earlier sessions included; listeners may take their time
+  double rate_ = 0;     // steps a second, smoothed
 };
 
 }  // namespace traceflow

@@ -72,6 +72,14 @@ RC_GTEST_PROP(Png, write_then_read_is_the_same_image, ()) {
   RC_ASSERT(size.height == shape[0] && size.width == shape[1] && size.channels == shape[2]);
 }
 
+TEST(Png, bytes_are_those_of_the_file) {
+  const TempFolder folder;
+  const Tensor<uint8_t> pixels = random_pixels({7, 9, 3}, 2);
+  write_png(folder / "image.png", pixels);
+  EXPECT_EQ(png_bytes(pixels), bytes_of(folder / "image.png"));
+  EXPECT_THROW(png_bytes(Tensor<uint8_t>({1, 32769})), InputError);
+}
+
 TEST(Png, grey_of_rank_two_reads_as_one_channel) {
   const TempFolder folder;
   Tensor<uint8_t> pixels = random_pixels({3, 5}, 1);

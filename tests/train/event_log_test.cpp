@@ -37,27 +37,40 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   full.seconds = 3;
   full.rate = 2.5;
   full.surfels = {100, 20};
+  full.memory_bytes = 1 << 20;
   const TempFolder folder;
   const auto path = folder / "log.jsonl";
   {
     EventLog log(path);
-    log(events::Started{"plate", "runs/plate", 0, 10, "cpu", 2, 42, {100, 20}, 5 << 20});
+    log(events::Started{"plate",
+                        "runs/plate",
+                        0,
+                        10,
+                        "cpu",
+                        2,
+                        42,
+                        {100, 20},
+                        5 << 20,
+                        "1.2.3",
+                        {"chip", 4, 8192, "Linux", ""}});
     log(full);
     log(events::DensityChanged{8, "main", 1, 2, 3, 4, true, false, 96});
     log(events::PhaseEntered{9, "joint"});
     log(events::Evaluated{9, "test", 5, 20.25, 0.75, 1.5});
     log(events::Warning{9, "a \"quoted\"\nline"});
     log(events::Saved{10, "runs/plate/state.safetensors", 0.5});
+    log(events::Measured{10, "joint", 3, {{"raster", 6, 0.25}, {"trace", 3, 0.5}}});
     log(events::Finished{events::Ending::interrupted, 10, 4, 22, {96, 20}, "SIGTERM"});
   }
   const std::vector<json> written = lines(path);
-  ASSERT_EQ(written.size(), 8U);
+  ASSERT_EQ(written.size(), 9U);
   EXPECT_EQ(written[0], json::parse(R"({"event":"started","capture":"plate","run":"runs/plate","iteration":0,
       "iterations":10,"device":"cpu","threads":2,"seed":42,"surfels":{"main":100,"environment":20},
-      "forecast_bytes":5242880})"));
+      "forecast_bytes":5242880,"version":"1.2.3","machine":{"processor":"chip","threads":4,"memory_bytes":8192,
+      "system":"Linux","gpu":""}})"));
   EXPECT_EQ(written[1],
             json::parse(R"({"event":"step","iteration":7,"iterations":10,"phase":"specular","loss":0.5,
-      "terms":{"l1":0.25,"ssim":1.5},"psnr":21.5,"seconds":3.0,"rate":2.5,"surfels":{"main":100,"environment":20}})"));
+      "terms":{"l1":0.25,"ssim":1.5},"psnr":21.5,"seconds":3.0,"rate":2.5,"surfels":{"main":100,"environment":20},"memory_bytes":1048576})"));
   EXPECT_EQ(written[2],
             json::parse(R"({"event":"density_changed","iteration":8,"set":"main","cloned":1,"split":2,
       "pruned_transparent":3,"pruned_large":4,"opacity_reset":true,"at_cap":false,"count":96})"));
@@ -68,7 +81,9 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   EXPECT_EQ(written[5]["text"], "a \"quoted\"\nline");
   EXPECT_EQ(written[6], json::parse(R"({"event":"saved","iteration":10,"path":"runs/plate/state.safetensors",
       "seconds":0.5})"));
-  EXPECT_EQ(written[7],
+  EXPECT_EQ(written[7], json::parse(R"({"event":"measured","iteration":10,"phase":"joint","iterations":3,
+      "steps":[{"name":"raster","calls":6,"seconds":0.25},{"name":"trace","calls":3,"seconds":0.5}]})"));
+  EXPECT_EQ(written[8],
             json::parse(R"({"event":"finished","ending":"interrupted","iteration":10,"seconds":4.0,
       "psnr":22.0,"surfels":{"main":96,"environment":20},"reason":"SIGTERM"})"));
 }
@@ -107,10 +122,11 @@ TEST(EventStream, CallsListenersInOrder) {
   std::string heard;
   events::Stream stream;
   stream.listen([&](const events::Event&) { heard += "a"; });
-  stream.listen([&](const events::Event& e) { heard += std::to_string(e.index()); });
+  stream.listen(
+      [&](const events::Event& e) { heard += std::holds_alternative<events::Step>(e) ? "s" : "f"; });
   stream.emit(events::Step{});
   stream.emit(events::Finished{});
-  EXPECT_EQ(heard, "a1a7");
+  EXPECT_EQ(heard, "asaf");
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "base/parallel.h"
 #include "support/narrow_lpips.h"
 #include "support/temp_folder.h"
@@ -48,6 +51,66 @@ TEST(Trainer, PhasesAndDensityControlAreToldAndTheCapsHold) {
   EXPECT_GT(grown, 0);
   EXPECT_LE(largest_main, 330);
   EXPECT_LE(largest_environment, 260);
+}
+
+// Steps are measured without turning the profile on for anybody else, and every iteration is in one account.
+TEST(Trainer, TellsWhereTheTimeWentPhaseByPhase) {
+  for (const bool profiled : {false, true}) {
+    profile::enable(profiled);
+    TrainOptions options = small_run(40);
+    options.save_every = 15;
+    Trainer trainer = make_trainer(options, "measured");
+    std::vector<std::string> told;
+    int64_t iterations = 0;
+    double inside = 0, training = 0;
+    trainer.stream().listen([&](const events::Event& event) {
+      EXPECT_EQ(profile::is_on(), profiled);
+      if (std::holds_alternative<events::Saved>(event)) told.push_back("saved");
+      if (const auto* phase = std::get_if<events::PhaseEntered>(&event)) told.push_back(phase->phase);
+      if (const auto* end = std::get_if<events::Finished>(&event)) training = end->seconds;
+      const auto* measured = std::get_if<events::Measured>(&event);
+      if (measured == nullptr) return;
+      told.push_back("measured " + measured->phase + " " + std::to_string(measured->iteration));
+      iterations += measured->iterations;
+      EXPECT_EQ(iterations, measured->iteration);
+      for (const profile::Entry& step : measured->steps) {
+        inside += step.seconds;
+      }
+    });
+    trainer.run(never);
+    profile::enable(false);
+    EXPECT_EQ(told,
+              (std::vector<std::string>{"diffuse", "measured diffuse 10", "specular", "measured specular 15",
+                                        "saved", "measured specular 16", "joint", "measured joint 30",
+                                        "saved", "measured joint 40", "saved"}));
+    EXPECT_GT(inside, 0);
+    EXPECT_LE(inside, training);
+  }
+}
+
+// A listener that waits, as a viewer does while training is paused, costs no training time.
+TEST(Trainer, TheTimeOfListenersIsNotTraining) {
+  Trainer trainer = make_trainer(small_run(40), "listeners");
+  std::chrono::duration<double> waited{0};
+  double rate = 0;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* step = std::get_if<events::Step>(&event)) {
+      rate = step->rate;
+      EXPECT_GT(step->memory_bytes, 1 << 20);
+    }
+    if (std::holds_alternative<events::DensityChanged>(event) ||
+        std::holds_alternative<events::Saved>(event)) {
+      const auto start = std::chrono::steady_clock::now();
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      waited += std::chrono::steady_clock::now() - start;
+    }
+  });
+  const auto start = std::chrono::steady_clock::now();
+  const events::Finished end = trainer.run(never);
+  const std::chrono::duration<double> whole = std::chrono::steady_clock::now() - start;
+  EXPECT_GT(waited.count(), 0.5);
+  EXPECT_LE(end.seconds, whole.count() - waited.count());
+  EXPECT_GT(rate, 0);
 }
 
 TEST(Trainer, SameSeedGivesTheSameBytesAtAnyThreadCount) {

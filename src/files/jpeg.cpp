@@ -1,0 +1,123 @@
+#include "files/jpeg.h"
+
+#include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <cstdio>
+#include <new>
+
+// libjpeg's header wants the above before it.
+#include <jpeglib.h>
+// Its macros for errors.
+#include <jerror.h>
+
+#include "base/error.h"
+
+namespace traceflow {
+
+namespace {
+
+// From here on a picture is for looking closely: edges between colours stay sharp.
+constexpr int fine_quality = 90;
+
+// libjpeg leaves by longjmp, which skips destructors: what owns memory lives here, outside the jump. The
+// library hands back pointers to its own structs, which are therefore the first members of these.
+struct ErrorExit {
+  jpeg_error_mgr manager;
+  std::jmp_buf jump;
+  std::array<char, JMSG_LENGTH_MAX> text;
+};
+
+struct Sink {
+  jpeg_destination_mgr manager;
+  std::string bytes;
+};
+
+void on_error(j_common_ptr info) {
+  auto* exit = reinterpret_cast<ErrorExit*>(info->err);
+  (*info->err->format_message)(info, exit->text.data());
+  std::longjmp(exit->jump, 1);
+}
+void on_message(j_common_ptr) {}
+
+Sink* sink_of(j_compress_ptr info) { return reinterpret_cast<Sink*>(info->dest); }
+
+bool grow(std::string& bytes, size_t size) noexcept {
+  try {
+    bytes.resize(size);
+  } catch (const std::exception&) {
+    return false;
+  }
+  return true;
+}
+
+// Gives the library the bytes from `used` on to write to, of at least twice as many.
+void give_room(j_compress_ptr info, size_t used) {
+  Sink* sink = sink_of(info);
+  if (!grow(sink->bytes, std::max<size_t>(2 * used, 1 << 15))) ERREXIT1(info, JERR_OUT_OF_MEMORY, 0);
+  sink->manager.next_output_byte = reinterpret_cast<JOCTET*>(sink->bytes.data()) + used;
+  sink->manager.free_in_buffer = sink->bytes.size() - used;
+}
+
+void begin(j_compress_ptr info) { give_room(info, 0); }
+boolean on_full(j_compress_ptr info) {
+  give_room(info, sink_of(info)->bytes.size());
+  return TRUE;
+}
+void end(j_compress_ptr info) {
+  Sink* sink = sink_of(info);
+  // Shorter: takes no memory.
+  sink->bytes.resize(sink->bytes.size() - sink->manager.free_in_buffer);
+}
+
+struct Encoder {
+  ErrorExit error{};
+  Sink sink{};
+  jpeg_compress_struct jpeg{};
+
+  // False with error.text where the library gave up.
+  bool encode(const Tensor<uint8_t>& pixels, int quality) {
+    jpeg.err = jpeg_std_error(&error.manager);
+    error.manager.error_exit = on_error;
+    error.manager.output_message = on_message;
+    if (setjmp(error.jump) != 0) return false;
+    jpeg_create_compress(&jpeg);
+    jpeg.dest = &sink.manager;
+    sink.manager.init_destination = begin;
+    sink.manager.empty_output_buffer = on_full;
+    sink.manager.term_destination = end;
+    jpeg.image_height = static_cast<JDIMENSION>(pixels.dim(0));
+    jpeg.image_width = static_cast<JDIMENSION>(pixels.dim(1));
+    jpeg.input_components = pixels.shape().rank() == 2 ? 1 : 3;
+    jpeg.in_color_space = jpeg.input_components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+    jpeg_set_defaults(&jpeg);
+    jpeg_set_quality(&jpeg, quality, TRUE);
+    jpeg.dct_method = quality >= fine_quality ? JDCT_ISLOW : JDCT_IFAST;
+    if (quality >= fine_quality) jpeg.comp_info[0].h_samp_factor = jpeg.comp_info[0].v_samp_factor = 1;
+    jpeg_start_compress(&jpeg, TRUE);
+    while (jpeg.next_scanline < jpeg.image_height) {
+      auto* row = const_cast<JSAMPROW>(pixels.row(jpeg.next_scanline));
+      jpeg_write_scanlines(&jpeg, &row, 1);
+    }
+    jpeg_finish_compress(&jpeg);
+    return true;
+  }
+  ~Encoder() { jpeg_destroy_compress(&jpeg); }
+};
+
+}  // namespace
+
+std::string jpeg_bytes(const Tensor<uint8_t>& pixels, int quality) {
+  const int rank = pixels.shape().rank();
+  require(rank == 2 || (rank == 3 && pixels.dim(2) == 3), "a JPEG's pixels are H×W or H×W×3",
+          pixels.shape().to_string());
+  require(quality >= 1 && quality <= 100, "a JPEG's quality is 1 to 100", std::to_string(quality));
+  Encoder encoder;
+  if (!encoder.encode(pixels, quality)) {
+    throw InputError("JPEG", "", pixels.shape().to_string() + ": " + encoder.error.text.data(),
+                     "a picture of 1 to 65,500 pixels a side");
+  }
+  return std::move(encoder.sink.bytes);
+}
+
+}  // namespace traceflow

@@ -1,0 +1,165 @@
+#include "train/log_history.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+namespace traceflow {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Longer or deeper than any event is: not ours.
+constexpr size_t line_cap = size_t{1} << 20;
+constexpr int depth_cap = 8;
+
+// An object, or null.
+Json parsed(const std::string& line) {
+  const auto shallow = [](int depth, Json::parse_event_t, Json&) { return depth <= depth_cap; };
+  Json json = line.size() > line_cap ? Json() : Json::parse(line, shallow, false);
+  return json.is_object() ? std::move(json) : Json();
+}
+
+std::string text_in(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+}
+
+double number_in(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_number() ? found->get<double>() : 0;
+}
+
+std::optional<LoggedEvent> event_in(const Json& json) {
+  const auto iteration = json.is_object() ? json.find("iteration") : json.end();
+  if (iteration == json.end() || !iteration->is_number_integer()) return std::nullopt;
+  LoggedEvent event{text_in(json, "event"), iteration->get<int64_t>(), json.dump()};
+  if (event.kind.empty() || event.iteration < 0) return std::nullopt;
+  return event;
+}
+
+// Events so far, of which a later line may take some back.
+class History {
+ public:
+  void add(LoggedEvent event) {
+    if (event.kind == "started") {
+      go_back_to(event.iteration);
+    } else if (event.kind == "step") {
+      // Steps that begin anew although no start was read.
+      if (event.iteration <= last_step_) go_back_to(event.iteration - 1);
+      last_step_ = event.iteration;
+    }
+    events_.push_back(std::move(event));
+  }
+  std::vector<LoggedEvent> take() {
+    std::set<std::string> warnings;
+    std::erase_if(events_, [&](const LoggedEvent& e) {
+      return e.kind == "warning" && !warnings.insert(text_in(parsed(e.line), "text")).second;
+    });
+    return std::move(events_);
+  }
+
+ private:
+  // To when `done` iterations were done. A phase that begins there is told again.
+  void go_back_to(int64_t done) {
+    if (done <= 0) events_.clear();
+    std::erase_if(events_, [&](const LoggedEvent& e) {
+      return e.iteration > done || e.kind == "finished" || (e.kind == "phase_entered" && e.iteration == done);
+    });
+    last_step_ = done;
+  }
+
+  std::vector<LoggedEvent> events_;
+  int64_t last_step_ = 0;
+};
+
+// Adds the steps of a "measured" event, as if all of `iterations` had been measured.
+void add_measured(const Json& json, double iterations, std::vector<profile::Entry>& sums) {
+  const double measured = number_in(json, "iterations");
+  const auto steps = json.find("steps");
+  if (!(measured >= 1) || steps == json.end() || !steps->is_array()) return;
+  const double share = std::max(1.0, iterations / measured);
+  for (const Json& step : *steps) {
+    const std::string name = step.is_object() ? text_in(step, "name") : std::string();
+    const double calls = name.empty() ? 0 : number_in(step, "calls");
+    if (!(calls >= 0 && calls < 1e15)) continue;
+    auto sum =
+        std::find_if(sums.begin(), sums.end(), [&](const profile::Entry& e) { return e.name == name; });
+    if (sum == sums.end()) sum = sums.insert(sums.end(), {name, 0, 0});
+    sum->calls += std::llround(share * calls);
+    sum->seconds += share * number_in(step, "seconds");
+  }
+}
+
+}  // namespace
+
+std::vector<LoggedEvent> read_log(std::istream& log) {
+  History history;
+  for (std::string line; std::getline(log, line);) {
+    if (auto event = event_in(parsed(line))) history.add(std::move(*event));
+  }
+  return history.take();
+}
+
+std::vector<LoggedEvent> read_log(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  return read_log(file);
+}
+
+std::vector<LoggedEvent> thinned(const std::vector<LoggedEvent>& events, size_t steps) {
+  const auto count = static_cast<size_t>(
+      std::count_if(events.begin(), events.end(), [](const LoggedEvent& e) { return e.kind == "step"; }));
+  if (count <= steps || steps < 2) return events;
+  std::vector<LoggedEvent> kept;
+  size_t step = 0, next = 0;
+  for (const LoggedEvent& event : events) {
+    if (event.kind == "step") {
+      // The next-th of those that stay is the one at next·(count − 1)/(steps − 1).
+      if (step++ != next * (count - 1) / (steps - 1)) continue;
+      ++next;
+    }
+    kept.push_back(event);
+  }
+  return kept;
+}
+
+std::vector<LoggedPhase> phases_of(const std::vector<LoggedEvent>& events) {
+  std::vector<LoggedPhase> phases;
+  // Training time and iterations up to which those are accounted for.
+  double seconds = 0;
+  int64_t measured_to = 0;
+  const auto phase = [&](const std::string& name, int64_t first) -> LoggedPhase& {
+    if (phases.empty() || phases.back().name != name) phases.push_back({name, first, first - 1, 0, {}});
+    return phases.back();
+  };
+  for (const LoggedEvent& event : events) {
+    if (event.kind != "step" && event.kind != "measured" && event.kind != "phase_entered") continue;
+    const Json json = parsed(event.line);
+    const std::string name = text_in(json, "phase");
+    if (event.kind == "phase_entered") {
+      if (!phases.empty()) phases.back().last = std::max(phases.back().last, event.iteration);
+      phase(name, event.iteration + 1);
+    } else if (event.kind == "step") {
+      LoggedPhase& now = phase(name, event.iteration);
+      now.last = event.iteration;
+      now.seconds += std::max(0.0, number_in(json, "seconds") - seconds);
+      seconds = std::max(seconds, number_in(json, "seconds"));
+    } else {
+      LoggedPhase& now = phase(name, measured_to + 1);
+      now.last = std::max(now.last, event.iteration);
+      add_measured(json, static_cast<double>(event.iteration - measured_to), now.steps);
+      measured_to = event.iteration;
+    }
+  }
+  for (LoggedPhase& p : phases) {
+    std::stable_sort(p.steps.begin(), p.steps.end(),
+                     [](const profile::Entry& a, const profile::Entry& b) { return a.seconds > b.seconds; });
+  }
+  return phases;
+}
+
+}  // namespace traceflow
