@@ -13,7 +13,6 @@ export function StatusLine() {
       class="status glass"
       data-testid="status"
       aria-expanded={status_open.value}
-      aria-label="Status"
       title="Status (I)"
       onClick={() => (status_open.value = !status_open.value)}
     >
