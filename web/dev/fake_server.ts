@@ -56,7 +56,7 @@ const types: Record<string, string> = { html: 'text/html', js: 'text/javascript'
 
 function is_known(request: IncomingMessage): boolean {
   const brought = new URL(request.url ?? '/', 'http://x').searchParams.get('token') === TOKEN;
-  return brought || (request.headers.cookie ?? '').includes(`traceflow_${PORT}=${TOKEN}`);
+  return brought || (request.headers.cookie ?? '').includes(`traceflow_fake=${TOKEN}`);
 }
 
 async function answer(request: IncomingMessage, response: ServerResponse): Promise<void> {
@@ -68,7 +68,7 @@ async function answer(request: IncomingMessage, response: ServerResponse): Promi
   response.writeHead(200, {
     'Content-Type': types[name.split('.')[1] ?? ''] ?? 'text/plain',
     'Content-Security-Policy': policy,
-    'Set-Cookie': `traceflow_${PORT}=${TOKEN}; HttpOnly; SameSite=Strict; Path=/`,
+    'Set-Cookie': `traceflow_fake=${TOKEN}; HttpOnly; SameSite=Strict; Path=/`,
   });
   response.end(body);
 }
@@ -115,7 +115,7 @@ if (source === 'training') {
     publish(training.advance());
     if (training.iteration === before) return;
     tell_state();
-    guests.forEach((guest) => guest.refresh());
+    if (training.iteration % 100 === 0) guests.forEach((guest) => guest.refresh());
   }, 400);
 }
 
@@ -123,4 +123,8 @@ if (source === 'training') {
 process.stdin.on('data', (text: Buffer) => guests.forEach((g) => g.tell({ type: 'trouble', text: String(text).trim() })));
 process.stdin.unref?.();
 
-server.listen(Number(PORT), '127.0.0.1', () => console.log(`http://127.0.0.1:${PORT}/?token=${TOKEN}`));
+server.listen(Number(PORT), '127.0.0.1', () => {
+  const address = server.address();
+  const port = typeof address === 'object' && address ? address.port : PORT;
+  console.log(`view: http://127.0.0.1:${port}/?token=${TOKEN}`);
+});

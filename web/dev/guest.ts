@@ -68,8 +68,9 @@ export class Guest {
         const height = Math.round((width * view.height) / view.width);
         const wanted = { layer: 'photograph', exposure: 0, map: '' };
         const { split, index } = request;
-        const bytes = png(render(view, view.time, width, height, wanted), width, height);
-        return this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, bytes);
+        return void render(view, view.time, width, height, wanted).then((rows) => {
+          if (rows) this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
+        });
       }
       case 'probe': {
         const from = this.camera();
@@ -82,8 +83,9 @@ export class Guest {
         if (!this.look || !from) return;
         const { id, width, height } = request;
         if (width * height > 3e7) return this.tell({ type: 'refused', request: 'still', id, text: 'A picture of this size would not fit into memory.' });
-        const bytes = png(render(from, this.look.time, width, height, this.look), width, height);
-        return this.picture({ type: 'still', id, width, height, format: 'png' }, bytes);
+        return void render(from, this.look.time, width, height, this.look).then((rows) => {
+          if (rows) this.picture({ type: 'still', id, width, height, format: 'png' }, png(rows, width, height));
+        });
       }
       case 'path':
         return this.tell({ type: 'path', id: request.id, shots: shots(request.path, this.host.hello) });
@@ -99,13 +101,14 @@ export class Guest {
     if (this.busy || !this.look || this.frame - this.seen >= 2 || this.step >= steps.length) return;
     this.busy = true;
     setTimeout(() => {
-      this.busy = false;
-      this.draw();
-      this.work();
+      void this.draw().then(() => {
+        this.busy = false;
+        this.work();
+      });
     }, this.host.slow);
   }
 
-  private draw(): void {
+  private async draw(): Promise<void> {
     const { look } = this;
     const from = this.camera();
     if (!look || !from) return;
@@ -113,7 +116,9 @@ export class Guest {
     const width = Math.max(1, Math.round(look.width / coarse));
     const height = Math.max(1, Math.round(look.height / coarse));
     const begin = performance.now();
-    const bytes = png(render(from, look.time, width, height, look), width, height);
+    const rows = await render(from, look.time, width, height, look, () => !look.moving && look !== this.look);
+    if (!rows) return;
+    const bytes = png(rows, width, height);
     this.step = look.moving ? steps.length : this.step + 1;
     const header = {
       type: 'frame' as const,

@@ -25,9 +25,16 @@ const states: Record<string, (page: Page) => Promise<unknown>> = {
     await press(page, 'rays');
     const box = await page.getByTestId('stage').boundingBox();
     if (!box) return;
-    await page.mouse.click(box.x + box.width * 0.47, box.y + box.height * 0.42);
-    await page.mouse.click(box.x + box.width * 0.55, box.y + box.height * 0.45);
-    await page.mouse.move(box.x + box.width * 0.5, box.y + box.height * 0.4);
+    const at = (x: number, y: number): [number, number] => [box.x + box.width * x, box.y + box.height * y];
+    await page.mouse.click(...at(0.47, 0.52));
+    await page.mouse.click(...at(0.6, 0.48));
+    await page.waitForTimeout(300);
+    await page.mouse.move(...at(0.3, 0.7));
+    await page.mouse.down();
+    await page.mouse.move(...at(0.42, 0.64), { steps: 4 });
+    await page.mouse.up();
+    await still(page);
+    await page.mouse.move(...at(0.5, 0.55));
     await page.waitForTimeout(400);
   },
   split: async (page) => {

@@ -143,13 +143,22 @@ function pixel(s: Sample, { layer, exposure, map }: Wanted, x: number, y: number
   }
 }
 
-// 8 bit RGB rows.
-export function render(camera: Camera, time: number, width: number, height: number, wanted: Wanted): Buffer {
+// 8 bit RGB rows. Lets others work in between; null once `is_stale`.
+export async function render(
+  camera: Camera,
+  time: number,
+  width: number,
+  height: number,
+  wanted: Wanted,
+  is_stale: () => boolean = () => false,
+): Promise<Buffer | null> {
   const scene = balls(time);
   const forward = forward_of(camera);
   const h = Math.tan(radians(camera.fov_y) / 2);
   const out = Buffer.alloc(width * height * 3);
   for (let y = 0, i = 0; y < height; y++) {
+    if (y % 16 === 15) await new Promise((done) => setImmediate(done));
+    if (is_stale()) return null;
     for (let x = 0; x < width; x++) {
       const direction: Vec3 = [((2 * x + 1) / width - 1) * h * (width / height), ((2 * y + 1) / height - 1) * h, 1];
       const colour = pixel(sample(scene, camera.position, unit(apply(camera.rotation, direction)), forward), wanted, x, y);

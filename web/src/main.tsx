@@ -4,9 +4,9 @@ import { App } from './App.tsx';
 import { hide_token } from './net/token.ts';
 import { start_looking, looker } from './stage/looking.ts';
 import { forget_request, paint, request_photograph, show_frame, show_photograph } from './stage/pictures.ts';
-import { take_probe } from './state/rays.ts';
+import { forget_probes, take_probe } from './state/rays.ts';
 import { take_path } from './state/path.ts';
-import { save_still } from './state/still.ts';
+import { give_up_still, save_still } from './state/still.ts';
 import { camera, comparing, hello, photo, pixel_ratio, split_at, stage } from './state/store.ts';
 import { start_connection } from './state/server.ts';
 import { repaint, start_theme } from './state/theme.ts';
@@ -23,8 +23,14 @@ start_connection({
   },
   probe: take_probe,
   path: take_path,
+  refused(reply) {
+    if (reply.request === 'probe') forget_probes();
+    if (reply.request === 'still') give_up_still();
+  },
   greeted() {
     forget_request();
+    forget_probes();
+    give_up_still();
     looker.restart();
   },
 });

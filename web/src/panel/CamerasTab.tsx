@@ -39,7 +39,13 @@ function CameraList() {
   const cameras = hello.value?.cameras;
   const list = useRef<HTMLOListElement>(null);
   useEffect(() => {
-    list.current?.querySelector('[aria-current=true]')?.scrollIntoView({ block: 'nearest' });
+    const row = list.current?.querySelector<HTMLElement>('[aria-current=true]');
+    if (!list.current || !row) return;
+    // Within the list alone: the panel stays where it is.
+    const top = row.offsetTop - list.current.offsetTop;
+    const { scrollTop, clientHeight } = list.current;
+    if (top < scrollTop) list.current.scrollTop = top;
+    else if (top + row.offsetHeight > scrollTop + clientHeight) list.current.scrollTop = top + row.offsetHeight - clientHeight;
   }, [current, split.value]);
   return (
     <Section title="Captured cameras">

@@ -1,8 +1,8 @@
 import { Button } from '../parts/controls.tsx';
 import { Icon, type IconName } from '../parts/Icon.tsx';
+import { ThemeButton } from '../parts/ThemeButton.tsx';
 import { choose_tab, help_open, panel_open, tab, tabs, type Tab } from '../state/panel.ts';
 import { events, hello } from '../state/store.ts';
-import { next_theme, theme } from '../state/theme.ts';
 import { CamerasTab } from './CamerasTab.tsx';
 import { PathTab } from './PathTab.tsx';
 import { TrainingTab } from './TrainingTab.tsx';
@@ -27,7 +27,7 @@ export function Panel() {
   const current = present.includes(tab.value) ? tab.value : 'view';
   const Body = faces[current].body;
   return (
-    <aside class="panel" aria-label="Panel">
+    <aside class="panel" aria-label="Panel" data-tab={current}>
       <Head />
       <div class="tabs" role="tablist" aria-label="Panel" onKeyDown={(event) => walk(event, present, current)}>
         {present.map((name) => (
@@ -67,7 +67,6 @@ function Head() {
   const there = hello.value;
   const kinds = { training: 'Training', run: 'Run', ply: 'Surfels' };
   const about = there ? [kinds[there.source], there.capture].filter(Boolean).join(' · ') : 'Connecting…';
-  const label = { auto: 'Colours as the system has them', light: 'Light colours', dark: 'Dark colours' }[theme.value];
   return (
     <header class="panel-head">
       <img src="/icon.svg" alt="" width={28} height={28} />
@@ -75,15 +74,7 @@ function Head() {
         <h1 title={there?.name}>{there?.name ?? 'TraceFlow'}</h1>
         <p>{about}</p>
       </div>
-      <Button
-        id="theme"
-        label={label}
-        keys="L"
-        icon={{ auto: 'auto' as const, light: 'sun' as const, dark: 'moon' as const }[theme.value]}
-        kind="quiet"
-        iconOnly
-        onPress={next_theme}
-      />
+      <ThemeButton />
       <Button id="help-open" label="Keys" keys="?" icon="help" kind="quiet" iconOnly onPress={() => (help_open.value = true)} />
     </header>
   );

@@ -1,10 +1,9 @@
-import { Button, Choice, Section, Segments, Slider } from '../parts/controls.tsx';
-import { signed, title } from '../parts/format.ts';
+import { Button, Choice, Section, Segments, Slider, Switch } from '../parts/controls.tsx';
+import { figure, signed, title } from '../parts/format.ts';
 import { comparing, exposure, hello, layer, map, rays_on } from '../state/store.ts';
 import { pinned, toggle_rays, unpin, unpin_all, type Ray } from '../state/rays.ts';
 import { size_of, still_size, still_sizes, still_wanted, take_still, type StillSize } from '../state/still.ts';
 import { moving } from '../stage/looking.ts';
-import { figure } from '../parts/format.ts';
 
 export function ViewTab() {
   return (
@@ -62,7 +61,7 @@ function Rays() {
   return (
     <Section
       title="Reflection rays"
-      aside={<Button id="rays-panel" label={rays_on.value ? 'On' : 'Off'} pressed={rays_on.value} keys="T" onPress={toggle_rays} />}
+      aside={<Switch id="rays-panel" label="Show" on={rays_on.value} onChange={toggle_rays} />}
     >
       {pinned.value.length === 0 ? (
         <p class="hint">
@@ -83,13 +82,12 @@ function Rays() {
 }
 
 function Pin({ ray, name }: { ray: Ray; name: string }) {
-  const reach = ray.mirrored && ray.mirrored.distance > 0 ? figure(ray.mirrored.distance) : '–';
+  const reach = ray.mirrored && ray.mirrored.distance > 0 ? `meets at ${figure(ray.mirrored.distance)}` : 'meets nothing';
   return (
     <li>
       <b>{name}</b>
-      <span title="Depth">{ray.depth === undefined ? '–' : figure(ray.depth)} deep</span>
-      <span title="Tint">tint {ray.tint === undefined ? '–' : ray.tint.toFixed(2)}</span>
-      <span title="Length of the mirrored ray">{reach} on</span>
+      <span>tint {ray.tint === undefined ? '–' : ray.tint.toFixed(2)}</span>
+      <span>{reach}</span>
       <Button id="unpin" label={`Take ${name} away`} icon="close" kind="quiet" iconOnly onPress={() => unpin(ray)} />
     </li>
   );

@@ -20,7 +20,9 @@ export function Banner() {
     <div class="banners" aria-live="polite">
       {state.kind === 'lost' && (
         <p class="banner wrong" data-testid="banner-lost">
-          <span>The connection to the server is lost. Next attempt in {seconds_until(state.retry_at, now.value)} s.</span>
+          <span>
+            The connection to the server is lost. <span aria-hidden="true">Next attempt in {seconds_until(state.retry_at, now.value)} s.</span>
+          </span>
           <button type="button" class="button quiet" data-testid="retry" onClick={retry_now}>
             Try now
           </button>

@@ -1,6 +1,6 @@
 import type { Camera, Vec3 } from '../messages.ts';
 import { frustum, project, project_line, type Point } from '../math/camera.ts';
-import { add_scaled } from '../math/vec.ts';
+import { add_scaled, dot, scale, subtract } from '../math/vec.ts';
 import { camera, hello, previewing, rays_on, shown, stage, type Shown } from '../state/store.ts';
 import { hovered, pinned, type Ray } from '../state/rays.ts';
 import { path, path_visible, shots } from '../state/path.ts';
@@ -49,7 +49,7 @@ function Dot({ view, at, kind, size }: { view: Shown; at: Vec3; kind: string; si
   return <circle class={kind} cx={x} cy={y} r={size} />;
 }
 
-// The normal, and the mirrored ray to where its light comes from; faint where it meets nothing.
+// The normal, the way back to the eye that a pinned ray was seen from, and the mirrored ray to where its light comes from; faint where it meets nothing.
 function RayLines({ view, ray, live }: { view: Shown; ray: Ray; live: boolean }) {
   const extent = hello.value?.extent ?? 1;
   const { surface, normal, mirrored } = ray;
@@ -57,14 +57,21 @@ function RayLines({ view, ray, live }: { view: Shown; ray: Ray; live: boolean })
   const end = mirrored && (meets ? mirrored.end : add_scaled(surface, mirrored.direction, extent));
   return (
     <g class={live ? 'ray live' : 'ray'}>
-      <Line view={view} from={surface} to={add_scaled(surface, normal, extent * 0.06)} kind="ray-normal" />
-      {end && <Line view={view} from={surface} to={end} kind="ray-halo" />}
+      {mirrored && !live && (
+        <Line view={view} from={surface} to={add_scaled(surface, towards_eye(mirrored.direction, normal), extent)} kind="ray-seen" />
+      )}
+      {end && meets && <Line view={view} from={surface} to={end} kind="ray-halo" />}
       {end && <Line view={view} from={surface} to={end} kind={meets ? 'ray-mirrored' : 'ray-mirrored lost'} />}
+      <Line view={view} from={surface} to={add_scaled(surface, normal, extent * 0.08)} kind="ray-halo" />
+      <Line view={view} from={surface} to={add_scaled(surface, normal, extent * 0.08)} kind="ray-normal" />
       <Dot view={view} at={surface} kind="ray-surface" size={live ? 4 : 3.2} />
       {end && meets && <Dot view={view} at={end} kind="ray-end" size={live ? 4.5 : 3.6} />}
     </g>
   );
 }
+
+// Where the ray came from: its mirror image, mirrored back.
+const towards_eye = (mirrored: Vec3, normal: Vec3): Vec3 => subtract(scale(normal, 2 * dot(mirrored, normal)), mirrored);
 
 // The way of the camera and a small pyramid for each keyframe.
 function PathLines({ view }: { view: Shown }) {

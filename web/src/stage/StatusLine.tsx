@@ -7,43 +7,45 @@ import { measures } from './measures.ts';
 export function StatusLine() {
   const m = measures.value;
   const s = server.value;
-  const up = link.value.kind === 'open';
-  const surfels = s ? count(s.surfels.main) + (s.surfels.environment ? ` + ${count(s.surfels.environment)}` : '') : '';
   return (
     <button
       type="button"
       class="status glass"
       data-testid="status"
       aria-expanded={status_open.value}
-      aria-label="Status"
       title="Status (I)"
       onClick={() => (status_open.value = !status_open.value)}
     >
       <span class="status-line">
-        <i class={up ? 'lamp on' : 'lamp'} aria-hidden="true" />
-        <b>{m ? Math.round(m.rate) : '–'}</b> fps
-        <b>{m ? Math.round(m.latency) : '–'}</b> ms
+        <i class={link.value.kind === 'open' ? 'lamp on' : 'lamp'} aria-hidden="true" />
+        <span title="Pictures in the last second">
+          <b>{m ? m.rate : '–'}</b> fps
+        </span>
+        <span title="From input to the picture that shows it">
+          <b>{m ? Math.round(m.latency) : '–'}</b> ms
+        </span>
+        {status_open.value && (
+          <span title="Size of the picture, and the time to render and pack it">
+            <b>{m ? `${m.width} × ${m.height}` : '–'}</b> in <b>{m ? Math.round(m.milliseconds) : '–'}</b> ms
+          </span>
+        )}
       </span>
-      {status_open.value && (
-        <dl>
-          <Row name="Picture" value={m ? `${m.width} × ${m.height}` : '–'} />
-          <Row name="Rendering" value={m ? `${m.milliseconds.toFixed(m.milliseconds < 10 ? 1 : 0)} ms` : '–'} />
-          <Row name="Iteration" value={s && s.iterations > 0 ? count(s.iteration) : ''} id="iteration" />
-          <Row name="Surfels" value={surfels} />
-          <Row name="Viewers" value={s ? count(s.viewers) : ''} />
-          <Row name="Device" value={hello.value?.device ?? ''} />
-        </dl>
+      {status_open.value && s && (
+        <span class="status-line">
+          {s.iterations > 0 && (
+            <span>
+              iteration <b data-testid="status-iteration">{count(s.iteration)}</b>
+            </span>
+          )}
+          <span>
+            <b>{[s.surfels.main, s.surfels.environment].filter((n) => n > 0).map(count).join(' + ') || '0'}</b> surfels
+          </span>
+          <span>
+            <b>{s.viewers}</b> {s.viewers === 1 ? 'viewer' : 'viewers'}
+          </span>
+          <span>{hello.value?.device}</span>
+        </span>
       )}
     </button>
-  );
-}
-
-function Row({ name, value, id }: { name: string; value: string; id?: string }) {
-  if (!value) return null;
-  return (
-    <div>
-      <dt>{name}</dt>
-      <dd data-testid={id && `status-${id}`}>{value}</dd>
-    </div>
   );
 }

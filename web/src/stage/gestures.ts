@@ -100,7 +100,8 @@ export function listen_to_pointers(element: HTMLElement, touches: Touches): () =
     ['pointermove', move],
     ['pointerup', release],
     ['pointercancel', release],
-    ['pointerleave', () => touches.leave()],
+    // A finger that was lifted has left too, but what it touched stays of interest.
+    ['pointerleave', (event: PointerEvent) => event.pointerType !== 'touch' && touches.leave()],
     ['wheel', roll],
     ['dblclick', double],
     ['contextmenu', menu],

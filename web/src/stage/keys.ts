@@ -112,7 +112,8 @@ function is_taken(event: KeyboardEvent): boolean {
   if (target.closest('dialog')) return event.key !== '?';
   if (target instanceof HTMLSelectElement || target instanceof HTMLTextAreaElement) return true;
   if (target instanceof HTMLInputElement) {
-    if (target.type === 'range' || target.type === 'radio') return event.key.startsWith('Arrow') || event.key === ' ';
+    if (target.type === 'range') return event.key.startsWith('Arrow');
+    if (target.type === 'radio') return event.key.startsWith('Arrow') || event.key === ' ';
     return target.type === 'checkbox' ? event.key === ' ' : true;
   }
   if (target instanceof HTMLButtonElement) return event.key === ' ' || event.key === 'Enter';

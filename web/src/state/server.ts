@@ -1,5 +1,5 @@
 import { batch } from '@preact/signals';
-import type { Hello, PathReply, ProbeReply, Reply, Request } from '../messages.ts';
+import type { Hello, PathReply, ProbeReply, Refused, Reply, Request } from '../messages.ts';
 import { Connection } from '../net/connection.ts';
 import type { Picture } from '../net/wire.ts';
 import { camera, events, hello, layer, link, map, notify, photo, pivot, server, time, trouble } from './store.ts';
@@ -9,6 +9,7 @@ import { camera, events, hello, layer, link, map, notify, photo, pivot, server, 
 export interface Handlers {
   picture(picture: Picture): void;
   probe(reply: ProbeReply): void;
+  refused(reply: Refused): void;
   path(reply: PathReply): void;
   greeted(): void; // Hello was taken in: all must be asked for again
 }
@@ -41,7 +42,8 @@ function take(reply: Reply, handlers: Handlers): void {
       trouble.value = reply.text;
       return;
     case 'refused':
-      return notify(reply.text);
+      notify(reply.text);
+      return handlers.refused(reply);
     case 'probe':
       return handlers.probe(reply);
     case 'path':

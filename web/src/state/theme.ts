@@ -14,19 +14,23 @@ const system = window.matchMedia('(prefers-color-scheme: dark)');
 
 export function start_theme(): void {
   effect(() => {
-    const dark = theme.value === 'dark' || (theme.value === 'auto' && system.matches);
-    document.documentElement.dataset['theme'] = dark ? 'dark' : 'light';
+    wear(theme.value);
     try {
       localStorage.setItem(key, theme.value);
     } catch {
       // A page opened from disk, or in a private window, may not remember.
     }
-    repaint.value = repaint.peek() + 1;
   });
-  system.addEventListener('change', () => {
-    document.documentElement.dataset['theme'] = theme.value === 'auto' ? (system.matches ? 'dark' : 'light') : theme.value;
-    repaint.value++;
-  });
+  system.addEventListener('change', () => wear(theme.value));
+  // Paper is white.
+  window.addEventListener('beforeprint', () => wear('light'));
+  window.addEventListener('afterprint', () => wear(theme.value));
+}
+
+function wear(wanted: Theme): void {
+  const dark = wanted === 'dark' || (wanted === 'auto' && system.matches);
+  document.documentElement.dataset['theme'] = dark ? 'dark' : 'light';
+  repaint.value = repaint.peek() + 1;
 }
 
 export const next_theme = (): void =>
