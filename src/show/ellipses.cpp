@@ -201,7 +201,8 @@ class Drawing {
   }
 
   static size_t at(const PixelBox& box, int x, int y) {
-    return static_cast<size_t>((y - box.top) * tile_side + (x - box.left));
+    const int place = (y - box.top) * tile_side + (x - box.left);
+    return static_cast<size_t>(place);
   }
 
   void meet(const Disk& d, const PixelBox& box, Pixels& pixels) const {
