@@ -98,6 +98,27 @@ TEST(Renderer, ReusingAPoseChangesNothing) {
   expect_reuse_changes_nothing(f);
 }
 
+TEST(Renderer, ReusingAPoseLeavesGradientsWhole) {
+  Fixture f;
+  f.request.reuse_pose = true;
+  Renderer looked(RenderOptions{}), fresh(RenderOptions{});
+  FrameRequest before = f.request;
+  before.time = 0.1F;
+  looked.forward(f.scene, before, true);
+  looked.forward(f.scene, f.request);
+  const auto gradient_of = [&](Renderer& renderer) {
+    const Frame& frame = renderer.forward(f.scene, f.request, true);
+    FrameGradient grad_frame;
+    grad_frame.colour.reset(frame.colour.shape());
+    grad_frame.colour.fill(1);
+    SceneGradient gradient;
+    gradient.reset(f.scene);
+    renderer.backward(f.scene, f.request, Trainable{}, grad_frame, gradient);
+    return gradient.main_field.head_weight;
+  };
+  expect_equal(gradient_of(looked), gradient_of(fresh), "field");
+}
+
 TEST(Renderer, APoseIsReusedOnlyWhereAskedFor) {
   Fixture f;
   Renderer renderer(RenderOptions{});
