@@ -35,6 +35,12 @@ Tensor<float> fitted(const Tensor<float>& image, int64_t width, int64_t height) 
                           static_cast<double>(image.dim(0)) / static_cast<double>(height)});
 }
 
+bool shows_reflections(const std::string& layer) {
+  const auto* const known = std::find(show::layer_names.begin(), show::layer_names.end(), layer);
+  return known == show::layer_names.end() ||
+         show::needs_reflections(static_cast<show::Layer>(known - show::layer_names.begin()));
+}
+
 show::Layer layer_named(const std::string& name) {
   const std::vector<show::Layer> layers = show::parse_layers(name);
   if (layers.size() != 1) throw InputError("message", "layer", name, "one layer");
@@ -102,6 +108,7 @@ FrameRequest Projector::request_for(const Look& look, const Stage& stage, double
   request.camera = camera_of(look, setting_, stage.scene.normalisation, divisor);
   request.time = look.time;
   request.reuse_pose = posed_;
+  request.specular = stage.request.specular && shows_reflections(look.layer);
   return request;
 }
 
@@ -115,7 +122,7 @@ Tensor<float> Projector::photograph(const PhotoRef& photo) const {
 
 Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request, const Stage& stage,
                                    show::Painter& painter) {
-  painter.options() = {show::parse_colour_map(look.map), look.exposure, follow};
+  painter.options() = {show::parse_colour_map(look.map), look.exposure, look.moving ? follow : 1};
   const bool difference = look.layer == "difference";
   const auto* photo = std::get_if<PhotoRef>(&look.camera);
   if (difference && photo == nullptr) throw InputError("message", "layer", "difference", "a captured camera");
@@ -188,7 +195,8 @@ void Projector::answer(const Job& job, const Path& path, const Stage& stage) {
 }
 
 void Projector::answer(const Job& job, const ProbeJob& probe, const Stage& stage) {
-  const FrameRequest request = request_for(probe.look, stage, 1);
+  FrameRequest request = request_for(probe.look, stage, 1);
+  request.specular = stage.request.specular;  // whatever the layer shows
   const double x = probe.probe.x * request.camera.width, y = probe.probe.y * request.camera.height;
   std::optional<show::ProbeResult> found = show::probe(renderer(stage), stage.scene, request, x, y);
   posed_ = true;
