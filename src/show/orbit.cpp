@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "show/look_at.h"
+
 namespace traceflow::show {
 
 namespace {
@@ -20,44 +22,6 @@ struct Circle {
   double radius = 1, height = 0;
   double swing = pi;  // largest angle to either side; pi goes round
 };
-
-V unit(const V& v, const V& otherwise) {
-  const double length = std::sqrt(dot(v, v));
-  return length > 1e-9 && std::isfinite(length) ? v / length : otherwise;
-}
-
-// Any unit vector at right angles to the unit vector v.
-V perpendicular(const V& v) {
-  const V axis = std::abs(v.x) < 0.5 ? V{1, 0, 0} : V{0, 0, 1};
-  return unit(cross(v, cross(axis, v)), V{0, 0, 1});
-}
-
-// Rows of camera_from_world are the camera's axes in world.
-V axis_of(const Camera<float>& camera, int row) {
-  const Mat3<float>& r = camera.camera_from_world;
-  return {r[0][row], r[1][row], r[2][row]};
-}
-
-// The point nearest to all optical axes in the least-squares sense; a little ridge keeps parallel axes
-// solvable.
-V point_looked_at(const std::vector<Camera<float>>& cameras, double spread) {
-  Mat3<double> a(1e-6);
-  V middle(0), b(0);
-  for (const Camera<float>& c : cameras) middle += V(c.position) / static_cast<double>(cameras.size());
-  V forward(0);
-  for (const Camera<float>& c : cameras) {
-    const V d = axis_of(c, 2);
-    const Mat3<double> project = Mat3<double>(1.0) - outerProduct(d, d);
-    a += project;
-    b += project * (V(c.position) - middle);
-    forward += d;
-  }
-  const V point = middle + inverse(a) * b;
-  double ahead = 0;
-  for (const Camera<float>& c : cameras) ahead += dot(point - V(c.position), axis_of(c, 2));
-  if (ahead > 0 && std::isfinite(ahead)) return point;
-  return middle + unit(forward, V{0, 0, 1}) * spread;
-}
 
 Circle circle_from(const std::vector<Camera<float>>& cameras) {
   V middle(0), down(0);
@@ -99,12 +63,7 @@ Camera<float> look(Camera<float> camera, const Circle& circle, double angle) {
   const V side = cross(circle.up, circle.start);
   const V offset =
       circle.radius * (std::cos(angle) * circle.start + std::sin(angle) * side) + circle.height * circle.up;
-  const V z = unit(-offset, circle.start);
-  const V x = unit(cross(z, circle.up), perpendicular(z));
-  const V y = cross(z, x);
-  camera.position = Vec3<float>(circle.target + offset);
-  camera.camera_from_world = Mat3<float>(transpose(Mat3<double>(x, y, z)));
-  return camera;
+  return looking(camera, circle.target + offset, unit(-offset, circle.start), circle.up);
 }
 
 std::vector<Shot> path(const Camera<float>& like, const Circle& circle, int frames) {
