@@ -36,7 +36,7 @@ inline constexpr int64_t path_frames_cap = 100'000;
 // missing, not a number or out of range, a rotation that is none, more than 10,000 keyframes or
 // path_frames_cap frames.
 CameraPath parse_camera_path(const std::string& text, const std::string& where);
-CameraPath read_camera_path(const std::filesystem::path& file);
+CameraPath read_camera_path(const std::filesystem::path& path);
 
 // Frames that the path has. Throws InputError beyond path_frames_cap.
 int64_t frame_count(const CameraPath& path);

@@ -17,9 +17,9 @@ V perpendicular(const V& v) {
 }
 
 // Rows of camera_from_world are the camera's axes in world.
-V axis_of(const Camera<float>& camera, int row) {
+V axis_of(const Camera<float>& camera, int axis) {
   const Mat3<float>& r = camera.camera_from_world;
-  return {r[0][row], r[1][row], r[2][row]};
+  return {r[0][axis], r[1][axis], r[2][axis]};
 }
 
 Camera<float> looking(Camera<float> camera, const V& from, const V& forward, const V& up) {

@@ -22,6 +22,7 @@ constexpr double least_share = 1.0 / 50;
 // How far nine of ten cameras stand from the mean along an axis, at most.
 double reach_along(const std::vector<Camera<float>>& cameras, const V& middle, const V& axis) {
   std::vector<double> distances;
+  distances.reserve(cameras.size());
   for (const Camera<float>& c : cameras) distances.push_back(std::abs(dot(V(c.position) - middle, axis)));
   const auto most = distances.begin() + static_cast<std::ptrdiff_t>((distances.size() - 1) * 9 / 10);
   std::nth_element(distances.begin(), most, distances.end());

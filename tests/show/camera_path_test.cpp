@@ -131,16 +131,18 @@ RC_GTEST_PROP(CameraPath, has_no_kinks, ()) {
 TEST(CameraPath, TurnsTheShorterWayAtAnEvenSpeedBetweenTwoKeyframes) {
   CameraPath path;
   path.keyframes.resize(2);
-  const double angle = 3.0;  // the other way would be 3.28
-  path.keyframes[1].world_from_camera =
-      Mat3<double>(std::cos(angle), 0, -std::sin(angle), 0, 1, 0, std::sin(angle), 0, std::cos(angle));
   path.keyframes[1].position = {2, 0, 0};
-  const PathCurve curve(path);
-  for (const double t : {0.25, 0.5, 0.75}) {
-    const Pose pose = curve.at(t);
-    EXPECT_NEAR(pose.world_from_camera[0][0], std::cos(t * angle), 1e-9);
-    EXPECT_NEAR(pose.world_from_camera[2][0], std::sin(t * angle), 1e-9);
-    EXPECT_NEAR(pose.position.x, 2 * t, 1e-9);
+  // The other way would be 3.28.
+  for (const double angle : {3.0, -3.0}) {
+    path.keyframes[1].world_from_camera =
+        Mat3<double>(std::cos(angle), 0, -std::sin(angle), 0, 1, 0, std::sin(angle), 0, std::cos(angle));
+    const PathCurve curve(path);
+    for (const double t : {0.25, 0.5, 0.75}) {
+      const Pose pose = curve.at(t);
+      EXPECT_NEAR(pose.world_from_camera[0][0], std::cos(t * angle), 1e-9);
+      EXPECT_NEAR(pose.world_from_camera[2][0], std::sin(t * angle), 1e-9);
+      EXPECT_NEAR(pose.position.x, 2 * t, 1e-9);
+    }
   }
 }
 

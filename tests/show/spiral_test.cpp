@@ -55,13 +55,15 @@ TEST(Spiral, GoesAsFarAsTheCamerasDidAndLooksAtWhatTheyLookAt) {
 
 TEST(Spiral, ClosesAndMovesEvenAroundOneCamera) {
   const auto shots = spiral_around_cameras({camera_at(1, 1)}, 200);
-  float longest = 0;
+  float longest = 0, right = 0;
   for (size_t i = 0; i < shots.size(); ++i) {
     const float step = length(shots[i].camera.position - shots[(i + 1) % shots.size()].camera.position);
     EXPECT_GT(step, 0);
     longest = std::max(longest, step);
+    right = std::max(right, shots[i].camera.position.x);
   }
   EXPECT_LT(longest, 0.01F);
+  EXPECT_GT(right, 1.01F);
 }
 
 }  // namespace
