@@ -35,13 +35,6 @@ std::string surfel_text(const events::SurfelCounts& counts) {
   return count_text(counts.main) + "+" + count_text(counts.environment) + " surfels";
 }
 
-int terminal_width() {
-  if (isatty(STDERR_FILENO) == 0) return 0;
-  winsize size{};
-  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
-  return size.ws_col;
-}
-
 const char* ending_text(events::Ending ending) {
   switch (ending) {
     case events::Ending::completed:
@@ -57,6 +50,13 @@ const char* ending_text(events::Ending ending) {
 }
 
 }  // namespace
+
+int terminal_width() {
+  if (isatty(STDERR_FILENO) == 0) return 0;
+  winsize size{};
+  if (ioctl(STDERR_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return 80;
+  return size.ws_col;
+}
 
 std::string duration_text(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0) return "?";

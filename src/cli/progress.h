@@ -43,6 +43,9 @@ class Progress {
 // The status line of one step, made of as many of its parts as fit into `width` columns (0: all, and no bar).
 std::string status_line(const events::Step& step, int width);
 
+// Columns of standard error's terminal; 0 where it is none.
+int terminal_width();
+
 // 7 s, 2:05, 1:02:03.
 std::string duration_text(double seconds);
 // 950, 12.7k, 1.25M.

@@ -1,15 +1,19 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <chrono>
 #include <memory>
 
 #include "cli/device_arguments.h"
+#include "cli/error_boundary.h"
+#include "cli/frame_progress.h"
 #include "cli/option_arguments.h"
-#include "cli/trained_run.h"
+#include "cli/render_shots.h"
+#include "cli/stop_request.h"
 #include "cli/verbs.h"
-#include "show/camera_file.h"
+#include "files/png.h"
 #include "show/layer_files.h"
-#include "show/orbit.h"
+#include "show/side_by_side.h"
 #include "show/video.h"
 
 namespace traceflow::cli {
@@ -17,143 +21,103 @@ namespace traceflow::cli {
 namespace {
 
 struct RenderArguments {
-  std::string scene, output, environment, capture, split, cameras, layers = "rgb", format = "png", video;
-  std::optional<float> time;
-  bool orbit = false;
-  int frames = 120;
-  int downscale = 0;
-  std::pair<int, int> size = {640, 360};
-  double frames_per_second = 30;
+  std::string scene, output, environment, layers = "rgb", format = "png", video;
+  ShotArguments shots;
+
+  void check() const {
+    if (output.empty() && video.empty())
+      throw InputError("option", "output", "nothing", "-o DIR, --video FILE.mp4 or both");
+    shots.check();
+    if (!video.empty()) show::Video::prepare(video);
+  }
 };
 
-// A scene to render and, when it comes from a run, what else is known of it.
-struct Loaded {
-  show::Subject subject;
-  std::optional<TrainedRun> run;
+// Where the pictures go: files, a film, or both.
+class Output {
+ public:
+  Output(const RenderArguments& a, const ChosenShots& chosen, double scale)
+      : a_(a),
+        chosen_(chosen),
+        layers_(show::parse_layers(a.layers)),
+        scale_(scale),
+        files_(a.output, layers_, a.format == "npy" ? show::ImageFormat::npy : show::ImageFormat::png, scale),
+        video_(a.video, chosen.frames_per_second) {}
+
+  void add(size_t i, const Frame& frame) {
+    const std::string& name = chosen_.shots[i].name;
+    if (!a_.output.empty()) files_.write(name, frame);
+    if (a_.video.empty() && !a_.shots.compare) return;
+    Tensor<uint8_t> picture =
+        show::in_colour(painter_.paint(layers_[0], show::layer_values(frame, layers_[0], scale_)));
+    if (a_.shots.compare) {
+      const std::shared_ptr<const ViewImages> images = load_images(*chosen_.capture, chosen_.photographs[i]);
+      picture = show::side_by_side(to_8bit(images->colour), picture);
+      if (!a_.output.empty()) write_compared(name, picture);
+    }
+    if (!a_.video.empty()) video_.add(picture);
+  }
+  void finish() { video_.finish(); }
+
+ private:
+  void write_compared(const std::string& name, const Tensor<uint8_t>& picture) const {
+    const std::filesystem::path path = std::filesystem::path(a_.output) / "compare" / (name + ".png");
+    std::filesystem::create_directories(path.parent_path());
+    write_png(path, picture);
+  }
+
+  const RenderArguments& a_;
+  const ChosenShots& chosen_;
+  std::vector<show::Layer> layers_;
+  double scale_;
+  show::LayerFiles files_;
+  show::Video video_;
+  show::Painter painter_;
 };
 
-Loaded load(const RenderArguments& a) {
-  const std::filesystem::path path(a.scene);
-  if (std::filesystem::is_regular_file(path))
-    return {show::read_ply_subject(path, a.environment), std::nullopt};
-  if (std::filesystem::is_regular_file(path / "main.ply")) {
-    return {show::read_ply_subject(path / "main.ply", a.environment), std::nullopt};
+// Renders until the end or Ctrl-C; how many shots it came to.
+size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, Output& output) {
+  const std::atomic<bool>& stop = stop_on_signals();
+  const auto start = std::chrono::steady_clock::now();
+  FrameProgress progress = FrameProgress::for_stderr(static_cast<int64_t>(shots.size()));
+  Renderer renderer(subject.render);
+  size_t done = 0;
+  while (done < shots.size() && !stop) {
+    FrameRequest request = subject.request;
+    request.camera = shots[done].camera;
+    request.time = *shots[done].time;
+    output.add(done, renderer.forward(subject.scene, request));
+    ++done;
+    progress.show(static_cast<int64_t>(done),
+                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
-  if (!std::filesystem::exists(path)) {
-    throw InputError(path.string(), "", "no such file or folder", "a run's folder or a .ply");
-  }
-  if (!a.environment.empty()) {
-    throw InputError("option", "environment", "a run, which has its own", "a .ply to go with");
-  }
-  TrainedRun run = read_run(path);
-  show::Subject subject = std::move(run.subject);
-  subject.warning = run.note;
-  return {std::move(subject), std::move(run)};
-}
-
-Capture capture_for(const RenderArguments& a, const Loaded& loaded) {
-  if (loaded.run) return capture_of(*loaded.run, a.capture, a.downscale);
-  if (a.capture.empty()) {
-    throw InputError(a.scene, "", "a .ply, which has no cameras", "--cameras FILE, --orbit, or -d CAPTURE");
-  }
-  CaptureOptions options;
-  if (a.downscale > 0) options.downscale = a.downscale;
-  return load_capture(a.capture, options);
-}
-
-// A capture's camera where the scene is: a .ply stands in the capture's own coordinates.
-Camera<float> camera_for(const Loaded& loaded, const Capture& capture, Camera<float> camera) {
-  if (loaded.run) return camera;
-  const SceneNormalisation& n = capture.normalisation;
-  camera.position = Vec3<float>(Vec3<double>(camera.position) / n.scale + n.centre);
-  return camera;
-}
-
-std::vector<show::Shot> split_shots(const RenderArguments& a, const Loaded& loaded) {
-  const Capture capture = capture_for(a, loaded);
-  std::vector<show::Shot> shots;
-  for (const View& view : views_of(capture, a.split.empty() ? "test" : a.split)) {
-    show::check_name(capture.folder.string(), "view id", view.id);
-    shots.push_back({view.id, view.time, camera_for(loaded, capture, view.camera)});
-  }
-  return shots;
-}
-
-std::vector<show::Shot> orbit_shots(const RenderArguments& a, const Loaded& loaded) {
-  if (!loaded.run && a.capture.empty()) {
-    return show::orbit_around_points(loaded.subject.scene.main.position, a.size.first, a.size.second,
-                                     a.frames);
-  }
-  const Capture capture = capture_for(a, loaded);
-  std::vector<Camera<float>> cameras;
-  for (const View& view : views_of(capture, "train"))
-    cameras.push_back(camera_for(loaded, capture, view.camera));
-  std::vector<show::Shot> shots = show::orbit_around_cameras(cameras, a.frames);
-  // The scene moves while the camera does, once from beginning to end.
-  for (size_t i = 0; i < shots.size(); ++i) {
-    shots[i].time =
-        static_cast<float>(static_cast<double>(i) / std::max<double>(1, static_cast<double>(a.frames - 1)));
-  }
-  return shots;
-}
-
-std::vector<show::Shot> choose_shots(const RenderArguments& a, const Loaded& loaded) {
-  if (!a.cameras.empty()) return show::read_cameras(a.cameras, loaded.subject.scene.normalisation);
-  return a.orbit ? orbit_shots(a, loaded) : split_shots(a, loaded);
-}
-
-void check_arguments(const RenderArguments& a) {
-  if (a.output.empty() && a.video.empty()) {
-    throw InputError("option", "output", "nothing", "-o DIR, --video FILE.mp4 or both");
-  }
-  // The parser's range lets "nan" through.
-  if (a.time) check_option(*a.time >= 0 && *a.time <= 1, "time", *a.time, "0 to 1");
-  if (!a.video.empty()) show::Video::prepare(a.video);
+  output.finish();
+  progress.finish();
+  return done;
 }
 
 void run_render(const RenderArguments& a, const OptionArguments& options, const DeviceArguments& devices) {
-  check_arguments(a);
-  const std::vector<show::Layer> layers = show::parse_layers(a.layers);
-  Loaded loaded = load(a);
-  show::Subject& subject = loaded.subject;
+  a.check();
+  show::parse_layers(a.layers);
+  LoadedScene scene = load_scene(a.scene, a.environment);
+  show::Subject& subject = scene.subject;
   options.apply(option_fields(subject.render));
   subject.render.validate();
-  const std::vector<show::Shot> shots = choose_shots(a, loaded);
-  if (!(subject.scene.extent > 0)) subject.scene.extent = show::extent_seen_from(subject.scene.main, shots);
+  const ChosenShots chosen = choose_shots(a.shots, scene);
+  if (!(subject.scene.extent > 0))
+    subject.scene.extent = show::extent_seen_from(subject.scene.main, chosen.shots);
   if (!subject.warning.empty()) fmt::print(stderr, "{}\n", subject.warning);
-
   subject.scene.move_to(devices.choose());
 
-  const double scale = subject.scene.normalisation.scale;
-  show::LayerFiles files(a.output, layers,
-                         a.format == "npy" ? show::ImageFormat::npy : show::ImageFormat::png, scale);
-  show::Video video(a.video, a.frames_per_second);
-  show::Painter painter;
-  Renderer renderer(subject.render);
-  for (const show::Shot& shot : shots) {
-    FrameRequest request = subject.request;
-    request.camera = shot.camera;
-    request.time = a.time ? *a.time : shot.time.value_or(0.0F);
-    const Frame& frame = renderer.forward(subject.scene, request);
-    if (!a.output.empty()) files.write(shot.name, frame);
-    if (!a.video.empty()) {
-      video.add(show::in_colour(painter.paint(layers[0], show::layer_values(frame, layers[0], scale))));
-    }
+  Output output(a, chosen, subject.scene.normalisation.scale);
+  const size_t done = take(chosen.shots, subject, output);
+  std::string where = a.output;
+  if (!a.video.empty()) where += (where.empty() ? "" : " and ") + a.video;
+  if (done < chosen.shots.size()) {
+    fmt::print(stderr, "stopped after {} of {} frames: {}\n", done, chosen.shots.size(),
+               done > 0 ? where : "nothing was written");
+    throw Exit{exit_interrupted};
   }
-  video.finish();
-  fmt::print("{} views of {} surfels: {}\n", shots.size(), subject.scene.main.count(),
-             a.output.empty() ? a.video : a.output);
-}
-
-// "640x360".
-std::pair<int, int> parse_size(const std::string& text) {
-  int width = 0, height = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &width, &height, &rest) != 2 || width < 1 || height < 1 ||
-      width > 16384 || height > 16384) {
-    throw InputError("option", "size", text, "WIDTHxHEIGHT, each 1 to 16384");
-  }
-  return {width, height};
+  fmt::print("{} views of {} surfels: {}\n", done, subject.scene.main.count(), where);
 }
 
 }  // namespace
@@ -165,26 +129,7 @@ void add_render(CLI::App& program) {
       ->required();
   verb->add_option("-o,--output", a->output, "Folder for LAYER/NAME.png or .npy");
   verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
-  CLI::Option* split =
-      verb->add_option("--split", a->split, "The capture's views of this split: test (default) or train")
-          ->check(CLI::IsMember({"test", "train"}));
-  CLI::Option* cameras =
-      verb->add_option("--cameras", a->cameras, "Cameras, a cameras.json as 3DGS and 2DGS write it")
-          ->excludes(split);
-  verb->add_flag("--orbit", a->orbit, "A path around what the cameras look at")
-      ->excludes(split)
-      ->excludes(cameras);
-  verb->add_option("--frames", a->frames, "Frames of the orbit")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
-  verb->add_option_function<std::string>(
-          "--size", [a](const std::string& text) { a->size = parse_size(text); }, "Size of a .ply's orbit")
-      ->default_str("640x360");
-  verb->add_option("--time", a->time, "One time for all views, 0 to 1; else each view's own")
-      ->check(CLI::Range(0.0, 1.0));
-  verb->add_option("-d,--data", a->capture, "The capture's folder, where it is not where the run found it");
-  verb->add_option("--downscale", a->downscale, "Another size of the capture than the run was trained at")
-      ->check(CLI::Range(1, 64));
+  add_shot_arguments(*verb, a->shots);
   verb->add_option("--layers", a->layers,
                    "Of rgb, diffuse, specular, tint, alpha, normal, depth, median-depth, distortion, "
                    "surfels, with commas between; or all")
@@ -192,10 +137,7 @@ void add_render(CLI::App& program) {
   verb->add_option("--format", a->format, "png for the eye or npy (float32)")
       ->check(CLI::IsMember({"png", "npy"}))
       ->capture_default_str();
-  verb->add_option("--video", a->video, "Film of the first layer, by ffmpeg");
-  verb->add_option("--fps", a->frames_per_second, "Frames a second of the film")
-      ->check(CLI::Range(0.1, 1000.0))
-      ->capture_default_str();
+  verb->add_option("--video", a->video, "Film of the first layer, by ffmpeg: FILE.mp4");
   const auto defaults = std::make_shared<RenderOptions>();
   const OptionArguments options(*verb, option_fields(*defaults));
   const DeviceArguments devices(*verb);

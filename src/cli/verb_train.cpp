@@ -9,7 +9,7 @@
 #include "cli/option_arguments.h"
 #include "cli/progress.h"
 #include "cli/server_arguments.h"
-#include "cli/stop_signal.h"
+#include "cli/stop_request.h"
 #include "cli/trained_run.h"
 #include "cli/verbs.h"
 #include "files/options_json.h"

@@ -4,9 +4,9 @@
 #include <memory>
 
 #include "cli/device_arguments.h"
+#include "cli/loaded_scene.h"
 #include "cli/server_arguments.h"
-#include "cli/stop_signal.h"
-#include "cli/trained_run.h"
+#include "cli/stop_request.h"
 #include "cli/verbs.h"
 #include "serve/run_view.h"
 #include "show/orbit.h"
@@ -33,59 +33,44 @@ serve::RunView::Shown shown_of(TrainedRun run, Device device) {
   return {std::move(run.subject), run.iterations, run.options.iterations};
 }
 
-// The capture, where it is still there: a run can be looked at without its photographs.
-std::optional<Capture> capture_beside(const ViewArguments& a, const TrainedRun& run) {
-  if (a.capture.empty() && !std::filesystem::exists(run.capture_folder)) {
-    fmt::print(stderr,
-               "{} is not there: no photographs to compare with; say where they are with -d CAPTURE\n",
-               run.capture_folder.string());
-    return std::nullopt;
-  }
-  return capture_of(run, a.capture, a.downscale);
-}
-
-void view_run(const ViewArguments& a, const DeviceArguments& devices, const ServerArguments& where) {
-  TrainedRun run = read_run(a.scene);
-  if (!run.note.empty()) fmt::print(stderr, "{}\n", run.note);
-  if (!a.environment.empty())
-    throw InputError("option", "environment", "a run, which has its own", "a .ply to go with");
-  const std::optional<Capture> capture = capture_beside(a, run);
-  const Device device = devices.choose();
-  const RunFolder folder{a.scene};
-  serve::Setting setting = serve::make_setting("run", run_name(a.scene), capture ? &*capture : nullptr,
-                                               run.subject.scene.normalisation);
-  serve::RunView view(std::move(setting), shown_of(std::move(run), device));
-  view.follow(folder, [&a, device] { return shown_of(read_run(a.scene), device); });
-  const auto server = where.start(view.room());
-  view.run(stop_on_signals());
-}
-
-void view_ply(const std::filesystem::path& path, const ViewArguments& a, const DeviceArguments& devices,
-              const ServerArguments& where) {
-  serve::RunView::Shown shown{show::read_ply_subject(path, a.environment)};
-  show::Subject& subject = shown.subject;
-  if (!subject.warning.empty()) fmt::print(stderr, "{}\n", subject.warning);
-  std::optional<Capture> capture;
-  if (!a.capture.empty()) {
+// The capture, where there is one: a run can be looked at without its photographs.
+std::optional<Capture> capture_beside(const ViewArguments& a, const std::optional<TrainedRun>& run) {
+  if (!run && a.capture.empty()) return std::nullopt;
+  if (!run) {
     CaptureOptions options;
     if (a.downscale > 0) options.downscale = a.downscale;
-    capture = load_capture(a.capture, options);
+    return load_capture(a.capture, options);
   }
-  serve::Setting setting = serve::make_setting("ply", path.filename().string(), capture ? &*capture : nullptr,
-                                               subject.scene.normalisation);
-  if (!(subject.scene.extent > 0)) subject.scene.extent = extent_of(subject.scene.main, setting);
-  subject.scene.move_to(devices.choose());
-  serve::RunView view(std::move(setting), std::move(shown));
-  const auto server = where.start(view.room());
-  view.run(stop_on_signals());
+  if (a.capture.empty() && !std::filesystem::exists(run->capture_folder)) {
+    fmt::print(stderr,
+               "{} is not there: no photographs to compare with; say where they are with -d CAPTURE\n",
+               run->capture_folder.string());
+    return std::nullopt;
+  }
+  return capture_of(*run, a.capture, a.downscale);
 }
 
 void view(const ViewArguments& a, const DeviceArguments& devices, const ServerArguments& where) {
-  const std::filesystem::path path(a.scene);
-  if (std::filesystem::is_regular_file(path)) return view_ply(path, a, devices, where);
-  if (std::filesystem::is_regular_file(path / "main.ply"))
-    return view_ply(path / "main.ply", a, devices, where);
-  view_run(a, devices, where);
+  LoadedScene loaded = load_scene(a.scene, a.environment);
+  Scene& scene = loaded.subject.scene;
+  if (!loaded.subject.warning.empty()) fmt::print(stderr, "{}\n", loaded.subject.warning);
+  const std::optional<Capture> capture = capture_beside(a, loaded.run);
+  serve::Setting setting = serve::make_setting(loaded.run ? "run" : "ply", run_name(a.scene),
+                                               capture ? &*capture : nullptr, scene.normalisation);
+  if (!(scene.extent > 0)) scene.extent = extent_of(scene.main, setting);
+  const Device device = devices.choose();
+  scene.move_to(device);
+
+  serve::RunView::Shown shown{std::move(loaded.subject)};
+  if (loaded.run) {
+    shown.iteration = loaded.run->iterations;
+    shown.iterations = loaded.run->options.iterations;
+  }
+  serve::RunView view(std::move(setting), std::move(shown));
+  if (loaded.run)
+    view.follow(RunFolder{a.scene}, [&a, device] { return shown_of(read_run(a.scene), device); });
+  const auto server = where.start(view.room());
+  view.run(stop_on_signals());
 }
 
 }  // namespace

@@ -13,6 +13,7 @@ namespace traceflow::cli {
 void add_train(CLI::App& program);
 void add_eval(CLI::App& program);
 void add_render(CLI::App& program);
+void add_report(CLI::App& program);
 void add_trace(CLI::App& program);
 void add_export(CLI::App& program);
 void add_synth(CLI::App& program);

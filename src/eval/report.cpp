@@ -12,12 +12,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Metrics mean_of(const Report& report) {
-  std::vector<Metrics> all;
-  for (const ViewReport& view : report.views) all.push_back(view.metrics);
-  return mean(all);
-}
-
 void put_metrics(const Metrics& metrics, Json& json) {
   Metrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
     json[name] = value ? Json(*value) : Json(nullptr);
@@ -35,6 +29,12 @@ std::string table_line(const std::string& label, size_t width, const Metrics& m)
 }
 
 }  // namespace
+
+Metrics mean_of(const Report& report) {
+  std::vector<Metrics> all;
+  for (const ViewReport& view : report.views) all.push_back(view.metrics);
+  return mean(all);
+}
 
 void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report) {
@@ -54,8 +54,10 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
 
     const std::shared_ptr<const ViewImages> images = load_images(capture, view);
     const ViewTruth truth = capture.has_truth ? load_truth(capture, view) : ViewTruth{};
-    report.views.push_back({view.id, measure(frame.colour, frame.raster.normal,
-                                             {images->colour, images->mask, truth.normal}, network)});
+    report.views.push_back(
+        {view.id,
+         measure(frame.colour, frame.raster.normal, {images->colour, images->mask, truth.normal}, network),
+         view.time});
     if (listener) listener(view, *images, frame);
   }
   if (seconds > 0) report.render_fps = static_cast<double>(views.size()) / seconds;

@@ -13,6 +13,7 @@ namespace traceflow::eval {
 struct ViewReport {
   std::string id;
   Metrics metrics;
+  float time = 0;  // in [0, 1]
 };
 
 // What is known of a scene's quality: the content of metrics.json.
@@ -35,6 +36,9 @@ using ViewListener = std::function<void(const View& view, const ViewImages& imag
 // Renders every view, measures it, and adds it to the report; sets render_fps and the surfel counts.
 void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report);
+
+// Each figure's mean over the report's views that have it.
+Metrics mean_of(const Report& report);
 
 // The report as JSON text: figures that cannot be had are null.
 std::string report_json(const Report& report);

@@ -4,9 +4,9 @@
 
 #include "base/version.h"
 #include "serve/look_camera.h"
-#include "show/aim.h"
 #include "show/colour_map.h"
 #include "show/layers.h"
+#include "show/look_at.h"
 #include "show/orbit.h"
 
 namespace traceflow::serve {
@@ -52,7 +52,9 @@ Start start_of(const Stage& stage, const Setting& setting) {
   for (const CapturedCamera& view : setting.test) cameras.push_back(view.camera);
   if (!cameras.empty()) return {cameras.front(), show::aim_of(cameras)};
   const Tensor<float> points = stage.scene.main.position.on(Device::cpu);
-  return {show::orbit_around_points(points, 16, 9, 1).front().camera, {show::median_point(points)}};
+  Start start{show::orbit_around_points(points, 16, 9, 1).front().camera, {}};
+  start.aim.target = show::median_point(points);
+  return start;
 }
 
 }  // namespace

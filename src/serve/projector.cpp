@@ -8,6 +8,7 @@
 #include "files/png.h"
 #include "serve/hello.h"
 #include "serve/look_camera.h"
+#include "show/camera_path.h"
 #include "show/probe.h"
 
 namespace traceflow::serve {
@@ -18,6 +19,7 @@ using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* about_memory = "memory";  // what a trouble is about
+constexpr int64_t most_previewed = 20'000;      // frames of a camera path
 constexpr int photo_quality = 90;
 // How fast the ranges of depth and distortion follow the picture: settled after some ten frames.
 constexpr float follow = 0.25F;
@@ -190,8 +192,16 @@ void Projector::answer(const Job& job, const Photo& photo, const Stage&) {
 
 void Projector::answer(const Job& job, const Path& path, const Stage& stage) {
   const SceneNormalisation& normalisation = stage.scene.normalisation;
-  static_cast<void>(normalisation);
-  audience_.refuse(job.guest, "path", path.id, "not yet");
+  const show::CameraPath asked = show::parse_camera_path(path.path, "camera path");
+  check_option(show::frame_count(asked) <= most_previewed, "frames", show::frame_count(asked),
+               "at most " + std::to_string(most_previewed) + " to preview");
+  Json shots = Json::array();
+  for (const show::Shot& shot : show::shots_of(asked, normalisation)) {
+    shots.push_back(
+        {{"camera", to_json(free_camera(shot.camera, normalisation))}, {"time", shot.time.value_or(0.0F)}});
+  }
+  audience_.reply(job.guest,
+                  text_message(dump({{"type", "path"}, {"id", path.id}, {"shots", std::move(shots)}})));
 }
 
 void Projector::answer(const Job& job, const ProbeJob& probe, const Stage& stage) {

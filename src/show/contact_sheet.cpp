@@ -49,13 +49,13 @@ void paste(const Tensor<uint8_t>& image, int64_t top, int64_t left, Tensor<uint8
   }
 }
 
+}  // namespace
+
 Tensor<float> difference(const Tensor<float>& a, const Tensor<float>& b) {
   Tensor<float> result(a.shape());
   for (int64_t i = 0; i < a.size(); ++i) result[i] = difference_gain * std::abs(a[i] - b[i]);
   return result;
 }
-
-}  // namespace
 
 void ContactSheet::add(const Tensor<float>& photograph, const Frame& frame) {
   require(photograph.shape() == frame.colour.shape(), "photograph and render have one shape",

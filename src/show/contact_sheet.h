@@ -24,4 +24,7 @@ class ContactSheet {
   std::vector<std::vector<Tensor<uint8_t>>> rows_;
 };
 
+// |a − b|, three times as strong, to be seen.
+Tensor<float> difference(const Tensor<float>& a, const Tensor<float>& b);
+
 }  // namespace traceflow::show

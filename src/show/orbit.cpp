@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "show/aim.h"
+#include "show/look_at.h"
 
 namespace traceflow::show {
 
@@ -23,15 +23,7 @@ struct Circle {
   double swing = pi;  // largest angle to either side; pi goes round
 };
 
-// Any unit vector at right angles to the unit vector v.
-V perpendicular(const V& v) {
-  const V axis = std::abs(v.x) < 0.5 ? V{1, 0, 0} : V{0, 0, 1};
-  return unit(cross(v, cross(axis, v)), V{0, 0, 1});
-}
-
 Circle circle_from(const std::vector<Camera<float>>& cameras) {
-  V middle(0);
-  for (const Camera<float>& c : cameras) middle += V(c.position) / static_cast<double>(cameras.size());
   const Aim aim = aim_of(cameras);
   Circle circle;
   circle.up = aim.up;
@@ -46,7 +38,7 @@ Circle circle_from(const std::vector<Camera<float>>& cameras) {
   }
   circle.radius = std::max(radius, 1e-6);
   circle.height = height;
-  const V mean_offset = middle - circle.target;
+  const V mean_offset = aim.middle - circle.target;
   circle.start = unit(mean_offset - dot(mean_offset, circle.up) * circle.up, perpendicular(circle.up));
 
   const V side = cross(circle.up, circle.start);
@@ -65,12 +57,7 @@ Camera<float> look(Camera<float> camera, const Circle& circle, double angle) {
   const V side = cross(circle.up, circle.start);
   const V offset =
       circle.radius * (std::cos(angle) * circle.start + std::sin(angle) * side) + circle.height * circle.up;
-  const V z = unit(-offset, circle.start);
-  const V x = unit(cross(z, circle.up), perpendicular(z));
-  const V y = cross(z, x);
-  camera.position = Vec3<float>(circle.target + offset);
-  camera.camera_from_world = Mat3<float>(transpose(Mat3<double>(x, y, z)));
-  return camera;
+  return looking(camera, circle.target + offset, unit(-offset, circle.start), circle.up);
 }
 
 std::vector<Shot> path(const Camera<float>& like, const Circle& circle, int frames) {

@@ -25,12 +25,18 @@ int spawn_ffmpeg(std::vector<std::string> words, int input, pid_t& process) {
   words.insert(words.begin(), "ffmpeg");
   std::vector<char*> arguments(words.size() + 1, nullptr);
   for (size_t i = 0; i < words.size(); ++i) arguments[i] = words[i].data();
+  // Ctrl-C goes to this program's group: the film is ended in good order from here.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   if (input >= 0) posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  const int error = ::posix_spawnp(&process, "ffmpeg", &actions, nullptr, arguments.data(), environ);
+  const int error = ::posix_spawnp(&process, "ffmpeg", &actions, &attributes, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
+  posix_spawnattr_destroy(&attributes);
   return error;
 }
 

@@ -98,7 +98,7 @@ TEST(Progress, RedrawsOneLineOnATerminalAndClearsItForOthers) {
 TEST(Progress, TellsHowARunBeginsAndEnds) {
   std::ostringstream out;
   Progress progress(out, 0);
-  progress(events::Started{"plate", "runs/plate", 200, 1000, "cpu", 2, 1, {500, 0}, 5 << 20, "", {}});
+  progress(events::Started{"plate", "runs/plate", 200, 1000, "cpu", 2, 1, {500, 0}, 5 << 20, "1.0", {}});
   progress(events::Saved{1000, "runs/plate/state.safetensors", 0.1});
   progress(events::Evaluated{1000, "test", 4, 25.5, 0.9, 3});
   progress(events::Finished{events::Ending::diverged, 700, 61, 12.25, {500, 40}, "main.position[3] is nan"});

@@ -1,4 +1,5 @@
-// Bytes as what a page says over its live connection, a message in each line: read, kept by the audience, and turned into jobs.
+// Bytes as what a page says over its live connection, a message in each line: read, kept by the audience, and
+// turned into jobs.
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
@@ -14,12 +15,14 @@ namespace {
 
 void check(const serve::Look& look) {
   promise(look.id >= 0, "a number is not negative");
-  promise(look.width >= 1 && look.width <= 4096 && look.height >= 1 && look.height <= 4096, "a size is in its range");
+  promise(look.width >= 1 && look.width <= 4096 && look.height >= 1 && look.height <= 4096,
+          "a size is in its range");
   promise(look.time >= 0 && look.time <= 1, "a time is in its range");
   promise(std::abs(look.exposure) <= 10, "an exposure is in its range");
   promise(look.layer.size() <= 64 && look.map.size() <= 64, "a word is short");
   const auto* free = std::get_if<serve::FreeCamera>(&look.camera);
-  if (free == nullptr) return promise(std::get<serve::PhotoRef>(look.camera).index >= 0, "an index is not negative");
+  if (free == nullptr)
+    return promise(std::get<serve::PhotoRef>(look.camera).index >= 0, "an index is not negative");
   promise(free->fov_y > 0 && free->fov_y < 180, "an angle is in its range");
   promise(std::abs(determinant(free->world_from_camera) - 1) < 0.1, "a rotation is one");
   promise(length(free->position) < 1e17, "a position is finite");
@@ -28,11 +31,13 @@ void check(const serve::Look& look) {
 void check(const serve::Request& request) {
   std::visit(Overloaded{[](const serve::Look& look) { check(look); },
                         [](const serve::Still& still) {
-                          promise(still.width >= 1 && still.width <= 8192 && still.height >= 1 && still.height <= 8192,
+                          promise(still.width >= 1 && still.width <= 8192 && still.height >= 1 &&
+                                      still.height <= 8192,
                                   "a still has a size");
                         },
                         [](const serve::Probe& probe) {
-                          promise(probe.x >= 0 && probe.x <= 1 && probe.y >= 0 && probe.y <= 1, "a probe is in the picture");
+                          promise(probe.x >= 0 && probe.x <= 1 && probe.y >= 0 && probe.y <= 1,
+                                  "a probe is in the picture");
                         },
                         [](const auto&) {}},
              request);

@@ -48,7 +48,7 @@ TEST(LogHistory, AResumedRunGoesBackToItsCheckpoint) {
                             step_line(2) + line(events::Measured{2, "diffuse", 2, {}}) +
                             line(events::Saved{2, "c", 1}) + line(events::PhaseEntered{2, "joint"}) +
                             step_line(3, "joint") +
-                            line(events::Finished{events::Ending::diverged, 3, 1, 2, {}, "why"});
+                            line(events::Finished{events::Ending::diverged, 2, 1, 2, {}, "why"});
   const std::string second = start_line(2) + line(events::PhaseEntered{2, "joint"}) + step_line(3, "joint") +
                              step_line(4, "joint") + line(events::Finished{});
   EXPECT_EQ(told(read(first + second)),

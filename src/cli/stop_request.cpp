@@ -1,4 +1,4 @@
-#include "cli/stop_signal.h"
+#include "cli/stop_request.h"
 
 #include <csignal>
 
@@ -16,6 +16,7 @@ void request_stop(int signal_number) {
 }  // namespace
 
 std::atomic<bool>& stop_on_signals() {
+  stop_requested = false;
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   return stop_requested;

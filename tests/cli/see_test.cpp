@@ -1,0 +1,300 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <thread>
+
+#include "capture/synth.h"
+#include "cli/error_boundary.h"
+#include "cli/frame_progress.h"
+#include "cli/program.h"
+#include "files/png.h"
+
+// `report`, `eval`'s page and the films of `render`, from a run's folder to the files they leave.
+namespace traceflow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+const fs::path& folder() {
+  static const fs::path path = fs::path(testing::TempDir()) / ("traceflow-see-" + std::to_string(::getpid()));
+  return path;
+}
+std::string path(const std::string& name) { return (folder() / name).string(); }
+
+struct Result {
+  int code;
+  std::string out, error;
+};
+Result run_verb(std::vector<std::string> words) {
+  words.insert(words.begin(), "traceflow");
+  std::vector<const char*> arguments;
+  arguments.reserve(words.size());
+  for (const std::string& word : words) arguments.push_back(word.c_str());
+  testing::internal::CaptureStderr();
+  testing::internal::CaptureStdout();
+  const int code = run(static_cast<int>(arguments.size()), arguments.data());
+  return {code, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
+}
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+Json data_of(const fs::path& page) {
+  const std::string html = text_of(page), before = R"(id="report">)";
+  const size_t begin = html.find(before) + before.size();
+  return Json::parse(html.substr(begin, html.find('<', begin) - begin));
+}
+
+std::set<std::string> names_in(const fs::path& directory) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(directory)) names.insert(entry.path().filename().string());
+  return names;
+}
+
+// A small run, made once: eleven iterations, then resumed to fourteen.
+class See : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    fs::remove_all(folder());
+    SynthOptions options;
+    options.frames = 5;
+    options.width = 40;
+    options.height = 24;
+    options.samples = 2;
+    options.points = 200;
+    options.test_every = 2;
+    write_synthetic_capture(options, folder() / "capture");
+    std::vector<std::string> train = {"train",
+                                      "-d",
+                                      path("capture"),
+                                      "-o",
+                                      path("run"),
+                                      "--preset",
+                                      "demo",
+                                      "--set",
+                                      "deform.network.width=16",
+                                      "--set",
+                                      "deform.environment_network.width=16",
+                                      "--set",
+                                      "initial.environment_cells=4",
+                                      "-q",
+                                      "-i"};
+    train.emplace_back("11");
+    ASSERT_EQ(run_verb(train).code, exit_done);
+    train.back() = "14";
+    train.emplace_back("--resume");
+    ASSERT_EQ(run_verb(train).code, exit_done);
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder()); }
+};
+
+TEST_F(See, ReportTellsAllThatIsKnownOfTheRun) {
+  const Result made = run_verb({"report", path("run") + "/", "-o", path("pages/page.html")});
+  ASSERT_EQ(made.code, exit_done) << made.error;
+  EXPECT_THAT(made.out, HasSubstr("page.html"));
+  const Json data = data_of(folder() / "pages/page.html");
+  EXPECT_EQ(data["run"], "run");
+  EXPECT_EQ(data["iterations"], 14);
+  EXPECT_EQ(data["views"].size(), 2U);
+  EXPECT_EQ(data["pictures"].size(), 2U);
+  EXPECT_EQ(data["pictures"][0]["width"], 40);
+  EXPECT_GT(data["mean"]["psnr"], 5);
+  EXPECT_GT(data["train_seconds"], 0);
+  EXPECT_FALSE(data["machine"]["processor"].get<std::string>().empty());
+  const auto setting = [&](const std::string& of) {
+    for (const Json& s : data["settings"]) {
+      if (s["path"] == of) return s;
+    }
+    return Json();
+  };
+  EXPECT_EQ(setting("deform.network.width")["value"], "16");
+  EXPECT_NE(setting("deform.network.width")["default"], "16");
+  EXPECT_EQ(setting("iterations")["value"], "14");
+
+  int64_t last = 0;
+  for (const Json& phase : data["phases"]) {
+    EXPECT_EQ(phase["first"], last + 1);
+    last = phase["last"];
+    EXPECT_GT(phase["steps"].size(), 5U);
+  }
+  EXPECT_EQ(last, 14);
+  int starts = 0, ends = 0;
+  for (const Json& event : data["events"]) {
+    starts += event["event"] == "started" ? 1 : 0;
+    ends += event["event"] == "finished" ? 1 : 0;
+    if (event["event"] == "started") {
+      EXPECT_EQ(event["machine"], data["machine"]);
+    } else if (event["event"] == "step") {
+      EXPECT_GT(event["memory_bytes"], 1 << 20);
+    }
+  }
+  EXPECT_EQ(starts, 2);
+  EXPECT_EQ(ends, 1);
+}
+
+TEST_F(See, EvalLeavesTheSamePage) {
+  ASSERT_EQ(run_verb({"eval", path("run"), "--layers", "none"}).code, exit_done);
+  ASSERT_EQ(run_verb({"report", path("run")}).code, exit_done);
+  Json eval = data_of(folder() / "run/eval/test/report.html"), report = data_of(folder() / "run/report.html");
+  for (Json* page : {&eval, &report}) {
+    page->erase("made");
+    page->erase("render_fps");
+  }
+  EXPECT_EQ(eval, report);
+}
+
+TEST_F(See, AReportOfARunWithoutALogHasNoEvents) {
+  fs::copy(folder() / "run", folder() / "silent", fs::copy_options::recursive);
+  fs::remove(folder() / "silent/log.jsonl");
+  ASSERT_EQ(run_verb({"report", path("silent")}).code, exit_done);
+  EXPECT_TRUE(data_of(folder() / "silent/report.html")["events"].empty());
+}
+
+TEST_F(See, CompareStandsBesideThePhotograph) {
+  ASSERT_EQ(run_verb({"render", path("run"), "--compare", "-o", path("compared")}).code, exit_done);
+  const std::set<std::string> names = names_in(folder() / "compared/compare");
+  ASSERT_EQ(names.size(), 2U);
+  EXPECT_EQ(names, names_in(folder() / "compared/rgb"));
+  const Tensor<uint8_t> both = read_png(folder() / "compared/compare" / *names.begin()),
+                        render = read_png(folder() / "compared/rgb" / *names.begin());
+  ASSERT_EQ(both.shape(), (Shape{24, 80, 3}));
+  for (int64_t y = 0; y < 24; ++y) {
+    for (int64_t x = 0; x < 40; ++x) ASSERT_EQ(both(y, x + 40, 1), render(y, x, 1));
+  }
+}
+
+TEST_F(See, AFrozenCameraSeesEveryTimeOnce) {
+  for (const std::string& which : {std::string("1"), std::string("000003_right")}) {
+    ASSERT_EQ(run_verb({"render", path("run"), "--freeze-camera", which, "--compare", "-o",
+                        path("frozen_" + which)})
+                  .code,
+              exit_done);
+    EXPECT_EQ(names_in(folder() / ("frozen_" + which) / "compare").size(), 5U);
+  }
+  // The same camera by either name, and the photograph of the fourth time is its own.
+  const auto picture = [](const std::string& name) { return text_of(folder() / name); };
+  EXPECT_EQ(picture("frozen_1/compare/00003.png"), picture("frozen_000003_right/compare/00003.png"));
+  ASSERT_EQ(run_verb({"render", path("run"), "--compare", "-o", path("own")}).code, exit_done);
+  EXPECT_EQ(picture("frozen_1/compare/00003.png"), picture("own/compare/000003_right.png"));
+
+  ASSERT_EQ(run_verb({"render", path("run"), "--freeze-camera", "0", "--frames", "3", "--size", "20x12", "-o",
+                      path("three")})
+                .code,
+            exit_done);
+  EXPECT_EQ(names_in(folder() / "three/rgb").size(), 3U);
+  EXPECT_EQ(read_png(folder() / "three/rgb/00000.png").shape(), (Shape{12, 20, 3}));
+}
+
+TEST_F(See, PathsOfEveryKind) {
+  std::ofstream(folder() / "path.json")
+      << R"({"format":"traceflow camera path","version":1,"width":32,"height":18,
+    "fps":4,"closed":true,"keyframes":[
+    {"position":[0,0,-1],"rotation":[[1,0,0],[0,1,0],[0,0,1]],"fov_y":45,"time":0,"seconds":1},
+    {"position":[1,0,-1],"rotation":[[1,0,0],[0,1,0],[0,0,1]],"fov_y":45,"time":1,"seconds":0.5}]})";
+  const auto frames = [](std::vector<std::string> flags) {
+    fs::remove_all(folder() / "path");
+    flags.insert(flags.begin(), {"render", path("run"), "-o", path("path")});
+    const Result made = run_verb(flags);
+    EXPECT_EQ(made.code, exit_done) << made.error;
+    return names_in(folder() / "path/rgb").size();
+  };
+  const auto shape = [] { return read_png(folder() / "path/rgb/00000.png").shape(); };
+  EXPECT_EQ(frames({"--camera-path", path("path.json")}), 6U);
+  EXPECT_EQ(shape(), (Shape{18, 32, 3}));
+  EXPECT_EQ(
+      frames({"--camera-path", path("path.json"), "--fps", "8", "--size", "16x9", "--freeze-time", "0.5"}),
+      12U);
+  EXPECT_EQ(shape(), (Shape{9, 16, 3}));
+  EXPECT_EQ(frames({"--spiral", "--frames", "4"}), 4U);
+  EXPECT_EQ(shape(), (Shape{24, 40, 3}));
+  EXPECT_EQ(frames({"--orbit", "--frames", "2", "--size", "30x20"}), 2U);
+  EXPECT_EQ(shape(), (Shape{20, 30, 3}));
+}
+
+TEST_F(See, FlagsThatContradictEachOtherAreRefusedInWords) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {{"--orbit", "--spiral"}, "--orbit and --spiral"},
+      {{"--split", "test", "--orbit"}, "--split and --orbit"},
+      {{"--cameras", "a", "--camera-path", "b"}, "--cameras and --camera-path"},
+      {{"--freeze-camera", "0", "--spiral"}, "--spiral and --freeze-camera"},
+      {{"--freeze-camera", "0", "--freeze-time", "0.5"}, "freeze-time"},
+      {{"--freeze-camera", "none"}, "freeze-camera"},
+      {{"--freeze-camera", "3"}, "0 to 1"},
+      {{"--freeze-camera", "-1"}, "freeze-camera"},
+      {{"--frames", "5"}, "frames"},
+      {{"--size", "5x5"}, "size"},
+      {{"--compare", "--orbit"}, "no photograph"},
+      {{"--compare", "--camera-path", "b"}, "no photograph"},
+      {{"--compare", "--time", "0.5"}, "compare"},
+      {{"--compare", "--freeze-camera", "0", "--frames", "5"}, "--frames"},
+      {{"--compare", "--freeze-camera", "0", "--size", "5x5"}, "--size"},
+      {{"--camera-path", path("nothing.json")}, "nothing.json"},
+  };
+  for (auto [words, part] : cases) {
+    words.insert(words.begin(), {"render", path("run"), "-o", path("refused")});
+    const Result refused = run_verb(words);
+    EXPECT_EQ(refused.code, exit_input) << part;
+    EXPECT_THAT(refused.error, HasSubstr(part));
+    EXPECT_EQ(std::count(refused.error.begin(), refused.error.end(), '\n'), 1) << refused.error;
+  }
+  EXPECT_FALSE(fs::exists(folder() / "refused"));
+  const Result directory = run_verb({"report", path("run"), "-o", path("run")});
+  EXPECT_EQ(directory.code, exit_input);
+  EXPECT_THAT(directory.error, HasSubstr("a folder"));
+}
+
+TEST_F(See, CtrlCEndsTheWorkAndSaysWhatThereIs) {
+  std::thread other([] {
+    while (!fs::exists(folder() / "stopped/rgb/00001.png")) std::this_thread::yield();
+    std::raise(SIGINT);
+  });
+  const Result stopped = run_verb(
+      {"render", path("run"), "--orbit", "--frames", "20000", "--size", "8x8", "-o", path("stopped")});
+  other.join();
+  EXPECT_EQ(stopped.code, exit_interrupted);
+  EXPECT_THAT(stopped.error, HasSubstr("stopped after "));
+  EXPECT_THAT(stopped.error, HasSubstr(" of 20000 frames: " + path("stopped")));
+}
+
+TEST_F(See, AFilmIsMadeWhereFfmpegIs) {
+  const Result made =
+      run_verb({"render", path("run"), "--spiral", "--frames", "3", "--video", path("films/a.mp4")});
+  if (made.code == exit_input) {
+    EXPECT_THAT(made.error, HasSubstr("ffmpeg"));
+    GTEST_SKIP() << made.error;
+  }
+  ASSERT_EQ(made.code, exit_done) << made.error;
+  EXPECT_THAT(text_of(folder() / "films/a.mp4").substr(0, 12), HasSubstr("ftyp"));
+}
+
+TEST(FrameProgress, TellsRateAndWhatIsLeft) {
+  EXPECT_EQ(frame_line(0, 10, 0), "0/10 frames");
+  EXPECT_EQ(frame_line(5, 125, 2), "5/125 frames  2.5 a second  48 s left");
+}
+
+TEST(FrameProgress, RedrawsOneLineOnATerminalAndWritesFewElsewhere) {
+  std::ostringstream terminal, file;
+  FrameProgress on_terminal(terminal, 20, 1000), elsewhere(file, 0, 1000);
+  for (int i = 1; i <= 1000; ++i) {
+    on_terminal.show(i, 0.05 * i);
+    elsewhere.show(i, 0.05 * i);
+  }
+  on_terminal.finish();
+  elsewhere.finish();
+  EXPECT_EQ(terminal.str().find('\n'), std::string::npos);
+  EXPECT_TRUE(terminal.str().ends_with("\r\x1b[K"));
+  const std::string lines = file.str();
+  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 3);
+}
+
+}  // namespace
+}  // namespace traceflow::cli
