@@ -56,6 +56,20 @@ const states: Record<string, (page: Page) => Promise<unknown>> = {
     await page.keyboard.press('-');
     for (let k = 0; k < 5; k++) await page.keyboard.press('-');
   },
+  density: async (page) => {
+    await open_tab(page, 'training');
+    await page.getByTestId('curve-density').scrollIntoViewIfNeeded();
+    await page.getByTestId('curve-rate').scrollIntoViewIfNeeded();
+    await page.getByTestId('curve-surfels').hover();
+  },
+  stop: async (page) => {
+    await open_tab(page, 'training');
+    await press(page, 'stop');
+  },
+  fly: async (page) => {
+    await page.keyboard.press('d');
+    await page.keyboard.press('6');
+  },
   help: async (page) => page.keyboard.press('?'),
 };
 

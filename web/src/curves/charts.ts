@@ -84,7 +84,7 @@ function surfels({ steps, density }: Series): Chart {
 function changes(density: Density): Chart {
   return {
     id: 'density',
-    title: 'Added and removed',
+    title: 'Changes',
     x: density.iteration,
     lines: [
       { name: 'Cloned', colour: 3, values: density.cloned, hidden: true },
