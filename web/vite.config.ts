@@ -43,7 +43,8 @@ function inline_everything(): Plugin {
       for (const [name, file] of Object.entries(bundle)) {
         if (file === page) continue;
         const text = file.type === 'chunk' ? file.code : String(file.source);
-        const tag = file.type === 'chunk' ? /<script[^>]*src="[^"]*viewer\.js"[^>]*><\/script>/ : /<link[^>]*viewer\.css"[^>]*>/;
+        const tag =
+          file.type === 'chunk' ? /<script[^>]*src="[^"]*viewer\.js"[^>]*><\/script>/ : /<link[^>]*viewer\.css"[^>]*>/;
         if (!tag.test(html)) throw new Error(`the report's page does not name ${name}`);
         html = html.replace(tag, () =>
           file.type === 'chunk'
