@@ -28,7 +28,10 @@ const hello: Hello = {
   capture: source === 'ply' ? '' : 'kettle',
   device: 'cpu',
   moves: MOVES !== '0' && source !== 'ply',
-  layers: [...colours.map((name) => ({ name, kind: 'colour' as const })), ...numbers.map((name) => ({ name, kind: 'number' as const }))],
+  layers: [
+    ...colours.map((name) => ({ name, kind: 'colour' as const })),
+    ...numbers.map((name) => ({ name, kind: 'number' as const })),
+  ],
   maps: ['viridis', 'turbo', 'grey'],
   cameras: source === 'ply' ? { train: [], test: [] } : captured_cameras,
   start: look_at(start, [0, 0, 0.25], [0, 0, 1], 34),
@@ -52,7 +55,12 @@ const tell_state = (): void => guests.forEach((guest) => guest.tell(state()));
 
 const policy =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'";
-const types: Record<string, string> = { html: 'text/html', js: 'text/javascript', css: 'text/css', svg: 'image/svg+xml' };
+const types: Record<string, string> = {
+  html: 'text/html',
+  js: 'text/javascript',
+  css: 'text/css',
+  svg: 'image/svg+xml',
+};
 
 function is_known(request: IncomingMessage): boolean {
   const brought = new URL(request.url ?? '/', 'http://x').searchParams.get('token') === TOKEN;
@@ -73,7 +81,9 @@ async function answer(request: IncomingMessage, response: ServerResponse): Promi
   response.end(body);
 }
 
-const server = createServer((request, response) => void answer(request, response).catch(() => response.writeHead(404).end()));
+const server = createServer(
+  (request, response) => void answer(request, response).catch(() => response.writeHead(404).end()),
+);
 const sockets = new WebSocketServer({
   server,
   path: '/ws',
@@ -89,7 +99,8 @@ sockets.on('connection', (socket) => {
       if (what === 'pause') training.paused = true;
       if (what === 'resume') training.paused = false;
       if (what === 'stop' && !training.over) publish([training.end('interrupted')]);
-      if (what === 'save') publish([{ event: 'saved', iteration: training.iteration, path: 'checkpoint.safetensors', seconds: 0.3 }]);
+      if (what === 'save')
+        publish([{ event: 'saved', iteration: training.iteration, path: 'checkpoint.safetensors', seconds: 0.3 }]);
       tell_state();
     },
   });
@@ -120,7 +131,9 @@ if (source === 'training') {
 }
 
 // What goes wrong, on demand: a line on standard input becomes the trouble, an empty one ends it.
-process.stdin.on('data', (text: Buffer) => guests.forEach((g) => g.tell({ type: 'trouble', text: String(text).trim() })));
+process.stdin.on('data', (text: Buffer) =>
+  guests.forEach((g) => g.tell({ type: 'trouble', text: String(text).trim() })),
+);
 process.stdin.unref?.();
 
 server.listen(Number(PORT), '127.0.0.1', () => {

@@ -69,7 +69,8 @@ export class Guest {
         const wanted = { layer: 'photograph', exposure: 0, map: '' };
         const { split, index } = request;
         return void render(view, view.time, width, height, wanted).then((rows) => {
-          if (rows) this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
+          if (rows)
+            this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
         });
       }
       case 'probe': {
@@ -82,7 +83,13 @@ export class Guest {
         const from = this.camera();
         if (!this.look || !from) return;
         const { id, width, height } = request;
-        if (width * height > 3e7) return this.tell({ type: 'refused', request: 'still', id, text: 'A picture of this size would not fit into memory.' });
+        if (width * height > 3e7)
+          return this.tell({
+            type: 'refused',
+            request: 'still',
+            id,
+            text: 'A picture of this size would not fit into memory.',
+          });
         return void render(from, this.look.time, width, height, this.look).then((rows) => {
           if (rows) this.picture({ type: 'still', id, width, height, format: 'png' }, png(rows, width, height));
         });

@@ -4,7 +4,10 @@ import { open_browser } from './browser.ts';
 
 const [file = 'out/report.html', folder = 'out/shots'] = process.argv.slice(2);
 const browser = await open_browser();
-for (const [form, width, height] of [['wide', 1280, 800], ['narrow', 390, 844]] as const) {
+for (const [form, width, height] of [
+  ['wide', 1280, 800],
+  ['narrow', 390, 844],
+] as const) {
   for (const colorScheme of ['dark', 'light'] as const) {
     const page = await browser.newPage({ viewport: { width, height }, colorScheme });
     page.on('pageerror', (error) => console.log(error.message));
@@ -22,5 +25,9 @@ for (const [form, width, height] of [['wide', 1280, 800], ['narrow', 390, 844]] 
 }
 const page = await browser.newPage({ colorScheme: 'dark' });
 await page.goto(`file://${file}`);
-await page.pdf({ path: `${folder}/report.pdf`, format: 'A4', margin: { top: '14mm', bottom: '14mm', left: '12mm', right: '12mm' } });
+await page.pdf({
+  path: `${folder}/report.pdf`,
+  format: 'A4',
+  margin: { top: '14mm', bottom: '14mm', left: '12mm', right: '12mm' },
+});
 await browser.close();

@@ -35,12 +35,23 @@ async function pictures(): Promise<ReportData['pictures']> {
         return [layer, address] as const;
       }),
     );
-    made.push({ id: view.id, width, height, ...(Object.fromEntries(drawn) as Record<(typeof layers)[number], string>) });
+    made.push({
+      id: view.id,
+      width,
+      height,
+      ...(Object.fromEntries(drawn) as Record<(typeof layers)[number], string>),
+    });
   }
   return made;
 }
 
-const setting = (path: string, value: string, usual: string, unit: string, help: string) => ({ path, value, default: usual, unit, help });
+const setting = (path: string, value: string, usual: string, unit: string, help: string) => ({
+  path,
+  value,
+  default: usual,
+  unit,
+  help,
+});
 const ops: [string, number][] = [
   ['raster backward', 0.31],
   ['raster', 0.2],
@@ -90,7 +101,12 @@ const data: ReportData = {
     setting('trace.hits', '64', '64', '', 'Surfels that a mirrored ray blends at most'),
     setting('raster.low_pass', '0.707', '0.707', 'pixels', 'Radius of the screen-space low-pass'),
   ],
-  phases: [phase('static', 0, 1200, 52), phase('diffuse', 1200, 3000, 140), phase('specular', 3000, 4400, 171), phase('joint', 4400, 8000, 354)],
+  phases: [
+    phase('static', 0, 1200, 52),
+    phase('diffuse', 1200, 3000, 140),
+    phase('specular', 3000, 4400, 171),
+    phase('joint', 4400, 8000, 354),
+  ],
   events,
   pictures: await pictures(),
 };
@@ -98,4 +114,7 @@ const data: ReportData = {
 const page = await readFile(new URL('../../page/report.html', import.meta.url), 'utf8');
 const text = JSON.stringify(data).replaceAll('<', '\\u003c');
 await mkdir(dirname(file), { recursive: true });
-await writeFile(file, page.replace(/(id="report">)null(<)/, (_, before: string, after: string) => before + text + after));
+await writeFile(
+  file,
+  page.replace(/(id="report">)null(<)/, (_, before: string, after: string) => before + text + after),
+);

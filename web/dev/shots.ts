@@ -7,11 +7,13 @@ import { open_browser } from './browser.ts';
 const [address = 'http://127.0.0.1:5174/?token=token', folder = 'out/shots', ...chosen] = process.argv.slice(2);
 
 const press = (page: Page, id: string) => page.getByTestId(id).click();
-const still = (page: Page) => page.waitForFunction(() => window.traceflow.lastFrame?.final, undefined, { timeout: 15000 });
+const still = (page: Page) =>
+  page.waitForFunction(() => window.traceflow.lastFrame?.final, undefined, { timeout: 15000 });
 
 async function open_tab(page: Page, name: string): Promise<void> {
   const tab = page.getByTestId(`tab-${name}`);
-  if ((await tab.getAttribute('aria-selected')) !== 'true' || (await page.locator('.panel-closed').count()) > 0) await tab.click();
+  if ((await tab.getAttribute('aria-selected')) !== 'true' || (await page.locator('.panel-closed').count()) > 0)
+    await tab.click();
 }
 
 const states: Record<string, (page: Page) => Promise<unknown>> = {
@@ -56,16 +58,37 @@ const states: Record<string, (page: Page) => Promise<unknown>> = {
     await page.keyboard.press('-');
     for (let k = 0; k < 5; k++) await page.keyboard.press('-');
   },
+  density: async (page) => {
+    await open_tab(page, 'training');
+    await page.getByTestId('curve-density').scrollIntoViewIfNeeded();
+    await page.getByTestId('curve-rate').scrollIntoViewIfNeeded();
+    await page.getByTestId('curve-surfels').hover();
+  },
+  stop: async (page) => {
+    await open_tab(page, 'training');
+    await press(page, 'stop');
+  },
+  fly: async (page) => {
+    await page.keyboard.press('d');
+    await page.keyboard.press('6');
+  },
   help: async (page) => page.keyboard.press('?'),
 };
 
 const browser = await open_browser();
 await mkdir(folder, { recursive: true });
-for (const [form, width, height] of [['wide', 1280, 800], ['narrow', 390, 844]] as const) {
+for (const [form, width, height] of [
+  ['wide', 1280, 800],
+  ['narrow', 390, 844],
+] as const) {
   for (const colours of ['dark', 'light'] as const) {
     for (const [name, reach] of Object.entries(states)) {
       if (chosen.length > 0 && !chosen.includes(name) && !chosen.includes(`${name}-${form}-${colours}`)) continue;
-      const context = await browser.newContext({ viewport: { width, height }, colorScheme: colours, hasTouch: form === 'narrow' });
+      const context = await browser.newContext({
+        viewport: { width, height },
+        colorScheme: colours,
+        hasTouch: form === 'narrow',
+      });
       const page = await context.newPage();
       page.on('console', (message) => message.type() === 'error' && console.log(name, message.text()));
       page.on('pageerror', (error) => console.log(name, error.message));

@@ -25,7 +25,12 @@ export function balls(time: number): Ball[] {
   const hop = Math.abs(Math.sin(time * Math.PI * 3)) * 0.28;
   return [
     { centre: [0, 0, 0.3 + hop], radius: 0.3, colour: [0.75, 0.76, 0.8], tint: 0.85 },
-    { centre: [0.75 * Math.cos(time * 6.2832), 0.75 * Math.sin(time * 6.2832), 0.16], radius: 0.16, colour: [0.93, 0.45, 0.16], tint: 0.1 },
+    {
+      centre: [0.75 * Math.cos(time * 6.2832), 0.75 * Math.sin(time * 6.2832), 0.16],
+      radius: 0.16,
+      colour: [0.93, 0.45, 0.16],
+      tint: 0.1,
+    },
     { centre: [-0.75, 0.3, 0.2], radius: 0.2, colour: [0.35, 0.68, 0.42], tint: 0.15 },
     { centre: [0.35, 0.85, 0.25], radius: 0.25, colour: [0.8, 0.3, 0.34], tint: 0.05 },
     { centre: [-0.45, -0.62, 0.12], radius: 0.12, colour: [0.28, 0.45, 0.8], tint: 0.3 },
@@ -161,7 +166,12 @@ export async function render(
     if (is_stale()) return null;
     for (let x = 0; x < width; x++) {
       const direction: Vec3 = [((2 * x + 1) / width - 1) * h * (width / height), ((2 * y + 1) / height - 1) * h, 1];
-      const colour = pixel(sample(scene, camera.position, unit(apply(camera.rotation, direction)), forward), wanted, x, y);
+      const colour = pixel(
+        sample(scene, camera.position, unit(apply(camera.rotation, direction)), forward),
+        wanted,
+        x,
+        y,
+      );
       for (const c of colour) out[i++] = Math.min(Math.max(c, 0), 1) ** (1 / 1.4) * 255;
     }
   }
@@ -192,4 +202,3 @@ export function probe(camera: Camera, time: number, along: Vec3, id: number): Pr
     mirrored: { direction, end, distance: next ? distance(surface, end) : 0, alpha: next ? 0.92 : 0 },
   };
 }
-

@@ -57,7 +57,15 @@ export class Training {
     if (i % 80 === 0 && i > 160 && i < 6000) made.push(this.density(i));
     made.push(this.step(i, phase));
     if (i % 1000 === 0) {
-      made.push({ event: 'evaluated', iteration: i, split: 'test', views: 20, psnr: 18 + 4.6 * (1 - Math.exp(-i / 2500)), ssim: 0.8, seconds: 4 });
+      made.push({
+        event: 'evaluated',
+        iteration: i,
+        split: 'test',
+        views: 20,
+        psnr: 18 + 4.6 * (1 - Math.exp(-i / 2500)),
+        ssim: 0.8,
+        seconds: 4,
+      });
       made.push({ event: 'saved', iteration: i, path: 'checkpoint.safetensors', seconds: 0.4 });
     }
     if (i >= last_iteration) made.push(this.end('completed'));
@@ -66,7 +74,15 @@ export class Training {
 
   end(ending: 'completed' | 'interrupted'): TrainingEvent {
     this.over = true;
-    return { event: 'finished', ending, iteration: this.iteration, seconds: this.seconds, psnr: 31.4, surfels: this.surfels(), reason: '' };
+    return {
+      event: 'finished',
+      ending,
+      iteration: this.iteration,
+      seconds: this.seconds,
+      psnr: 31.4,
+      surfels: this.surfels(),
+      reason: '',
+    };
   }
 
   private density(i: number): TrainingEvent {
@@ -105,7 +121,14 @@ export class Training {
       iterations: last_iteration,
       phase,
       loss: 0.8 * l1 + 0.2 * ssim + normal,
-      terms: { l1, ssim, normal, normal_prior: normal * 0.6, distortion: i > 3000 ? 0.003 : 0, rigidity: 0.004 * decay },
+      terms: {
+        l1,
+        ssim,
+        normal,
+        normal_prior: normal * 0.6,
+        distortion: i > 3000 ? 0.003 : 0,
+        rigidity: 0.004 * decay,
+      },
       psnr: 19 + 12.5 * (1 - Math.exp(-i / 1800)) + 0.7 * noise(i + 5),
       seconds: this.seconds,
       rate,

@@ -15,7 +15,8 @@ export function Curves({ events, height = 108 }: { events: readonly TrainingEven
   const drawn = useSlowly(events);
   const series = useMemo(() => series_of(drawn), [drawn]);
   const charts = useMemo(() => charts_of(series, log.value, set.value), [series, log.value, set.value]);
-  if (series.steps.iteration.length === 0) return <p class="hint curves-none">The curves begin with the first steps.</p>;
+  if (series.steps.iteration.length === 0)
+    return <p class="hint curves-none">The curves begin with the first steps.</p>;
   const two_sets = series.density.environment.iteration.length > 0;
   const sets = (
     <Segments
@@ -36,7 +37,12 @@ export function Curves({ events, height = 108 }: { events: readonly TrainingEven
       </div>
       {charts.map((chart) => (
         <div key={chart.id} class={`curve curve-${chart.id}`}>
-          <Plot chart={chart} aside={chart.id === 'density' && two_sets && sets} phases={series.phases} height={height} />
+          <Plot
+            chart={chart}
+            aside={chart.id === 'density' && two_sets && sets}
+            phases={series.phases}
+            height={height}
+          />
         </div>
       ))}
     </div>

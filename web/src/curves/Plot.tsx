@@ -30,7 +30,11 @@ export function Plot({ chart, aside, phases, height }: PlotProps) {
   useEffect(() => {
     const element = box.current;
     if (!element) return;
-    const made = new uPlot(options(newest, element.clientWidth, tall, (i) => (index.value = i)), data_of(newest.current.chart), element);
+    const made = new uPlot(
+      options(newest, element.clientWidth, tall, (i) => (index.value = i)),
+      data_of(newest.current.chart),
+      element,
+    );
     plot.current = made;
     const observer = new ResizeObserver(() => made.setSize({ width: element.clientWidth, height: tall }));
     observer.observe(element);
@@ -59,7 +63,13 @@ export function Plot({ chart, aside, phases, height }: PlotProps) {
           <Value key={line.name} line={line} at={at} format={chart.format} />
         ))}
       </ul>
-      <div ref={box} class="plot-box" style={{ height: `${tall}px` }} role="img" aria-label={`${chart.title} over the iterations`} />
+      <div
+        ref={box}
+        class="plot-box"
+        style={{ height: `${tall}px` }}
+        role="img"
+        aria-label={`${chart.title} over the iterations`}
+      />
     </figure>
   );
 }
@@ -88,27 +98,52 @@ function data_of(chart: Chart): uPlot.AlignedData {
 
 type Newest = { current: { chart: Chart; phases: Phase[] } };
 
-function options(newest: Newest, width: number, height: number, on_index: (index: number | null) => void): uPlot.Options {
+function options(
+  newest: Newest,
+  width: number,
+  height: number,
+  on_index: (index: number | null) => void,
+): uPlot.Options {
   const { chart } = newest.current;
   const axis = chart.axis ?? chart.format;
-  const common = { font, stroke: () => css_colour('--dim'), ticks: { show: false }, grid: { stroke: () => css_colour('--grid'), width: 1 } };
+  const common = {
+    font,
+    stroke: () => css_colour('--dim'),
+    ticks: { show: false },
+    grid: { stroke: () => css_colour('--grid'), width: 1 },
+  };
   return {
     width,
     height,
     legend: { show: false },
     padding: [8, 6, 0, 0],
-    cursor: { y: false, drag: { x: false, y: false }, sync: { key: 'curves', scales: ['x', null] }, points: { size: 6 } },
+    cursor: {
+      y: false,
+      drag: { x: false, y: false },
+      sync: { key: 'curves', scales: ['x', null] },
+      points: { size: 6 },
+    },
     scales: {
       x: { time: false, range: (_, low, high) => across(newest.current.phases, low, high) },
-      y: chart.log ? { distr: 3 } : { range: (_, low, high) => padded(chart.from_zero ? 0 : low, high, chart.from_zero ?? false) },
+      y: chart.log
+        ? { distr: 3 }
+        : { range: (_, low, high) => padded(chart.from_zero ? 0 : low, high, chart.from_zero ?? false) },
     },
     axes: [
       { ...common, size: 22, gap: 3, grid: { show: false }, values: (_, splits) => splits.map(short_iteration) },
       { ...common, size: 46, gap: 4, space: 26, values: (_, splits) => splits.map((v) => (v === null ? '' : axis(v))) },
     ],
     series: [{}, ...chart.lines.map(series_of_line)],
-    plugins: [bands_plugin(() => newest.current.phases, () => newest.current.chart.marks), bars_plugin(() => newest.current.chart.bars)],
-    hooks: { setCursor: [(u) => on_index(u.cursor.left !== undefined && u.cursor.left >= 0 ? (u.cursor.idx ?? null) : null)] },
+    plugins: [
+      bands_plugin(
+        () => newest.current.phases,
+        () => newest.current.chart.marks,
+      ),
+      bars_plugin(() => newest.current.chart.bars),
+    ],
+    hooks: {
+      setCursor: [(u) => on_index(u.cursor.left !== undefined && u.cursor.left >= 0 ? (u.cursor.idx ?? null) : null)],
+    },
   };
 }
 

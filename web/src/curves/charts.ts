@@ -41,11 +41,28 @@ function loss({ steps }: Series, log: boolean): Chart {
   const lines: Line[] = [{ name: 'Loss', colour: 1, values: steps.loss }];
   terms.forEach(([name, values], i) => lines.push({ name: title(name), colour: 2 + (i % 6), values }));
   if (log) for (const line of lines) line.values = positive(line.values);
-  return { id: 'loss', title: 'Loss', x: steps.iteration, lines, format: figure, axis: compact, log, from_zero: !log, marks: [] };
+  return {
+    id: 'loss',
+    title: 'Loss',
+    x: steps.iteration,
+    lines,
+    format: figure,
+    axis: compact,
+    log,
+    from_zero: !log,
+    marks: [],
+  };
 }
 
 function psnr({ steps, held_out }: Series): Chart {
-  const training = thin_chart({ id: 'psnr', title: 'PSNR', x: steps.iteration, lines: [{ name: 'Training', colour: 1, values: steps.psnr }], format: figure, marks: [] });
+  const training = thin_chart({
+    id: 'psnr',
+    title: 'PSNR',
+    x: steps.iteration,
+    lines: [{ name: 'Training', colour: 1, values: steps.psnr }],
+    format: figure,
+    marks: [],
+  });
   const db = (v: number): string => `${v.toFixed(2)} dB`;
   if (held_out.iteration.length === 0) return { ...training, format: db, axis: (v) => v.toFixed(0) };
   const x = [...new Set([...training.x, ...held_out.iteration])].sort((a, b) => a - b);
@@ -84,7 +101,7 @@ function surfels({ steps, density }: Series): Chart {
 function changes(density: Density): Chart {
   return {
     id: 'density',
-    title: 'Added and removed',
+    title: 'Changes',
     x: density.iteration,
     lines: [
       { name: 'Cloned', colour: 3, values: density.cloned, hidden: true },
@@ -101,10 +118,27 @@ function changes(density: Density): Chart {
 
 export function charts_of(series: Series, log: boolean, set: 'main' | 'environment'): Chart[] {
   const { steps } = series;
-  const single = (id: string, name: string, colour: number, values: (number | null)[], format: Chart['format'], axis = format): Chart =>
-    thin_chart({ id, title: name, x: steps.iteration, lines: [{ name, colour, values }], format, axis, from_zero: true, marks: [] });
+  const single = (
+    id: string,
+    name: string,
+    colour: number,
+    values: (number | null)[],
+    format: Chart['format'],
+    axis = format,
+  ): Chart =>
+    thin_chart({
+      id,
+      title: name,
+      x: steps.iteration,
+      lines: [{ name, colour, values }],
+      format,
+      axis,
+      from_zero: true,
+      marks: [],
+    });
   const charts = [thin_chart(loss(series, log)), psnr(series), thin_chart(surfels(series))];
-  if (series.density.main.iteration.length + series.density.environment.iteration.length > 0) charts.push(changes(series.density[set]));
+  if (series.density.main.iteration.length + series.density.environment.iteration.length > 0)
+    charts.push(changes(series.density[set]));
   charts.push(single('rate', 'Iterations a second', 3, steps.rate, (v) => v.toFixed(1), compact));
   if (steps.memory.some((m) => m !== null)) charts.push(single('memory', 'Memory', 5, steps.memory, bytes));
   return charts;

@@ -3,7 +3,8 @@ import type { Density, Phase } from './series.ts';
 
 // What lies under and beside the lines of a chart.
 
-export const css_colour = (name: string): string => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const css_colour = (name: string): string =>
+  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Phases as bands with their names, and opacity resets as dashed lines.
 export function bands_plugin(phases: () => Phase[], marks: () => number[]): uPlot.Plugin {
@@ -12,7 +13,8 @@ export function bands_plugin(phases: () => Phase[], marks: () => number[]): uPlo
       drawClear: (u) => {
         const { ctx, bbox } = u;
         const ratio = devicePixelRatio;
-        const place = (x: number): number => Math.min(Math.max(u.valToPos(x, 'x', true), bbox.left), bbox.left + bbox.width);
+        const place = (x: number): number =>
+          Math.min(Math.max(u.valToPos(x, 'x', true), bbox.left), bbox.left + bbox.width);
         ctx.save();
         ctx.font = `${10 * ratio}px system-ui, sans-serif`;
         ctx.textAlign = 'left';
@@ -25,7 +27,8 @@ export function bands_plugin(phases: () => Phase[], marks: () => number[]): uPlo
             ctx.fillRect(left, bbox.top, width, bbox.height);
           }
           ctx.fillStyle = css_colour('--dim');
-          if (ctx.measureText(name).width + 8 * ratio < width) ctx.fillText(name, left + 4 * ratio, bbox.top + 3 * ratio);
+          if (ctx.measureText(name).width + 8 * ratio < width)
+            ctx.fillText(name, left + 4 * ratio, bbox.top + 3 * ratio);
         });
         ctx.strokeStyle = css_colour('--dim');
         ctx.setLineDash([2 * ratio, 3 * ratio]);
@@ -65,7 +68,12 @@ export function bars_plugin(density: () => Density | undefined): uPlot.Plugin {
           ctx.fillRect(x - width / 2, Math.min(a, b), width, Math.abs(b - a));
         };
         bars.iteration.forEach((_, i) => {
-          const [cloned = 0, split = 0, transparent = 0, large = 0] = [bars.cloned[i], bars.split[i], bars.transparent[i], bars.large[i]];
+          const [cloned = 0, split = 0, transparent = 0, large = 0] = [
+            bars.cloned[i],
+            bars.split[i],
+            bars.transparent[i],
+            bars.large[i],
+          ];
           bar(i, 0, cloned, 3);
           bar(i, cloned, cloned + split, 2);
           bar(i, 0, -transparent, 7);

@@ -39,7 +39,16 @@ export interface Series {
 const no_density = (): Density => ({ iteration: [], cloned: [], split: [], transparent: [], large: [], resets: [] });
 
 export function series_of(events: readonly TrainingEvent[]): Series {
-  const steps: Steps = { iteration: [], loss: [], terms: new Map(), psnr: [], rate: [], memory: [], main: [], environment: [] };
+  const steps: Steps = {
+    iteration: [],
+    loss: [],
+    terms: new Map(),
+    psnr: [],
+    rate: [],
+    memory: [],
+    main: [],
+    environment: [],
+  };
   const series: Series = {
     steps,
     density: { main: no_density(), environment: no_density() },
@@ -79,7 +88,15 @@ function add_step(steps: Steps, event: Extract<TrainingEvent, { event: 'step' }>
 }
 
 function drop_last(steps: Steps): void {
-  for (const column of [steps.iteration, steps.loss, steps.psnr, steps.rate, steps.memory, steps.main, steps.environment]) {
+  for (const column of [
+    steps.iteration,
+    steps.loss,
+    steps.psnr,
+    steps.rate,
+    steps.memory,
+    steps.main,
+    steps.environment,
+  ]) {
     column.pop();
   }
   for (const column of steps.terms.values()) column.length = Math.min(column.length, steps.iteration.length);
@@ -87,7 +104,8 @@ function drop_last(steps: Steps): void {
 
 function add_density(density: Density, event: Extract<TrainingEvent, { event: 'density_changed' }>): void {
   while ((density.iteration.at(-1) ?? -1) >= event.iteration) {
-    for (const column of [density.iteration, density.cloned, density.split, density.transparent, density.large]) column.pop();
+    for (const column of [density.iteration, density.cloned, density.split, density.transparent, density.large])
+      column.pop();
   }
   while ((density.resets.at(-1) ?? -1) >= event.iteration) density.resets.pop();
   density.iteration.push(event.iteration);

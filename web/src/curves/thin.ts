@@ -1,5 +1,5 @@
-// Indices of at most about `limit` of the values, in order: the least and the greatest of each run of neighbours, so that the
-// drawn line has the shape of the whole; the ends are always among them.
+// Indices of at most about `limit` of the values, in order: the least and the greatest of each run of neighbours, so
+// that the drawn line has the shape of the whole; the ends are always among them.
 export function thinned(values: readonly (number | null)[], limit: number): number[] {
   const count = values.length;
   if (count <= limit) return values.map((_, i) => i);

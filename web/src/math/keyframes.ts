@@ -49,7 +49,8 @@ function keyframe_problem(k: unknown): string {
   if (!is_record(k)) return 'is not an object';
   if (!is_vector(k['position'])) return 'needs a position of three numbers';
   const rotation = k['rotation'];
-  if (!Array.isArray(rotation) || rotation.length !== 3 || !rotation.every(is_vector)) return 'needs a rotation of 3×3 numbers';
+  if (!Array.isArray(rotation) || rotation.length !== 3 || !rotation.every(is_vector))
+    return 'needs a rotation of 3×3 numbers';
   if (!is_number(k['fov_y']) || k['fov_y'] <= 0 || k['fov_y'] >= 180) return 'needs a fov_y between 0 and 180 degrees';
   if (!is_number(k['time']) || k['time'] < 0 || k['time'] > 1) return 'needs a time from 0 to 1';
   if (!is_number(k['seconds']) || k['seconds'] < 0) return 'needs seconds that are not negative';
@@ -67,7 +68,8 @@ export function parse_path(text: string): CameraPath {
   if (!is_record(json) || json['format'] !== empty_path.format) throw new Error('This file is not a camera path.');
   if (json['version'] !== 1) throw new Error(`This camera path has version ${String(json['version'])}; 1 is known.`);
   const { width, height, fps, keyframes } = json;
-  if (!is_number(width) || !is_number(height) || width < 1 || height < 1) throw new Error('The camera path has no size.');
+  if (!is_number(width) || !is_number(height) || width < 1 || height < 1)
+    throw new Error('The camera path has no size.');
   if (!is_number(fps) || fps <= 0) throw new Error('The camera path has no frames per second.');
   if (!Array.isArray(keyframes)) throw new Error('The camera path has no keyframes.');
   keyframes.forEach((k, i) => {

@@ -26,7 +26,11 @@ function Compare() {
           { value: 'render', label: 'Render' },
           { value: 'split', label: 'Split' },
           { value: 'photo', label: 'Photo' },
-          { value: 'difference', label: 'Difference', disabled: !hello.value?.layers.some((l) => l.name === 'difference') },
+          {
+            value: 'difference',
+            label: 'Difference',
+            disabled: !hello.value?.layers.some((l) => l.name === 'difference'),
+          },
         ]}
       />
     </Section>
@@ -45,7 +49,8 @@ function CameraList() {
     const top = row.offsetTop - list.current.offsetTop;
     const { scrollTop, clientHeight } = list.current;
     if (top < scrollTop) list.current.scrollTop = top;
-    else if (top + row.offsetHeight > scrollTop + clientHeight) list.current.scrollTop = top + row.offsetHeight - clientHeight;
+    else if (top + row.offsetHeight > scrollTop + clientHeight)
+      list.current.scrollTop = top + row.offsetHeight - clientHeight;
   }, [current, split.value]);
   return (
     <Section title="Captured cameras">
@@ -60,7 +65,14 @@ function CameraList() {
         ]}
       />
       <div class="camera-steps">
-        <Button id="camera-before" label="Camera before" keys="[" icon="left" iconOnly onPress={() => step_camera(-1)} />
+        <Button
+          id="camera-before"
+          label="Camera before"
+          keys="["
+          icon="left"
+          iconOnly
+          onPress={() => step_camera(-1)}
+        />
         <Slider
           id="camera-scrub"
           label="Captured camera"

@@ -75,7 +75,15 @@ function Head() {
         <p>{about}</p>
       </div>
       <ThemeButton />
-      <Button id="help-open" label="Keys" keys="?" icon="help" kind="quiet" iconOnly onPress={() => (help_open.value = true)} />
+      <Button
+        id="help-open"
+        label="Keys"
+        keys="?"
+        icon="help"
+        kind="quiet"
+        iconOnly
+        onPress={() => (help_open.value = true)}
+      />
     </header>
   );
 }

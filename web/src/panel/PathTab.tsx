@@ -14,7 +14,10 @@ export function PathTab() {
   const { keyframes } = path.value;
   return (
     <>
-      <Section title="Camera path" aside={<span class="hint">{keyframes.length > 1 ? duration(total_seconds(path.value)) : ''}</span>}>
+      <Section
+        title="Camera path"
+        aside={<span class="hint">{keyframes.length > 1 ? duration(total_seconds(path.value)) : ''}</span>}
+      >
         <div class="row">
           <Button id="keyframe-add" label="Add keyframe" keys="K" icon="plus" kind="main" onPress={add_keyframe} />
           <Button
@@ -27,7 +30,9 @@ export function PathTab() {
           />
         </div>
         {keyframes.length === 0 ? (
-          <p class="hint">Look from where the film should begin and add a keyframe; then go on to the next place and time.</p>
+          <p class="hint">
+            Look from where the film should begin and add a keyframe; then go on to the next place and time.
+          </p>
         ) : (
           <ol class="keyframes" data-testid="keyframes">
             {keyframes.map((keyframe, i) => (
@@ -35,7 +40,12 @@ export function PathTab() {
             ))}
           </ol>
         )}
-        <Switch id="path-visible" label="Show in the scene" on={path_visible.value} onChange={(on) => (path_visible.value = on)} />
+        <Switch
+          id="path-visible"
+          label="Show in the scene"
+          on={path_visible.value}
+          onChange={(on) => (path_visible.value = on)}
+        />
       </Section>
       <Film />
     </>
@@ -78,8 +88,24 @@ function KeyframeRow({ keyframe, index, last }: { keyframe: Keyframe; index: num
       ) : (
         <span class="seconds">end</span>
       )}
-      <Button id={`keyframe-up-${index}`} label="Earlier" icon="up" kind="quiet" iconOnly disabled={index === 0} onPress={() => move(-1)} />
-      <Button id={`keyframe-down-${index}`} label="Later" icon="down" kind="quiet" iconOnly disabled={last} onPress={() => move(1)} />
+      <Button
+        id={`keyframe-up-${index}`}
+        label="Earlier"
+        icon="up"
+        kind="quiet"
+        iconOnly
+        disabled={index === 0}
+        onPress={() => move(-1)}
+      />
+      <Button
+        id={`keyframe-down-${index}`}
+        label="Later"
+        icon="down"
+        kind="quiet"
+        iconOnly
+        disabled={last}
+        onPress={() => move(1)}
+      />
       <Button
         id={`keyframe-delete-${index}`}
         label={`Delete keyframe ${index + 1}`}
@@ -119,11 +145,22 @@ function Film() {
           onChange={(value) => (path.value = { ...path.value, fps: Number(value) })}
         />
       </div>
-      <Switch id="path-closed" label="Go back to the first keyframe" on={closed} onChange={(on) => (path.value = { ...path.value, closed: on })} />
+      <Switch
+        id="path-closed"
+        label="Go back to the first keyframe"
+        on={closed}
+        onChange={(on) => (path.value = { ...path.value, closed: on })}
+      />
       <div class="row">
         <Button id="path-export" label="Export" icon="save" disabled={keyframes.length === 0} onPress={export_path} />
         <Button id="path-import" label="Import" icon="load" onPress={() => file.current?.click()} />
-        <Button id="path-clear" label="Clear" icon="bin" disabled={keyframes.length === 0} onPress={() => (path.value = { ...path.value, keyframes: empty_path.keyframes })} />
+        <Button
+          id="path-clear"
+          label="Clear"
+          icon="bin"
+          disabled={keyframes.length === 0}
+          onPress={() => (path.value = { ...path.value, keyframes: empty_path.keyframes })}
+        />
       </div>
       <input
         ref={file}

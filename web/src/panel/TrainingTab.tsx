@@ -20,9 +20,20 @@ function Progress() {
   const step = latest_step(events.value);
   const share = state && state.iterations > 0 ? state.iteration / state.iterations : 0;
   const left = seconds_left(events.value);
-  const says = !state ? '' : state.over ? 'ended' : state.paused ? 'paused' : left === null ? '' : `about ${duration(left)} left`;
+  const says = !state
+    ? ''
+    : state.over
+      ? 'ended'
+      : state.paused
+        ? 'paused'
+        : left === null
+          ? ''
+          : `about ${duration(left)} left`;
   return (
-    <Section title={step && !state?.over ? `Phase: ${step.phase}` : 'Training'} aside={<span class="hint">{says}</span>}>
+    <Section
+      title={step && !state?.over ? `Phase: ${step.phase}` : 'Training'}
+      aside={<span class="hint">{says}</span>}
+    >
       <div
         class="progress"
         role="progressbar"

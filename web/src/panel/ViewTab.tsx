@@ -65,7 +65,9 @@ function Rays() {
     >
       {pinned.value.length === 0 ? (
         <p class="hint">
-          {rays_on.value ? 'Point at the picture to see where it mirrors from; click to pin a ray.' : 'Where does a reflection come from? Switch on and point.'}
+          {rays_on.value
+            ? 'Point at the picture to see where it mirrors from; click to pin a ray.'
+            : 'Where does a reflection come from? Switch on and point.'}
         </p>
       ) : (
         <>
@@ -82,7 +84,8 @@ function Rays() {
 }
 
 function Pin({ ray, name }: { ray: Ray; name: string }) {
-  const reach = ray.mirrored && ray.mirrored.distance > 0 ? `meets at ${figure(ray.mirrored.distance)}` : 'meets nothing';
+  const reach =
+    ray.mirrored && ray.mirrored.distance > 0 ? `meets at ${figure(ray.mirrored.distance)}` : 'meets nothing';
   return (
     <li>
       <b>{name}</b>
@@ -99,7 +102,13 @@ function Screenshot() {
   const size = size_of(still_size.value);
   return (
     <Section title="Screenshot" aside={size && <span class="hint">{`${size.width} × ${size.height}`}</span>}>
-      <Segments id="still-size" label="Size" options={options} value={still_size.value} onChange={(v) => (still_size.value = v)} />
+      <Segments
+        id="still-size"
+        label="Size"
+        options={options}
+        value={still_size.value}
+        onChange={(v) => (still_size.value = v)}
+      />
       <Button
         id="still"
         label={still_wanted.value ? 'Rendering…' : 'Save PNG'}

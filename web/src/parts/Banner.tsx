@@ -21,7 +21,8 @@ export function Banner() {
       {state.kind === 'lost' && (
         <p class="banner wrong" data-testid="banner-lost">
           <span>
-            The connection to the server is lost. <span aria-hidden="true">Next attempt in {seconds_until(state.retry_at, now.value)} s.</span>
+            The connection to the server is lost.{' '}
+            <span aria-hidden="true">Next attempt in {seconds_until(state.retry_at, now.value)} s.</span>
           </span>
           <button type="button" class="button quiet" data-testid="retry" onClick={retry_now}>
             Try now
@@ -35,7 +36,9 @@ export function Banner() {
       )}
       {state.kind === 'locked' && (
         <p class="banner wrong" data-testid="banner-locked">
-          <span>Another server answers here and does not know this page. Open the address that its terminal printed.</span>
+          <span>
+            Another server answers here and does not know this page. Open the address that its terminal printed.
+          </span>
         </p>
       )}
       {trouble.value && (

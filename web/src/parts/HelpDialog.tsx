@@ -21,7 +21,14 @@ export function HelpDialog() {
       <div class="help-body">
         <div class="help-head">
           <h1>Keys</h1>
-          <Button id="help-close" label="Close" icon="close" kind="quiet" iconOnly onPress={() => (help_open.value = false)} />
+          <Button
+            id="help-close"
+            label="Close"
+            icon="close"
+            kind="quiet"
+            iconOnly
+            onPress={() => (help_open.value = false)}
+          />
         </div>
         <div class="help-columns">
           {key_list.map((group) => (

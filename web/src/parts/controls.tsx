@@ -48,7 +48,12 @@ export function Segments<T extends string>({ id, label, options, value, onChange
   return (
     <div class="segments" role="radiogroup" aria-label={label} data-testid={id}>
       {options.map((option) => (
-        <label key={option.value} class="segment" data-testid={`${id}-${option.value}`} title={option.icon ? option.label : undefined}>
+        <label
+          key={option.value}
+          class="segment"
+          data-testid={`${id}-${option.value}`}
+          title={option.icon ? option.label : undefined}
+        >
           <input
             type="radio"
             name={name}
@@ -149,7 +154,15 @@ export function Choice({ id, label, options, value, onChange }: ChoiceProps) {
   );
 }
 
-export function Section({ title, aside, children }: { title: string; aside?: ComponentChildren; children: ComponentChildren }) {
+export function Section({
+  title,
+  aside,
+  children,
+}: {
+  title: string;
+  aside?: ComponentChildren;
+  children: ComponentChildren;
+}) {
   return (
     <section class="section">
       <div class="section-head">

@@ -1,7 +1,9 @@
 // Numbers as people read them.
 
 export function count(n: number): string {
-  return Math.round(n).toString().replace(/\B(?=(\d{3})+$)/g, ',');
+  return Math.round(n)
+    .toString()
+    .replace(/\B(?=(\d{3})+$)/g, ',');
 }
 
 // 12,345 → 12.3k
@@ -47,4 +49,5 @@ export function title(name: string): string {
 }
 
 // What a file may be called on any system.
-export const file_name = (text: string): string => text.replace(/[^\w.-]+/g, '-').replace(/^[-.]+|-+$/g, '') || 'traceflow';
+export const file_name = (text: string): string =>
+  text.replace(/[^\w.-]+/g, '-').replace(/^[-.]+|-+$/g, '') || 'traceflow';

@@ -27,7 +27,13 @@ export function Compare({ left, right, leftName, rightName, aspect, id }: Compar
     set_share((s) => clamp(s + by, 0, 1));
   };
   return (
-    <div class="compare" style={{ aspectRatio: String(aspect) }} onPointerDown={drag} onPointerMove={drag} data-testid={`${id}-compare`}>
+    <div
+      class="compare"
+      style={{ aspectRatio: String(aspect) }}
+      onPointerDown={drag}
+      onPointerMove={drag}
+      data-testid={`${id}-compare`}
+    >
       <img src={right} alt={rightName} draggable={false} />
       <img src={left} alt={leftName} draggable={false} style={{ clipPath: `inset(0 ${(1 - share) * 100}% 0 0)` }} />
       <span class="compare-name start">{leftName}</span>

@@ -31,7 +31,14 @@ export function FigureTable({ data, open }: { data: ReportData; open: (opened: O
           </thead>
           <tbody>
             {sorted(data.views, order).map((view) => (
-              <Row key={view.id} view={view} kinds={kinds} marks={marks} picture={data.pictures.findIndex((p) => p.id === view.id)} open={open} />
+              <Row
+                key={view.id}
+                view={view}
+                kinds={kinds}
+                marks={marks}
+                picture={data.pictures.findIndex((p) => p.id === view.id)}
+                open={open}
+              />
             ))}
           </tbody>
           <tfoot>

@@ -45,7 +45,14 @@ export function Large({ data, opened, open }: LargeProps) {
   const label = layers.find((l) => l.key === opened.layer)?.label ?? '';
   const aspect = picture.width / picture.height;
   return (
-    <dialog ref={dialog} class="large" aria-label={`View ${picture.id}`} data-testid="large" onClose={() => open(null)} onKeyDown={key}>
+    <dialog
+      ref={dialog}
+      class="large"
+      aria-label={`View ${picture.id}`}
+      data-testid="large"
+      onClose={() => open(null)}
+      onKeyDown={key}
+    >
       <div class="large-body" style={{ '--aspect': String(aspect) }} tabIndex={-1} autofocus>
         <div class="large-head">
           <Button id="large-before" label="View before (←)" icon="left" iconOnly onPress={() => step(-1)} />
@@ -74,7 +81,9 @@ export function Large({ data, opened, open }: LargeProps) {
         <Segments
           id="large-layer"
           label="Beside the photograph"
-          options={layers.filter((l) => l.key !== 'photograph').map((l) => ({ value: l.key as LayerKey, label: l.label }))}
+          options={layers
+            .filter((l) => l.key !== 'photograph')
+            .map((l) => ({ value: l.key as LayerKey, label: l.label }))}
           value={opened.layer}
           onChange={(layer) => open({ ...opened, layer })}
         />

@@ -15,8 +15,18 @@ export function Report({ data }: { data: ReportData }) {
   const [opened, open] = useState<Opened | null>(null);
   const parts: { id: string; title: string; body: preact.ComponentChild; there: boolean }[] = [
     { id: 'views', title: 'Views', body: <Views data={data} open={open} />, there: data.pictures.length > 0 },
-    { id: 'figures', title: 'Figures of each view', body: <FigureTable data={data} open={open} />, there: data.views.length > 0 },
-    { id: 'curves', title: 'Training', body: <Curves events={data.events} height={170} />, there: data.events.length > 0 },
+    {
+      id: 'figures',
+      title: 'Figures of each view',
+      body: <FigureTable data={data} open={open} />,
+      there: data.views.length > 0,
+    },
+    {
+      id: 'curves',
+      title: 'Training',
+      body: <Curves events={data.events} height={170} />,
+      there: data.events.length > 0,
+    },
     { id: 'times', title: 'Time', body: <Times phases={data.phases} />, there: data.phases.length > 0 },
     { id: 'settings', title: 'Settings', body: <Settings settings={data.settings} />, there: data.settings.length > 0 },
     { id: 'run', title: 'Run', body: <Facts data={data} />, there: true },
@@ -53,7 +63,8 @@ function Header({ data }: { data: ReportData }) {
         <div>
           <h1>{data.run}</h1>
           <p>
-            {data.capture} · {data.views.length} {data.split} views · {data.iterations.toLocaleString('en-GB')} iterations
+            {data.capture} · {data.views.length} {data.split} views · {data.iterations.toLocaleString('en-GB')}{' '}
+            iterations
           </p>
         </div>
         <ThemeButton />
@@ -76,13 +87,22 @@ function Header({ data }: { data: ReportData }) {
 // The view of middling quality, large: what to expect.
 function Hero({ data, open }: { data: ReportData; open: (opened: Opened) => void }) {
   const value = (id: string): number => data.views.find((view) => view.id === id)?.psnr ?? 0;
-  const ordered = data.pictures.map((_, i) => i).sort((a, b) => value(data.pictures[a]?.id ?? '') - value(data.pictures[b]?.id ?? ''));
+  const ordered = data.pictures
+    .map((_, i) => i)
+    .sort((a, b) => value(data.pictures[a]?.id ?? '') - value(data.pictures[b]?.id ?? ''));
   const index = ordered[ordered.length >> 1];
   const picture = index === undefined ? undefined : data.pictures[index];
   if (index === undefined || !picture) return null;
   return (
     <figure class="hero">
-      <Compare left={picture.photograph} right={picture.rgb} leftName="Photograph" rightName="Render" aspect={picture.width / picture.height} id="hero" />
+      <Compare
+        left={picture.photograph}
+        right={picture.rgb}
+        leftName="Photograph"
+        rightName="Render"
+        aspect={picture.width / picture.height}
+        id="hero"
+      />
       <figcaption>
         <span>{picture.id}, the view of median PSNR</span>
         <button type="button" class="link" data-testid="hero-open" onClick={() => open({ index, layer: 'rgb' })}>

@@ -17,7 +17,12 @@ export function Views({ data, open }: { data: ReportData; open: (opened: Opened)
             </h3>
             <div class="strip">
               {layers.map(({ key, label }) => (
-                <button key={key} type="button" aria-label={`${picture.id}, ${label}, large`} onClick={() => open({ index, layer: key })}>
+                <button
+                  key={key}
+                  type="button"
+                  aria-label={`${picture.id}, ${label}, large`}
+                  onClick={() => open({ index, layer: key })}
+                >
                   <img src={picture[key]} alt="" width={picture.width} height={picture.height} loading="lazy" />
                   <span>{label}</span>
                 </button>

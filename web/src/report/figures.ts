@@ -27,7 +27,8 @@ export type View = ReportData['views'][number];
 export const present = (data: ReportData): Kind[] =>
   kinds.filter(({ key }) => data.mean[key] !== null || data.views.some((view) => view[key] !== null));
 
-export const written = (value: number | null, { digits }: Kind): string => (value === null ? '–' : value.toFixed(digits));
+export const written = (value: number | null, { digits }: Kind): string =>
+  value === null ? '–' : value.toFixed(digits);
 
 // The best and the worst value among the views; null where they do not differ.
 export function ends(views: readonly View[], { key, higher_is_better }: Kind): { best: number; worst: number } | null {

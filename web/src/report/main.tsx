@@ -9,4 +9,12 @@ const text = document.getElementById('report')?.textContent ?? 'null';
 const data = JSON.parse(text) as ReportData | null;
 const root = document.getElementById('page');
 if (data) document.title = `${data.run} · TraceFlow report`;
-if (root) render(data ? <Report data={data} /> : <p class="empty">This page is the empty form of a report: traceflow report fills it.</p>, root);
+if (root)
+  render(
+    data ? (
+      <Report data={data} />
+    ) : (
+      <p class="empty">This page is the empty form of a report: traceflow report fills it.</p>
+    ),
+    root,
+  );

@@ -5,12 +5,14 @@ import { camera, hello, previewing, rays_on, shown, stage, type Shown } from '..
 import { hovered, pinned, type Ray } from '../state/rays.ts';
 import { path, path_visible, shots } from '../state/path.ts';
 
-// What is drawn into the scene over its picture, with the camera of the picture that is shown: rays and the camera path.
+// What is drawn into the scene over its picture, with the camera of the picture that is shown: rays and the camera
+// path.
 export function Overlay() {
   const view = shown.value;
   if (!view) return null;
   const { width, height } = stage.value;
-  const rays = rays_on.value || pinned.value.length > 0 ? [...pinned.value, ...(hovered.value ? [hovered.value] : [])] : [];
+  const rays =
+    rays_on.value || pinned.value.length > 0 ? [...pinned.value, ...(hovered.value ? [hovered.value] : [])] : [];
   return (
     <svg class="overlay" width={width} height={height} aria-hidden="true" data-testid="overlay">
       {path_visible.value && !previewing.value && <PathLines view={view} />}
@@ -49,7 +51,8 @@ function Dot({ view, at, kind, size }: { view: Shown; at: Vec3; kind: string; si
   return <circle class={kind} cx={x} cy={y} r={size} />;
 }
 
-// The normal, the way back to the eye that a pinned ray was seen from, and the mirrored ray to where its light comes from; faint where it meets nothing.
+// The normal, the way back to the eye that a pinned ray was seen from, and the mirrored ray to where its light comes
+// from; faint where it meets nothing.
 function RayLines({ view, ray, live }: { view: Shown; ray: Ray; live: boolean }) {
   const extent = hello.value?.extent ?? 1;
   const { surface, normal, mirrored } = ray;
@@ -58,7 +61,12 @@ function RayLines({ view, ray, live }: { view: Shown; ray: Ray; live: boolean })
   return (
     <g class={live ? 'ray live' : 'ray'}>
       {mirrored && !live && (
-        <Line view={view} from={surface} to={add_scaled(surface, towards_eye(mirrored.direction, normal), extent)} kind="ray-seen" />
+        <Line
+          view={view}
+          from={surface}
+          to={add_scaled(surface, towards_eye(mirrored.direction, normal), extent)}
+          kind="ray-seen"
+        />
       )}
       {end && meets && <Line view={view} from={surface} to={end} kind="ray-halo" />}
       {end && <Line view={view} from={surface} to={end} kind={meets ? 'ray-mirrored' : 'ray-mirrored lost'} />}
@@ -71,7 +79,8 @@ function RayLines({ view, ray, live }: { view: Shown; ray: Ray; live: boolean })
 }
 
 // Where the ray came from: its mirror image, mirrored back.
-const towards_eye = (mirrored: Vec3, normal: Vec3): Vec3 => subtract(scale(normal, 2 * dot(mirrored, normal)), mirrored);
+const towards_eye = (mirrored: Vec3, normal: Vec3): Vec3 =>
+  subtract(scale(normal, 2 * dot(mirrored, normal)), mirrored);
 
 // The way of the camera and a small pyramid for each keyframe.
 function PathLines({ view }: { view: Shown }) {

@@ -10,7 +10,10 @@ export function RayReadout({ ray }: { ray: Ray }) {
       <Entry name="Depth" value={ray.depth} />
       <Entry name="Tint" value={ray.tint} />
       <Entry name="Alpha" value={ray.alpha} />
-      <Entry name="Mirrored" value={mirrored ? (mirrored.distance > 0 ? mirrored.distance : 'meets nothing') : undefined} />
+      <Entry
+        name="Mirrored"
+        value={mirrored ? (mirrored.distance > 0 ? mirrored.distance : 'meets nothing') : undefined}
+      />
       <Colour name="Colour" value={ray.colour} />
       <Colour name="Diffuse" value={ray.diffuse} />
       <Colour name="Specular" value={ray.specular} />

@@ -38,7 +38,13 @@ export function StatusLine() {
             </span>
           )}
           <span>
-            <b>{[s.surfels.main, s.surfels.environment].filter((n) => n > 0).map(count).join(' + ') || '0'}</b> surfels
+            <b>
+              {[s.surfels.main, s.surfels.environment]
+                .filter((n) => n > 0)
+                .map(count)
+                .join(' + ') || '0'}
+            </b>{' '}
+            surfels
           </span>
           <span>
             <b>{s.viewers}</b> {s.viewers === 1 ? 'viewer' : 'viewers'}

@@ -40,7 +40,14 @@ export function Timeline() {
         options={speeds.map((s) => ({ value: String(s), label: `${s}×` }))}
         onChange={(value) => (speed.value = Number(value))}
       />
-      <Button id="loop" label="Loop" icon="loop" iconOnly pressed={looping.value} onPress={() => (looping.value = !looping.value)} />
+      <Button
+        id="loop"
+        label="Loop"
+        icon="loop"
+        iconOnly
+        pressed={looping.value}
+        onPress={() => (looping.value = !looping.value)}
+      />
     </div>
   );
 }

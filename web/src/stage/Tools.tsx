@@ -19,7 +19,15 @@ export function Tools() {
           { value: 'fly', label: 'Fly (F; W A S D Q E)', icon: 'fly' },
         ]}
       />
-      <Button id="rays" label="Reflection rays" keys="T" icon="ray" iconOnly pressed={rays_on.value} onPress={toggle_rays} />
+      <Button
+        id="rays"
+        label="Reflection rays"
+        keys="T"
+        icon="ray"
+        iconOnly
+        pressed={rays_on.value}
+        onPress={toggle_rays}
+      />
       <Button id="reset" label="Back to the start" keys="R" icon="reset" iconOnly onPress={reset_view} />
       <Button
         id="still-quick"
@@ -31,7 +39,15 @@ export function Tools() {
         onPress={take_still}
       />
       <span class="wide-only">
-        <Button id="panel-toggle" label="Panel" keys="\" icon="panel" iconOnly pressed={panel_open.value} onPress={toggle_panel} />
+        <Button
+          id="panel-toggle"
+          label="Panel"
+          keys="\"
+          icon="panel"
+          iconOnly
+          pressed={panel_open.value}
+          onPress={toggle_panel}
+        />
       </span>
     </div>
   );

@@ -42,7 +42,7 @@ export const release_fly_keys = (): void => held.clear();
 function step(now: number): void {
   running = held.size > 0;
   if (!running) return;
-  const length = (((hello.value?.extent ?? 1) * (fast ? 1.2 : 0.35)) * Math.min(Math.max(now - before, 0), 100)) / 1000;
+  const length = ((hello.value?.extent ?? 1) * (fast ? 1.2 : 0.35) * Math.min(Math.max(now - before, 0), 100)) / 1000;
   before = now;
   const [right, rise, ahead] = [...held].reduce(
     (sum, key) => sum.map((value, i) => value + (directions[key]?.[i] ?? 0)) as [number, number, number],

@@ -2,8 +2,8 @@ import { look_around, orbit, pan, zoom, fly } from '../math/navigate.ts';
 import { hello, mode, stage } from '../state/store.ts';
 import { steer } from './travel.ts';
 
-// Pointers on the stage: drags orbit (or look around), right, middle and shift drags and two fingers pan, the wheel and a pinch
-// come nearer. A press that does not move is left to `tap`.
+// Pointers on the stage: drags orbit (or look around), right, middle and shift drags and two fingers pan, the wheel and
+// a pinch come nearer. A press that does not move is left to `tap`.
 
 export interface Touches {
   tap(x: number, y: number, event: PointerEvent): void; // x, y in CSS pixels of the stage
@@ -111,4 +111,3 @@ export function listen_to_pointers(element: HTMLElement, touches: Touches): () =
     for (const [name, f] of listeners) element.removeEventListener(name, f as EventListener);
   };
 }
-

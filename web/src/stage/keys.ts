@@ -1,7 +1,18 @@
 import { zoom_by, pan_by, turn_by } from './gestures.ts';
 import { fly_key_down, fly_key_up, release_fly_keys } from './fly_keys.ts';
 import { centre_on, reset_view } from './travel.ts';
-import { comparison, hello, layer, mode, photo, playing, previewing, rays_on, shown, type Comparison } from '../state/store.ts';
+import {
+  comparison,
+  hello,
+  layer,
+  mode,
+  photo,
+  playing,
+  previewing,
+  rays_on,
+  shown,
+  type Comparison,
+} from '../state/store.ts';
 import { step_camera } from '../state/cameras.ts';
 import { step_time, toggle_playing } from '../state/clock.ts';
 import { add_keyframe, toggle_preview } from '../state/path.ts';

@@ -17,8 +17,8 @@ const rest_after = 150; // ms without input until a picture is at rest
 const patience = 2000; // ms until an unanswered look stops holding back the next
 const remembered = 32;
 
-// Decides which looks are sent when: no faster than they are answered, the newest always wins, and the last of a movement
-// asks for a picture at rest.
+// Decides which looks are sent when: no faster than they are answered, the newest always wins, and the last of a
+// movement asks for a picture at rest.
 export class Looker {
   private readonly send: (look: Look) => boolean;
   private readonly clock: Clock;

@@ -2,7 +2,20 @@ import { batch, effect } from '@preact/signals';
 import type { Look } from '../messages.ts';
 import { fit, whole } from '../math/fit.ts';
 import { widened } from '../math/camera.ts';
-import { asleep, camera, captured, comparing, exposure, hello, layer, map, photo, pixel_ratio, stage, time } from '../state/store.ts';
+import {
+  asleep,
+  camera,
+  captured,
+  comparing,
+  exposure,
+  hello,
+  layer,
+  map,
+  photo,
+  pixel_ratio,
+  stage,
+  time,
+} from '../state/store.ts';
 import { send } from '../state/server.ts';
 import { Looker, type Wish } from './looker.ts';
 

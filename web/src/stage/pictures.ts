@@ -79,7 +79,8 @@ export const forget_request = (): void => void (asked = '');
 const same = (a: PhotoRef | null | undefined, b: PhotoRef | null | undefined): boolean =>
   !!a && !!b && a.split === b.split && a.index === b.index;
 
-// Where a frame belongs on the stage: a captured view's as large as fits; any other so that its angles agree with the stage's.
+// Where a frame belongs on the stage: a captured view's as large as fits; any other so that its angles agree with the
+// stage's.
 function place_of(drawn: Frame): Rectangle {
   const aspect = drawn.header.width / drawn.header.height;
   const sent = drawn.look.camera;

@@ -35,7 +35,10 @@ export function take_still(): void {
   const when = there.moves ? `_t${time.value.toFixed(3)}` : '';
   const trained = server.value?.iterations ? `_${server.value.iteration}` : '';
   const where = captured_view.value ? `_${captured_view.value.id}` : '';
-  names.set(id, file_name(`${there.name}${where}_${shown_layer()}${when}${trained}_${size.width}x${size.height}`) + '.png');
+  names.set(
+    id,
+    file_name(`${there.name}${where}_${shown_layer()}${when}${trained}_${size.width}x${size.height}`) + '.png',
+  );
   if (send({ type: 'still', id, ...size })) still_wanted.value = id;
   else notify('There is no connection to the server.');
 }

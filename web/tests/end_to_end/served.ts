@@ -2,9 +2,9 @@ import { spawn, type ChildProcess } from 'node:child_process';
 import { connect, createServer, type AddressInfo, type Server, type Socket } from 'node:net';
 import { fileURLToPath } from 'node:url';
 
-// A server for a test, behind a line that the test can cut. Without anything said it is the stand-in of dev/; the environment
-// gives others: VIEW_COMMAND and TRAIN_COMMAND, shell commands such as "traceflow view RUN" and "traceflow train … --view" that
-// print the address and take --port and --allow-host.
+// A server for a test, behind a line that the test can cut. Without anything said it is the stand-in of dev/; the
+// environment gives others: VIEW_COMMAND and TRAIN_COMMAND, shell commands such as "traceflow view RUN" and "traceflow
+// train … --view" that print the address and take --port and --allow-host.
 
 export type Kind = 'view' | 'train';
 
@@ -54,7 +54,10 @@ function start(kind: Kind, seen_port: number, token: string): Promise<Program> {
   const command = commands[kind];
   const environment = { ...process.env, PORT: '0', TOKEN: token, SOURCE: kind === 'view' ? 'run' : 'training' };
   const child = command
-    ? spawn(`exec ${command} --port 0 --allow-host 127.0.0.1:${seen_port}`, { shell: true, stdio: ['ignore', 'pipe', 'inherit'] })
+    ? spawn(`exec ${command} --port 0 --allow-host 127.0.0.1:${seen_port}`, {
+        shell: true,
+        stdio: ['ignore', 'pipe', 'inherit'],
+      })
     : spawn(process.execPath, [fake], { env: environment, stdio: ['ignore', 'pipe', 'inherit'] });
   return new Promise((found, failed) => {
     let said = '';
@@ -110,7 +113,10 @@ class Line {
   private pass(near: Socket): void {
     if (!this.whole) return void near.destroy();
     const far = connect(this.target, '127.0.0.1');
-    for (const [from, to] of [[near, far], [far, near]] as const) {
+    for (const [from, to] of [
+      [near, far],
+      [far, near],
+    ] as const) {
       this.ends.add(from);
       from.setNoDelay(true);
       from.pipe(to);

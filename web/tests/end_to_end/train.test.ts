@@ -57,7 +57,9 @@ describe('watching a training', { skip: !available('train') }, () => {
 
   test('a second page sees the same', async () => {
     const other = await open(browser, served.address);
-    await page.waitForFunction(() => document.querySelector('[data-testid=status]')?.textContent?.includes('2 viewers'));
+    await page.waitForFunction(() =>
+      document.querySelector('[data-testid=status]')?.textContent?.includes('2 viewers'),
+    );
     await press(other.page, 'tab-training');
     await press(other.page, 'pause');
     await page.getByTestId('resume').waitFor({ timeout: patience });

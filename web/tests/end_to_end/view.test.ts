@@ -31,12 +31,16 @@ describe('looking at a run', { skip: !available('view') }, () => {
       requestAnimationFrame(look);
     });
     await page.goto(served.address);
-    await page.waitForFunction(() => performance.getEntriesByName('first picture').length > 0, undefined, { timeout: patience });
+    await page.waitForFunction(() => performance.getEntriesByName('first picture').length > 0, undefined, {
+      timeout: patience,
+    });
     const [painted, picture] = await page.evaluate(() => [
       performance.getEntriesByName('first-contentful-paint')[0]?.startTime ?? Infinity,
       performance.getEntriesByName('first picture')[0]?.startTime ?? Infinity,
     ]);
-    console.log(`# first paint after ${Math.round(painted ?? 0)} ms, first picture after ${Math.round(picture ?? 0)} ms`);
+    console.log(
+      `# first paint after ${Math.round(painted ?? 0)} ms, first picture after ${Math.round(picture ?? 0)} ms`,
+    );
     assert.ok((painted ?? Infinity) < 1000);
     assert.ok((picture ?? Infinity) < 1000);
     await page.close();
@@ -61,7 +65,9 @@ describe('looking at a run', { skip: !available('view') }, () => {
 
   test('each layer differs from the others', async () => {
     const { page } = await open(browser, served.address);
-    const names = await page.locator('[data-testid^=layer-]').evaluateAll((all) => all.map((e) => e.getAttribute('data-testid') ?? ''));
+    const names = await page
+      .locator('[data-testid^=layer-]')
+      .evaluateAll((all) => all.map((e) => e.getAttribute('data-testid') ?? ''));
     assert.ok(names.length >= 9);
     const seen: [string, number[]][] = [];
     for (const name of names) {
@@ -89,7 +95,7 @@ describe('looking at a run', { skip: !available('view') }, () => {
     assert.ok((await page.evaluate(() => window.traceflow.latencies.length)) > known);
     await press(page, 'reset');
     await page.waitForTimeout(1200);
-    await at_rest(page, await newest_look(page) - 1);
+    await at_rest(page, (await newest_look(page)) - 1);
     assert.ok(difference(start, await glimpse(page)) < 1);
     await page.context().close();
   });
@@ -127,7 +133,7 @@ describe('looking at a run', { skip: !available('view') }, () => {
     await press(page, 'camera-3');
     const handle = page.getByTestId('split');
     await handle.waitFor({ timeout: patience });
-    await at_rest(page, await newest_look(page) - 1);
+    await at_rest(page, (await newest_look(page)) - 1);
     await page.waitForTimeout(1500);
     const area = await handle.locator('..').boundingBox();
     assert.ok(area);
@@ -165,7 +171,8 @@ describe('looking at a run', { skip: !available('view') }, () => {
     await page.mouse.down();
     await page.mouse.up();
     await page.getByTestId('pins').waitFor({ timeout: patience });
-    const where = (): Promise<string> => page.locator('.ray:not(.live) .ray-surface').evaluate((e) => `${e.getAttribute('cx')} ${e.getAttribute('cy')}`);
+    const where = (): Promise<string> =>
+      page.locator('.ray:not(.live) .ray-surface').evaluate((e) => `${e.getAttribute('cx')} ${e.getAttribute('cy')}`);
     const start = await where();
     await then_rest(page, async () => {
       await page.keyboard.press('t');
@@ -188,7 +195,9 @@ describe('looking at a run', { skip: !available('view') }, () => {
     });
     await page.keyboard.press('k');
     assert.equal(await page.getByTestId('keyframes').locator('li').count(), 2);
-    await page.waitForFunction(() => !document.querySelector<HTMLButtonElement>('[data-testid=path-preview]')?.disabled);
+    await page.waitForFunction(
+      () => !document.querySelector<HTMLButtonElement>('[data-testid=path-preview]')?.disabled,
+    );
     assert.ok((await page.locator('.path-way').count()) > 5);
     const start = await glimpse(page);
     await press(page, 'path-preview');
@@ -246,7 +255,9 @@ describe('looking at a run', { skip: !available('view') }, () => {
     const frames = await page.evaluate(() => window.traceflow.frames);
     await page.waitForTimeout(1500);
     served.restore();
-    await page.waitForFunction((known) => window.traceflow.connected && window.traceflow.frames > known, frames, { timeout: patience });
+    await page.waitForFunction((known) => window.traceflow.connected && window.traceflow.frames > known, frames, {
+      timeout: patience,
+    });
     await at_rest(page);
     assert.equal(await page.getByTestId('banner-lost').count(), 0);
     assert.ok(difference(before_cut, await glimpse(page)) < 1);
@@ -258,7 +269,11 @@ describe('looking at a run', { skip: !available('view') }, () => {
     for (const tab of ['view', 'cameras', 'path']) {
       await press(page, `tab-${tab}`);
       await page.waitForTimeout(100);
-      const wide = await page.evaluate(() => [...document.querySelectorAll('.panel *, .stage > *')].filter((e) => e.getBoundingClientRect().right > 391).length);
+      const wide = await page.evaluate(
+        () =>
+          [...document.querySelectorAll('.panel *, .stage > *')].filter((e) => e.getBoundingClientRect().right > 391)
+            .length,
+      );
       assert.equal(wide, 0, tab);
     }
     await press(page, 'tab-path');

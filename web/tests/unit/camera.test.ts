@@ -1,6 +1,16 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { degrees, down_of, forward_of, look_at, project, project_line, ray_through, right_of, widened } from '../../src/math/camera.ts';
+import {
+  degrees,
+  down_of,
+  forward_of,
+  look_at,
+  project,
+  project_line,
+  ray_through,
+  right_of,
+  widened,
+} from '../../src/math/camera.ts';
 import { about, multiply, orthonormal, slerp, to_matrix, to_quaternion, transpose } from '../../src/math/rotation.ts';
 import { add_scaled, cross, dot, scale, unit } from '../../src/math/vec.ts';
 import { near, near_vector, numbers, vector } from './near.ts';
@@ -65,7 +75,12 @@ test('matrices and quaternions say the same', () => {
     const m = about(unit(vector(next)), next() * Math.PI);
     to_matrix(to_quaternion(m)).forEach((row, j) => near_vector(row, m[j] ?? []));
     orthonormal(m).forEach((row, j) => near_vector(row, m[j] ?? []));
-    multiply(m, transpose(m)).forEach((row, j) => near_vector(row, [0, 1, 2].map((k) => Number(k === j))));
+    multiply(m, transpose(m)).forEach((row, j) =>
+      near_vector(
+        row,
+        [0, 1, 2].map((k) => Number(k === j)),
+      ),
+    );
   }
 });
 
@@ -73,12 +88,17 @@ test('half of the way between two rotations is half of the angle', () => {
   const axis = unit([1, 2, -1]);
   const from = about(axis, 0.3);
   slerp(from, about(axis, 1.7), 0.5).forEach((row, i) => near_vector(row, about(axis, 1)[i] ?? []));
-  slerp(from, about(axis, 0.3 + 1.6 * Math.PI), 0.5).forEach((row, i) => near_vector(row, about(axis, 0.3 - 0.2 * Math.PI)[i] ?? []));
+  slerp(from, about(axis, 0.3 + 1.6 * Math.PI), 0.5).forEach((row, i) =>
+    near_vector(row, about(axis, 0.3 - 0.2 * Math.PI)[i] ?? []),
+  );
   slerp(from, from, 0.4).forEach((row, i) => near_vector(row, from[i] ?? []));
 });
 
 test('right-handed about an axis', () => {
   const turned = about([0, 0, 1], Math.PI / 2);
-  near_vector(turned.map((row) => row[0]), [0, 1, 0]);
+  near_vector(
+    turned.map((row) => row[0]),
+    [0, 1, 0],
+  );
   near_vector(scale([1, 2, 3], 2), [2, 4, 6]);
 });

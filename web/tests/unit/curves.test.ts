@@ -28,7 +28,10 @@ test('thinning keeps ends, extremes and order', () => {
   const kept = thinned(values, 500);
   assert.ok(kept.length <= 502);
   for (const i of [0, 1234, 4321, 9999]) assert.ok(kept.includes(i), `${i} is missing`);
-  assert.deepEqual(kept, [...kept].sort((a, b) => a - b));
+  assert.deepEqual(
+    kept,
+    [...kept].sort((a, b) => a - b),
+  );
   assert.equal(new Set(kept).size, kept.length);
 });
 
@@ -89,10 +92,16 @@ test('every chart of a whole run has columns of one length', () => {
   const events = training.begin();
   while (!training.over) events.push(...training.advance());
   const charts = charts_of(series_of(events), true, 'main');
-  assert.deepEqual(charts.map((c) => c.id), ['loss', 'psnr', 'surfels', 'density', 'rate', 'memory']);
+  assert.deepEqual(
+    charts.map((c) => c.id),
+    ['loss', 'psnr', 'surfels', 'density', 'rate', 'memory'],
+  );
   for (const chart of charts) {
     for (const line of chart.lines) assert.equal(line.values.length, chart.x.length, chart.id);
-    assert.deepEqual(chart.x, [...chart.x].sort((a, b) => a - b));
+    assert.deepEqual(
+      chart.x,
+      [...chart.x].sort((a, b) => a - b),
+    );
   }
   const loss = charts[0]?.lines.flatMap((line) => line.values) ?? [];
   assert.ok(loss.every((v) => v === null || v > 0));

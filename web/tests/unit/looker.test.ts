@@ -66,8 +66,14 @@ test('while one is unanswered only the newest waits', () => {
   assert.equal(b.sent.length, 1);
   b.pass(10);
   b.answer(1);
-  assert.deepEqual(b.sent.map((l) => l.time), [0, 0.2]);
-  assert.deepEqual(b.sent.map((l) => l.id), [1, 2]);
+  assert.deepEqual(
+    b.sent.map((l) => l.time),
+    [0, 0.2],
+  );
+  assert.deepEqual(
+    b.sent.map((l) => l.id),
+    [1, 2],
+  );
 });
 
 test('motion ends with a look at rest', () => {
@@ -146,6 +152,9 @@ test('after a reconnection the wish is sent again', () => {
   b.connected = true;
   b.looker.restart();
   b.looker.want(wish(0.3));
-  assert.deepEqual(b.sent.map((l) => l.time), [0, 0.3]);
+  assert.deepEqual(
+    b.sent.map((l) => l.time),
+    [0, 0.3],
+  );
   assert.equal(b.looker.waiting(), 0);
 });

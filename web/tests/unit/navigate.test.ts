@@ -84,7 +84,10 @@ test('centring turns towards the pivot without moving', () => {
 test('a flight begins and ends where it should and goes around the centre', () => {
   const centre: Vec3 = [0, 0, 0.2];
   const to = look_at([0, 4, 0.8], centre, up, 50);
-  for (const [t, expected] of [[0, start.camera], [1, to]] as const) {
+  for (const [t, expected] of [
+    [0, start.camera],
+    [1, to],
+  ] as const) {
     const found = between(start.camera, to, centre, t);
     near_vector(found.position, expected.position, 1e-6);
     found.rotation.forEach((row, i) => near_vector(row, expected.rotation[i] ?? [], 1e-6));

@@ -36,8 +36,23 @@ test('numbers are written for people', () => {
   assert.equal(short_count(9999), '9,999');
   assert.equal(short_count(12345), '12.3k');
   assert.equal(short_count(2.5e6), '2.50M');
-  assert.deepEqual([0.000012, 0.1234567, 1.23456, 12.3456, 123.456, 0, NaN].map(figure), ['1.20e-5', '0.1235', '1.235', '12.35', '123.5', '0', '–']);
-  assert.deepEqual([0.25, 4.2, 42, 65, 3725, 7199].map(duration), ['250 ms', '4.2 s', '42 s', '1 min 5 s', '1 h 2 min', '2 h 0 min']);
+  assert.deepEqual([0.000012, 0.1234567, 1.23456, 12.3456, 123.456, 0, NaN].map(figure), [
+    '1.20e-5',
+    '0.1235',
+    '1.235',
+    '12.35',
+    '123.5',
+    '0',
+    '–',
+  ]);
+  assert.deepEqual([0.25, 4.2, 42, 65, 3725, 7199].map(duration), [
+    '250 ms',
+    '4.2 s',
+    '42 s',
+    '1 min 5 s',
+    '1 h 2 min',
+    '2 h 0 min',
+  ]);
   assert.deepEqual([999, 1500, 1.9e9, 24e9].map(bytes), ['999 B', '1.50 kB', '1.90 GB', '24.0 GB']);
   assert.equal(signed(-0.5, 1), '−0.5');
   assert.equal(title('median-depth'), 'Median depth');
@@ -52,14 +67,33 @@ test('pictures are fitted into the middle', () => {
 });
 
 const kind: Kind = { key: 'lpips', label: '', unit: '', digits: 2, higher_is_better: false };
-const view = (id: string, lpips: number | null): View =>
-  ({ id, time: 0, lpips, psnr: null, ssim: null, lpips_published: null, masked_psnr: null, masked_ssim: null, normal_mae_deg: null, masked_normal_mae_deg: null });
+const view = (id: string, lpips: number | null): View => ({
+  id,
+  time: 0,
+  lpips,
+  psnr: null,
+  ssim: null,
+  lpips_published: null,
+  masked_psnr: null,
+  masked_ssim: null,
+  normal_mae_deg: null,
+  masked_normal_mae_deg: null,
+});
 
 test('views are sorted with the unknown last', () => {
   const views = [view('b', 0.2), view('c', null), view('a', 0.1)];
-  assert.deepEqual(sorted(views, { by: 'lpips', falling: false }).map((v) => v.id), ['a', 'b', 'c']);
-  assert.deepEqual(sorted(views, { by: 'lpips', falling: true }).map((v) => v.id), ['b', 'a', 'c']);
-  assert.deepEqual(sorted(views, { by: 'id', falling: true }).map((v) => v.id), ['c', 'b', 'a']);
+  assert.deepEqual(
+    sorted(views, { by: 'lpips', falling: false }).map((v) => v.id),
+    ['a', 'b', 'c'],
+  );
+  assert.deepEqual(
+    sorted(views, { by: 'lpips', falling: true }).map((v) => v.id),
+    ['b', 'a', 'c'],
+  );
+  assert.deepEqual(
+    sorted(views, { by: 'id', falling: true }).map((v) => v.id),
+    ['c', 'b', 'a'],
+  );
   assert.deepEqual(ends(views, kind), { best: 0.1, worst: 0.2 });
   assert.equal(ends([view('a', 0.1), view('b', 0.1)], kind), null);
 });
