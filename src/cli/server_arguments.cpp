@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <cstdio>
 #include <optional>
 
 #include "base/error.h"
@@ -56,9 +57,10 @@ std::unique_ptr<serve::Server> ServerArguments::start(serve::Room& room) const {
     options.port = 0;
     server = listen();
   }
-  fmt::print(stderr, "view: {}\n", server->address());
-  fmt::print(stderr, "      from elsewhere: ssh -L {0}:127.0.0.1:{0} THIS-MACHINE, then the same address\n",
+  fmt::print("view: {}\n", server->address());
+  fmt::print("      from elsewhere: ssh -L {0}:127.0.0.1:{0} THIS-MACHINE, then the same address\n",
              server->port());
+  std::fflush(stdout);  // whoever waits for the address at the other end of a pipe
   return server;
 }
 

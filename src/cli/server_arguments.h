@@ -18,7 +18,7 @@ class ServerArguments {
   // needs: a flag without which these make no sense, or null.
   explicit ServerArguments(CLI::App& verb, CLI::Option* needs = nullptr);
 
-  // Starts the server, and says on standard error where to look and how from another machine. Where no port
+  // Starts the server, and says on standard output where to look and how from another machine. Where no port
   // was asked for and the usual one is taken, it takes any. Throws InputError.
   std::unique_ptr<serve::Server> start(serve::Room& room) const;
 
