@@ -126,7 +126,7 @@ function options(
     scales: {
       x: { time: false, range: (_, low, high) => across(newest.current.phases, low, high) },
       y: chart.log
-        ? { distr: 3 }
+        ? { distr: 3, range: (_, low, high) => on_log_scale(low, high) }
         : { range: (_, low, high) => padded(chart.from_zero ? 0 : low, high, chart.from_zero ?? false) },
     },
     axes: [
@@ -151,8 +151,12 @@ function series_of_line(line: Line): uPlot.Series {
   const stroke = (): string => css_colour(`--series-${line.colour}`);
   if (line.hidden) return { stroke, paths: () => null, points: { show: false } };
   if (line.dots) return { stroke, paths: () => null, points: { show: true, size: 7, fill: stroke } };
-  return { stroke, width: line.colour === 1 ? 1.8 : 1.3, spanGaps: true, points: { show: false } };
+  return { stroke, width: line.colour === 1 ? 2 : 1.2, alpha: line.colour === 1 ? 1 : 0.85, spanGaps: true, points: { show: false } };
 }
+
+// A term that starts near nothing must not press the others flat.
+const on_log_scale = (low: number, high: number): [number, number] =>
+  high > 0 ? [Math.max(low, high / 3e4) * 0.8, high * 2] : [0.1, 1];
 
 // All charts of a run have the same iterations below them.
 const across = (phases: Phase[], low: number, high: number): [number, number] => [

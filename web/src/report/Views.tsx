@@ -23,7 +23,7 @@ export function Views({ data, open }: { data: ReportData; open: (opened: Opened)
                   aria-label={`${picture.id}, ${label}, large`}
                   onClick={() => open({ index, layer: key })}
                 >
-                  <img src={picture[key]} alt="" width={picture.width} height={picture.height} loading="lazy" />
+                  <img src={picture[key]} alt="" width={picture.width} height={picture.height} decoding="async" />
                   <span>{label}</span>
                 </button>
               ))}

@@ -56,16 +56,19 @@ function start(kind: Kind, seen_port: number, token: string): Promise<Program> {
   const child = command
     ? spawn(`exec ${command} --port 0 --allow-host 127.0.0.1:${seen_port}`, {
         shell: true,
-        stdio: ['ignore', 'pipe', 'inherit'],
+        stdio: ['ignore', 'pipe', 'pipe'],
       })
-    : spawn(process.execPath, [fake], { env: environment, stdio: ['ignore', 'pipe', 'inherit'] });
+    : spawn(process.execPath, [fake], { env: environment, stdio: ['ignore', 'pipe', 'pipe'] });
   return new Promise((found, failed) => {
     let said = '';
-    child.stdout?.on('data', (text: Buffer) => {
-      said += String(text);
-      const match = /http:\/\/[^\s/]*:(\d+)\/\?token=(\S+)/.exec(said);
-      if (match) found({ process: child, port: Number(match[1]), token: match[2] ?? '' });
-    });
+    // The program says its address among its other remarks.
+    for (const stream of [child.stdout, child.stderr]) {
+      stream?.on('data', (text: Buffer) => {
+        said += String(text);
+        const match = /http:\/\/[^\s/]*:(\d+)\/\?token=(\S+)/.exec(said);
+        if (match) found({ process: child, port: Number(match[1]), token: match[2] ?? '' });
+      });
+    }
     child.on('exit', (code) => failed(new Error(`the server ended with ${code}: ${said}`)));
   });
 }
