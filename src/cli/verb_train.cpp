@@ -81,7 +81,7 @@ class Watched {
 
   // After the training, for as long as somebody looks.
   void stay(bool quiet) {
-    if (view_.is_alone()) return;
+    if (!view_.is_wanted()) return;
     if (!quiet) fmt::print(stderr, "still shown to those who look; Ctrl-C ends it\n");
     view_.stay();
   }
@@ -118,7 +118,7 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   if (arguments.view) watched.emplace(trainer, arguments, where, stop);
 
   const events::Finished end = trainer.run(stop);
-  if (watched && !stop) watched->stay(arguments.quiet);
+  if (watched) watched->stay(arguments.quiet);
   if (end.ending == events::Ending::diverged) end_with(exit_diverged, arguments, end);
   if (end.ending == events::Ending::out_of_memory) end_with(exit_memory, arguments, end);
   if (end.ending == events::Ending::interrupted) end_with(exit_interrupted, arguments, end);

@@ -41,6 +41,7 @@ void LiveView::command(Do what) {
       save_ = true;
       break;
     case Do::stop:
+      if (!*hooks_.stop) stopped_by_page_ = true;
       *hooks_.stop = true;
       break;
   }
@@ -124,7 +125,11 @@ void LiveView::on_finished(const events::Finished& finished) {
   audience_.scene_changed({});
 }
 
+bool LiveView::is_wanted() { return audience_.viewers() > 0 && (!*hooks_.stop || stopped_by_page_); }
+
 void LiveView::stay() {
+  // A page that has stopped the training still looks at what came of it.
+  if (stopped_by_page_) *hooks_.stop = false;
   while (audience_.viewers() > 0 && !*hooks_.stop) {
     if (audience_.wait(nap)) serve();
   }

@@ -39,8 +39,9 @@ class LiveView {
   // The log of a run that is resumed.
   void recall(const std::vector<LoggedEvent>& events) { audience_.tell(lines_of(thinned(events)), true); }
   void operator()(const events::Event& event);
-  bool is_alone() { return audience_.viewers() == 0; }
-  // After the training: goes on until the last page has left, or the stop flag is raised.
+  // After the training: whether a page is open, and the stop flag was not raised by another than a page.
+  bool is_wanted();
+  // Goes on until the last page has left, or the stop flag is raised.
   void stay();
 
  private:
@@ -58,7 +59,7 @@ class LiveView {
   TrainingHooks hooks_;
   Audience audience_;
   Projector projector_;
-  std::atomic<bool> pause_{false}, save_{false};
+  std::atomic<bool> pause_{false}, save_{false}, stopped_by_page_{false};
   State state_;
   std::vector<std::string> unsent_;
   std::string last_step_;

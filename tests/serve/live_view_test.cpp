@@ -142,7 +142,21 @@ TEST(LiveView, StaysUntilTheLastPageHasLeft) {
   });
   watched.view.stay();
   leaving.join();
-  EXPECT_TRUE(watched.view.is_alone());
+  EXPECT_FALSE(watched.view.is_wanted());
+}
+
+TEST(LiveView, StaysForThePageThatStoppedItAndForNobodyElse) {
+  WatchedRun watched(20, "view_stays_stopped");
+  FakePage page(watched.view.room(), 1);
+  page.say({{"type", "command"}, {"do", "stop"}});
+  watched.trainer.run(watched.stop);
+  EXPECT_TRUE(watched.view.is_wanted());
+
+  WatchedRun interrupted(20, "view_interrupted");
+  FakePage other(interrupted.view.room(), 1);
+  interrupted.stop = true;
+  interrupted.trainer.run(interrupted.stop);
+  EXPECT_FALSE(interrupted.view.is_wanted());
 }
 
 TEST(LiveView, AShareIsAboveNoneAndUnderAll) {

@@ -11,5 +11,5 @@ const arguments_ = [
 ];
 
 // The system's Chromium, or the one that CHROMIUM names.
-export const open_browser = (): Promise<Browser> =>
-  chromium.launch({ executablePath: process.env['CHROMIUM'] ?? '/usr/bin/chromium', args: arguments_ });
+export const open_browser = (...more: string[]): Promise<Browser> =>
+  chromium.launch({ executablePath: process.env['CHROMIUM'] ?? '/usr/bin/chromium', args: [...arguments_, ...more] });

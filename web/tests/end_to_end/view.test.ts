@@ -130,7 +130,7 @@ describe('looking at a run', { skip: !available('view') }, () => {
   test('the split slider moves between photograph and render, by hand and by key', async () => {
     const { page } = await open(browser, served.address);
     await press(page, 'tab-cameras');
-    await press(page, 'camera-3');
+    await press(page, 'camera-0');
     const handle = page.getByTestId('split');
     await handle.waitFor({ timeout: patience });
     await at_rest(page, (await newest_look(page)) - 1);
