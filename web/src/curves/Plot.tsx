@@ -131,7 +131,14 @@ function options(
     },
     axes: [
       { ...common, size: 22, gap: 3, grid: { show: false }, values: (_, splits) => splits.map(short_iteration) },
-      { ...common, size: 46, gap: 4, space: 26, values: (_, splits) => splits.map((v) => (v === null ? '' : axis(v))) },
+      {
+        ...common,
+        size: 46,
+        gap: 4,
+        space: 26,
+        ...(chart.log && { splits: (_: uPlot, __: number, low: number, high: number) => powers_of_ten(low, high) }),
+        values: (_, splits) => splits.map((v) => (v === null ? '' : axis(v))),
+      },
     ],
     series: [{}, ...chart.lines.map(series_of_line)],
     plugins: [
@@ -154,9 +161,17 @@ function series_of_line(line: Line): uPlot.Series {
   return { stroke, width: line.colour === 1 ? 2 : 1.2, alpha: line.colour === 1 ? 1 : 0.85, spanGaps: true, points: { show: false } };
 }
 
-// A term that starts near nothing must not press the others flat.
-const on_log_scale = (low: number, high: number): [number, number] =>
-  high > 0 ? [Math.max(low, high / 3e4) * 0.8, high * 2] : [0.1, 1];
+// Whole powers of ten, five at most: a term that starts near nothing must not press the others flat.
+function on_log_scale(low: number, high: number): [number, number] {
+  if (!(high > 0)) return [0.1, 1];
+  const top = Math.ceil(Math.log10(high) + 0.1);
+  return [10 ** Math.max(Math.floor(Math.log10(low)), top - 5), 10 ** top];
+}
+
+function powers_of_ten(low: number, high: number): number[] {
+  const first = Math.round(Math.log10(low));
+  return Array.from({ length: Math.round(Math.log10(high)) - first + 1 }, (_, i) => 10 ** (first + i));
+}
 
 // All charts of a run have the same iterations below them.
 const across = (phases: Phase[], low: number, high: number): [number, number] => [

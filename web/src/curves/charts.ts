@@ -144,5 +144,8 @@ export function charts_of(series: Series, log: boolean, set: 'main' | 'environme
   return charts;
 }
 
-// 0.0100 → 0.01
-const compact = (v: number): string => String(Number(v.toPrecision(3)));
+// 0.0100 → 0.01, 0.00010 → 1e-4
+function compact(v: number): string {
+  const rounded = Number(v.toPrecision(3));
+  return rounded !== 0 && Math.abs(rounded) < 1e-3 ? rounded.toExponential() : String(rounded);
+}
