@@ -57,6 +57,8 @@ test('a line through the plane of the camera is cut at the near depth', () => {
   const ends = project_line(camera, 1, ahead, add_scaled(behind, right_of(camera), 1), 0.01);
   assert.ok(ends && ends.flatMap((p) => [p.x, p.y]).every(Number.isFinite));
   near(ends[0].x, 0.5);
+  const turned = project_line(camera, 1, add_scaled(behind, right_of(camera), 1), ahead, 0.01);
+  near_vector([turned?.[0].x ?? NaN, turned?.[1].x ?? NaN], [ends[1].x, ends[0].x]);
   assert.equal(project_line(camera, 1, behind, behind, 0.01), null);
   const whole = project_line(camera, 1, ahead, add_scaled(ahead, right_of(camera), 0.2), 0.01);
   near(whole?.[1].x ?? NaN, project(camera, 1, add_scaled(ahead, right_of(camera), 0.2))?.x ?? NaN);
