@@ -3,7 +3,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "serve/messages.h"
+#include "serve/audience/messages.h"
 #include "serve/stage.h"
 
 namespace traceflow::serve {

@@ -4,9 +4,10 @@
 #include <functional>
 
 #include "base/options.h"
-#include "serve/audience.h"
+#include "serve/audience/audience.h"
 #include "serve/projector.h"
 #include "train/events.h"
+#include "train/log_history.h"
 
 namespace traceflow::serve {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "serve/messages.h"
+#include "serve/audience/messages.h"
 #include "serve/stage.h"
 
 namespace traceflow::serve {

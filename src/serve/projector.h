@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "render/renderer.h"
-#include "serve/audience.h"
+#include "serve/audience/audience.h"
 #include "serve/stage.h"
 #include "show/picture.h"
 

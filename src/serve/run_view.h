@@ -3,7 +3,7 @@
 #include <atomic>
 #include <functional>
 
-#include "serve/audience.h"
+#include "serve/audience/audience.h"
 #include "serve/projector.h"
 #include "serve/run_watch.h"
 #include "show/subject.h"

@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/overloaded.h"
 #include "fuzz/promise.h"
-#include "serve/audience.h"
+#include "serve/audience/audience.h"
 
 using namespace traceflow;
 using fuzz::promise;

@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "serve/fake_page.h"
+#include "serve/audience/fake_page.h"
 #include "train/event_log.h"
 #include "train/small_run.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "files/png.h"
-#include "serve/fake_page.h"
+#include "serve/audience/fake_page.h"
 #include "show/layers.h"
 #include "support/temp_folder.h"
 #include "train/small_run.h"

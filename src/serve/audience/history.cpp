@@ -1,4 +1,4 @@
-#include "serve/history.h"
+#include "serve/audience/history.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -36,12 +36,6 @@ std::vector<std::string> History::lines() const {
   std::vector<std::string> texts;
   for (const Line& line : lines_) texts.push_back(line.text);
   return texts;
-}
-
-std::vector<std::string> lines_of(const std::vector<LoggedEvent>& events) {
-  std::vector<std::string> lines;
-  for (const LoggedEvent& event : events) lines.push_back(event.line);
-  return lines;
 }
 
 std::string events_text(const std::vector<std::string>& lines, bool reset) {

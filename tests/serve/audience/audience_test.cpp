@@ -1,9 +1,9 @@
-#include "serve/audience.h"
+#include "serve/audience/audience.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "serve/fake_page.h"
+#include "serve/audience/fake_page.h"
 
 namespace traceflow::serve {
 namespace {

@@ -1,4 +1,4 @@
-#include "serve/messages.h"
+#include "serve/audience/messages.h"
 
 #include <fmt/format.h>
 

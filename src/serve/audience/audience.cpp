@@ -1,4 +1,4 @@
-#include "serve/audience.h"
+#include "serve/audience/audience.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "train/log_history.h"
-
 namespace traceflow::serve {
 
 // What is told of a training run to whoever comes later: lines of its log. Of the steps, every n-th is kept,
@@ -28,8 +26,6 @@ class History {
   int64_t steps_ = 0;
   int64_t stride_ = 1;
 };
-
-std::vector<std::string> lines_of(const std::vector<LoggedEvent>& events);
 
 // {"type": "events", …} of such lines.
 std::string events_text(const std::vector<std::string>& lines, bool reset);

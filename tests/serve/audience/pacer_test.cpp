@@ -1,4 +1,4 @@
-#include "serve/pacer.h"
+#include "serve/audience/pacer.h"
 
 #include <gtest/gtest.h>
 

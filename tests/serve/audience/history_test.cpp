@@ -1,4 +1,4 @@
-#include "serve/history.h"
+#include "serve/audience/history.h"
 
 #include <gtest/gtest.h>
 

@@ -13,10 +13,10 @@
 #include <variant>
 #include <vector>
 
-#include "serve/history.h"
-#include "serve/messages.h"
+#include "serve/audience/history.h"
+#include "serve/audience/messages.h"
+#include "serve/audience/pacer.h"
 #include "serve/net/room.h"
-#include "serve/pacer.h"
 
 namespace traceflow::serve {
 
