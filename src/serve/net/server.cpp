@@ -136,7 +136,7 @@ struct Server::State {
       try {
         io.run();
         return;
-      } catch (...) {  // NOLINT(bugprone-empty-catch): what failed has ended; the others go on
+      } catch (...) {  // what failed has ended; the others go on
       }
     }
   }

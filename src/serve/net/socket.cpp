@@ -155,7 +155,7 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
     mailbox_.reset();
     try {
       common_.room.leave(guest_);
-    } catch (...) {  // NOLINT(bugprone-empty-catch): it is gone either way
+    } catch (...) {  // it is gone either way
     }
   }
 

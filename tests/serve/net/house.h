@@ -60,8 +60,10 @@ class EchoRoom : public Room {
 
 // A server with a page of two files, and what a client of it says.
 struct House {
-  explicit House(const Limits& limits = {}, const ServerOptions& options = {})
-      : server(options, page, room, limits), token(server.address().substr(server.address().find('=') + 1)) {}
+  // elsewhere: a room to serve instead of its own.
+  explicit House(const Limits& limits = {}, const ServerOptions& options = {}, EchoRoom* elsewhere = nullptr)
+      : server(options, page, elsewhere != nullptr ? *elsewhere : room, limits),
+        token(server.address().substr(server.address().find('=') + 1)) {}
 
   static constexpr unsigned char html[] = {'<', 'p', '>', 'h', 'i'};
   static constexpr unsigned char script[] = {'1', ';'};

@@ -31,6 +31,14 @@ RC_GTEST_PROP(Token, SecretsAreTheSameWhenTheirBytesAre, (const std::string& a, 
   RC_ASSERT(same_secret(a, b) == (a == b));
 }
 
+TEST(Token, ASecretsBeginningIsNotTheSecret) {
+  const std::string secret("abc\0", 4);
+  EXPECT_TRUE(same_secret(secret, secret));
+  EXPECT_FALSE(same_secret(secret, secret.substr(0, 3)));
+  EXPECT_FALSE(same_secret(secret.substr(0, 3), secret));
+  EXPECT_FALSE(same_secret("", secret));
+}
+
 TEST(Mailbox, WakesOnceForWhatWaits) {
   int wakes = 0;
   Mailbox mailbox(10, 100, [&] { ++wakes; });

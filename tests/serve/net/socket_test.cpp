@@ -68,6 +68,18 @@ TEST(Socket, WelcomesNobodyElse) {
   EXPECT_EQ(house.status("GET /ws", host + origin + cookie + upgrade), 400);
 }
 
+TEST(Socket, NobodySpeaksBeforeTheWelcome) {
+  const House house;
+  Client client(house.server.port());
+  client.send(
+      "GET /ws HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+      "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n" +
+      house.host_line() + house.origin_line() + house.cookie_line() + "\r\n\x81");
+  const auto reply = client.reply();
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, 400);
+}
+
 TEST(Socket, ARefusedHandshakeHasTheSafetyFieldsToo) {
   const House house;
   const auto reply = house.ask("GET /ws", house.host_line() + house.origin_line() + house.cookie_line() +
