@@ -77,6 +77,11 @@ Machine this_machine(Device device) {
   return machine;
 }
 
+int64_t memory_available() {
+  const int64_t kibibytes = number_at_start(value_of(text_of("/proc/meminfo"), "MemAvailable"));
+  return kibibytes > 0 ? kibibytes << 10 : int64_t{1} << 60;
+}
+
 int64_t memory_in_use(Device device) {
   if (device == Device::cuda) return static_cast<int64_t>(memory::device_bytes());
   return resident_memory(text_of("/proc/self/statm"), ::sysconf(_SC_PAGESIZE));

@@ -24,6 +24,9 @@ Machine this_machine(Device device);
 // does not tell.
 int64_t memory_in_use(Device device);
 
+// Memory that this machine could still give to this process. Much where the system does not tell.
+int64_t memory_available();
+
 // Of the texts of /proc/cpuinfo (empty where the processor has no name there), /proc/meminfo and
 // /proc/self/statm (0 where they do not say).
 std::string processor_name(std::string_view cpuinfo);

@@ -53,13 +53,16 @@ std::unique_ptr<serve::Server> ServerArguments::start(serve::Room& room) const {
   try {
     server = listen();
   } catch (const InputError&) {
-    if (state_->port) throw;
+    // With other names or addresses a port is part of an agreement.
+    const bool as_usual = state_->allowed_hosts.empty() && state_->bind == serve::ServerOptions().bind;
+    if (state_->port || !as_usual) throw;
     options.port = 0;
     server = listen();
   }
   fmt::print("view: {}\n", server->address());
-  fmt::print("      from elsewhere: ssh -L {0}:127.0.0.1:{0} THIS-MACHINE, then the same address\n",
-             server->port());
+  if (state_->bind == serve::ServerOptions().bind)
+    fmt::print("      from elsewhere: ssh -L {0}:127.0.0.1:{0} THIS-MACHINE, then the same address\n",
+               server->port());
   std::fflush(stdout);  // whoever waits for the address at the other end of a pipe
   return server;
 }

@@ -15,7 +15,7 @@ void request_stop(int signal_number) {
 
 }  // namespace
 
-std::atomic<bool>& stop_on_signals() {
+const std::atomic<bool>& stop_on_signals() {
   stop_requested = false;
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);

@@ -68,12 +68,13 @@ std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& argument
 class Watched {
  public:
   Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where,
-          std::atomic<bool>& stop)
+          const std::atomic<bool>& stop)
       : view_(arguments.view_options,
               serve::make_setting("training", run_name(arguments.output), &trainer.capture(),
                                   trainer.scene().normalisation),
               {[&trainer] { return stage_of(trainer); }, [&trainer] { trainer.save(); },
-               [&trainer](const events::Event& event) { trainer.stream().emit(event); }, &stop}) {
+               [&trainer](const events::Event& event) { trainer.stream().emit(event); },
+               [&trainer] { trainer.stop_soon(); }, &stop}) {
     view_.recall(read_log(RunFolder{arguments.output}.log()));
     server_ = where.start(view_.room());
     trainer.stream().listen([this](const events::Event& event) { view_(event); });
@@ -113,7 +114,7 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
   trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
   if (checkpoint) trainer.resume();
-  std::atomic<bool>& stop = stop_on_signals();
+  const std::atomic<bool>& stop = stop_on_signals();
   std::optional<Watched> watched;
   if (arguments.view) watched.emplace(trainer, arguments, where, stop);
 

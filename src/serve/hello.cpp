@@ -21,6 +21,8 @@ Json to_json(const CapturedCamera& view, const SceneNormalisation& normalisation
   json["time"] = view.time;
   json["width"] = view.camera.width;
   json["height"] = view.camera.height;
+  json["centre"] = {view.camera.centre_x / static_cast<float>(view.camera.width),
+                    view.camera.centre_y / static_cast<float>(view.camera.height)};
   return json;
 }
 

@@ -12,7 +12,7 @@ constexpr auto between_events = 200ms;
 constexpr auto refresh = 500ms;
 constexpr auto nap = 100ms;
 // So much is saved up while nobody looks: enough for the first pictures of somebody who comes.
-constexpr double most_credit = 1;
+constexpr double most_credit = 1, most_debt = 1;
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
@@ -41,8 +41,8 @@ void LiveView::command(Do what) {
       save_ = true;
       break;
     case Do::stop:
-      if (!*hooks_.stop) stopped_by_page_ = true;
-      *hooks_.stop = true;
+      stop_ = true;
+      hooks_.stop();
       break;
   }
 }
@@ -52,6 +52,8 @@ void LiveView::operator()(const events::Event& event) {
     on_step(*step);
     return;
   }
+  // What a step told before stays before.
+  if (!last_step_.empty()) unsent_.push_back(std::exchange(last_step_, {}));
   unsent_.push_back(to_json_line(event));
   if (const auto* started = std::get_if<events::Started>(&event)) {
     state_ = {false,
@@ -78,13 +80,15 @@ void LiveView::on_step(const events::Step& step) {
   if (now - sent_ >= between_events) flush_events();
 
   audience_.scene_changed(refresh);
-  while (credit_ > 0) {
+  // Whoever moves the camera is served at once, on credit; what only becomes finer or newer waits until there
+  // is time for it.
+  while (credit_ > -most_debt) {
     const Clock::time_point start = Clock::now();
-    if (!serve()) break;
+    if (!serve({credit_ > 0, credit_ >= most_credit / 2})) break;
     credit_ -= seconds(Clock::now() - start);
   }
   projector_.scene_changed(hooks_.stage().scene.device());
-  if (save_.exchange(false)) hooks_.save();
+  if (save_.exchange(false)) save();
   if (pause_) serve_while_paused();
   returned_ = Clock::now();
 }
@@ -92,20 +96,28 @@ void LiveView::on_step(const events::Step& step) {
 void LiveView::serve_while_paused() {
   state_.paused = true;
   hooks_.emit(events::Paused{state_.iteration, true});
-  flush_events();
-  while (pause_ && !*hooks_.stop) {
-    if (save_.exchange(false)) hooks_.save();
-    if (audience_.wait(nap)) serve();
+  while (pause_ && !stop_ && !*hooks_.interrupted) {
+    if (save_.exchange(false)) save();
+    if (audience_.wait(nap)) serve({});
   }
   pause_ = false;
   state_.paused = false;
   hooks_.emit(events::Paused{state_.iteration, false});
-  flush_events();
   projector_.scene_changed(hooks_.stage().scene.device());
 }
 
-bool LiveView::serve() {
-  const std::optional<Job> job = audience_.next();
+// A page's wish must not end a training: where it cannot be saved, it goes on.
+void LiveView::save() {
+  try {
+    hooks_.save();
+    audience_.tell_trouble("saving", "");
+  } catch (const std::exception& error) {
+    audience_.tell_trouble("saving", std::string("Not saved. ") + error.what());
+  }
+}
+
+bool LiveView::serve(const Allowed& allowed) {
+  const std::optional<Job> job = audience_.next(allowed);
   if (job) projector_.answer(*job, hooks_.stage());
   return job.has_value();
 }
@@ -125,13 +137,11 @@ void LiveView::on_finished(const events::Finished& finished) {
   audience_.scene_changed({});
 }
 
-bool LiveView::is_wanted() { return audience_.viewers() > 0 && (!*hooks_.stop || stopped_by_page_); }
+bool LiveView::is_wanted() { return audience_.viewers() > 0 && !*hooks_.interrupted; }
 
 void LiveView::stay() {
-  // A page that has stopped the training still looks at what came of it.
-  if (stopped_by_page_) *hooks_.stop = false;
-  while (audience_.viewers() > 0 && !*hooks_.stop) {
-    if (audience_.wait(nap)) serve();
+  while (is_wanted()) {
+    if (audience_.wait(nap)) serve({});
   }
 }
 

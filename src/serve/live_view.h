@@ -24,7 +24,8 @@ struct TrainingHooks {
   std::function<Stage()> stage;
   std::function<void()> save;
   std::function<void(const events::Event&)> emit;
-  std::atomic<bool>* stop = nullptr;
+  std::function<void()> stop;                      // on any thread
+  const std::atomic<bool>* interrupted = nullptr;  // the whole program is to end
 };
 
 // Shows a training run to the pages that look at it: a listener of its events, so that pictures are made
@@ -40,9 +41,9 @@ class LiveView {
   // The log of a run that is resumed.
   void recall(const std::vector<LoggedEvent>& events) { audience_.tell(lines_of(thinned(events)), true); }
   void operator()(const events::Event& event);
-  // After the training: whether a page is open, and the stop flag was not raised by another than a page.
+  // After the training: whether a page is open.
   bool is_wanted();
-  // Goes on until the last page has left, or the stop flag is raised.
+  // Goes on until the last page has left, or the program is to end.
   void stay();
 
  private:
@@ -51,8 +52,9 @@ class LiveView {
   void on_step(const events::Step& step);
   void on_finished(const events::Finished& finished);
   void serve_while_paused();
+  void save();
   // Serves one job, if there is one.
-  bool serve();
+  bool serve(const Allowed& allowed);
   void flush_events();
   void command(Do what);
 
@@ -60,7 +62,7 @@ class LiveView {
   TrainingHooks hooks_;
   Audience audience_;
   Projector projector_;
-  std::atomic<bool> pause_{false}, save_{false}, stopped_by_page_{false};
+  std::atomic<bool> pause_{false}, save_{false}, stop_{false};
   State state_;
   std::vector<std::string> unsent_;
   std::string last_step_;

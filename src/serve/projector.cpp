@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/device_memory.h"
+#include "base/machine.h"
 #include "capture/resample.h"
 #include "files/jpeg.h"
 #include "files/png.h"
@@ -19,7 +19,9 @@ using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char* about_memory = "memory";  // what a trouble is about
-constexpr int64_t most_previewed = 20'000;      // frames of a camera path
+// That a frame takes with all its layers, and more.
+constexpr int64_t bytes_per_pixel = 300;
+constexpr int64_t most_previewed = 20'000;  // frames of a camera path
 constexpr int photo_quality = 90;
 // How fast the ranges of depth and distortion follow the picture: settled after some ten frames.
 constexpr float follow = 0.25F;
@@ -93,16 +95,20 @@ Renderer& Projector::renderer(const Stage& stage) {
 void Projector::answer(const Job& job, const Stage& stage) {
   try {
     std::visit([&](const auto& what) { answer(job, what, stage); }, job.what);
-    audience_.tell_trouble(about_memory, "");
-  } catch (const memory::OutOfMemory& error) {
+    if (!audience_.anybody_lacks_memory()) audience_.tell_trouble(about_memory, "");
+  } catch (const std::bad_alloc& error) {
     forget();
-    audience_.tell_trouble(about_memory, std::string("No memory for pictures: ") + error.what());
-  } catch (const std::bad_alloc&) {
-    forget();
-    audience_.tell_trouble(about_memory, "No memory for pictures on this machine.");
+    const std::string why = std::string("No memory for a picture of this size: ") + error.what();
+    if (std::holds_alternative<FrameJob>(job.what)) {
+      audience_.no_memory_for(job);
+      audience_.tell_trouble(about_memory, why);
+    } else {
+      audience_.refuse(job, why);
+    }
   } catch (const std::exception& error) {
     audience_.refuse(job, error.what());
   }
+  std::erase_if(painters_, [&](const auto& entry) { return !audience_.is_here(entry.first); });
 }
 
 FrameRequest Projector::request_for(const Look& look, const Stage& stage, double divisor) const {
@@ -160,11 +166,14 @@ void Projector::answer(const Job& job, const FrameJob& frame, const Stage& stage
 }
 
 void Projector::answer(const Job& job, const StillJob& still, const Stage& stage) {
+  // The system may promise memory that is not there, and then end the program: a training, perhaps.
+  const int64_t wanted = bytes_per_pixel * still.still.width * still.still.height;
+  if (stage.scene.device() == Device::cpu && wanted > memory_available() / 2) throw std::bad_alloc();
   Look look = still.look;
   look.width = still.still.width;
   look.height = still.still.height;
   const FrameRequest request = request_for(look, stage, 1);
-  // A copy, so that the still has the ranges of the page's last frame and leaves them as they are.
+  // A copy: the page's ranges stay as they are.
   show::Painter painter = painters_[job.guest];
   const std::string bytes = png_bytes(picture(look, request, stage, painter));
   audience_.reply(job.guest, picture_message({{"type", "still"},
@@ -173,6 +182,8 @@ void Projector::answer(const Job& job, const StillJob& still, const Stage& stage
                                               {"height", request.camera.height},
                                               {"format", "png"}},
                                              bytes));
+  // What so large a picture took is not kept.
+  forget();
 }
 
 void Projector::answer(const Job& job, const Photo& photo, const Stage&) {

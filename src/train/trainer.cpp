@@ -266,7 +266,7 @@ void Trainer::tell_density() {
 
 events::Finished Trainer::run(const std::atomic<bool>& stop) {
   tell_start();
-  while (iteration_ < options_.iterations && !stop) {
+  while (iteration_ < options_.iterations && !stop && !stop_soon_) {
     const Phase phase = schedule_.phase(iteration_);
     if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
       tell_measured();

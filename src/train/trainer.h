@@ -56,6 +56,8 @@ class Trainer {
   // One iteration of the loop, without saving; returns the loss.
   LossTerms step();
 
+  // Ends run() after the iteration that goes on. On any thread.
+  void stop_soon() { stop_soon_ = true; }
   // Saves what stands. May be called between two iterations, so by a listener.
   void save();
 
@@ -118,7 +120,8 @@ class Trainer {
   events::Stream stream_;
   StepMeter meter_;
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
-  int iteration_ = 0;                                    // done so far
+  std::atomic<bool> stop_soon_{false};
+  int iteration_ = 0;   // done so far
   double seconds_ = 0;  // of steps and saves, earlier sessions included; listeners may take their time
   double rate_ = 0;     // steps a second, smoothed
 };

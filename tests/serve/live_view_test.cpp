@@ -1,5 +1,6 @@
 #include "serve/live_view.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <thread>
@@ -23,12 +24,17 @@ struct WatchedRun {
                 return Stage{trainer.scene(), trainer.options().render,
                              picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
               },
-              [this] { trainer.save(); },
-              [this](const events::Event& event) { trainer.stream().emit(event); }, &stop}) {
+              [this] {
+                if (cannot_save) throw InputError("run", "", "a full disk", "room");
+                trainer.save();
+              },
+              [this](const events::Event& event) { trainer.stream().emit(event); },
+              [this] { trainer.stop_soon(); }, &stop}) {
     trainer.stream().listen([this](const events::Event& event) { view(event); });
   }
 
   Trainer trainer;
+  bool cannot_save = false;
   std::atomic<bool> stop{false};
   LiveView view;
 };
@@ -143,6 +149,17 @@ TEST(LiveView, StaysUntilTheLastPageHasLeft) {
   watched.view.stay();
   leaving.join();
   EXPECT_FALSE(watched.view.is_wanted());
+}
+
+// Where a folder cannot be written to, a page's wish to save is told to have failed, and the training goes
+// on.
+TEST(LiveView, ASaveThatFailsEndsNothing) {
+  WatchedRun watched(10, "view_unsaved");
+  watched.cannot_save = true;
+  FakePage page(watched.view.room(), 1);
+  page.say({{"type", "command"}, {"do", "save"}});
+  EXPECT_EQ(watched.trainer.run(watched.stop).ending, events::Ending::completed);
+  EXPECT_THAT(page.of("trouble").at(0).json["text"].get<std::string>(), ::testing::HasSubstr("full"));
 }
 
 TEST(LiveView, StaysForThePageThatStoppedItAndForNobodyElse) {

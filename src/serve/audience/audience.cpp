@@ -13,7 +13,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr size_t most_asked = 32;        // questions of one page that wait for an answer
+constexpr size_t most_asked = 32;  // questions of one page that wait for an answer
+// After memory ran out: how long frames stay coarse, and how long nothing is tried.
+constexpr std::chrono::seconds coarse_for{30}, breath{1};
 constexpr size_t most_on_their_way = 2;  // frames that a page has not shown yet
 
 std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -21,8 +23,8 @@ std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::erro
 // What is known of a message that could not be read: its type and number, for the page to make sense of the
 // refusal.
 std::pair<std::string, int64_t> label_of(std::string_view text) {
-  const nlohmann::json json = nlohmann::json::parse(text.begin(), text.end(), nullptr, false);
   std::pair<std::string, int64_t> label = {"", 0};
+  const nlohmann::json json = nlohmann::json::parse(text.begin(), text.end(), nullptr, false);
   if (!json.is_object()) return label;
   if (json.contains("type") && json["type"].is_string())
     label.first = json["type"].get<std::string>().substr(0, 16);
@@ -187,18 +189,32 @@ void Audience::scene_changed(Clock::duration refresh) {
   refresh_ = refresh;
 }
 
-bool Audience::wants_frame(const Guest& guest, Clock::time_point now) const {
+bool Audience::wants_frame(const Guest& guest, const Allowed& allowed, Clock::time_point now) const {
   if (!guest.look || guest.asleep || guest.on_their_way.size() >= most_on_their_way) return false;
+  if (now < guest.not_before) return false;
   const bool nothing_shown = guest.shown_divisor == std::numeric_limits<double>::infinity();
   if (nothing_shown) return true;
   if (guest.look->moving) return false;
-  if (!guest.shown_final) return true;
-  return guest.shown_scene != scene_ && now - guest.served >= refresh_;
+  if (!guest.shown_final) return allowed.refining;
+  return allowed.refreshing && guest.shown_scene != scene_ && now - guest.served >= refresh_;
+}
+
+Coarseness Audience::coarseness_for(const Guest& guest, Clock::time_point now) const {
+  const double pixels = pixels_of(*guest.look);
+  Coarseness coarseness = Pacer::whole();
+  if (guest.shown_divisor == std::numeric_limits<double>::infinity()) {
+    coarseness = guest.pacer.moving(pixels);
+  } else if (!guest.shown_final) {
+    coarseness = guest.pacer.finer(pixels, guest.shown_divisor);
+  }
+  if (now >= guest.coarse_until || coarseness.divisor >= guest.least_divisor) return coarseness;
+  // As fine as it can be.
+  return {guest.least_divisor, coarseness.quality, !guest.look->moving};
 }
 
 bool Audience::has_job(Clock::time_point now) {
   return std::any_of(guests_.begin(), guests_.end(), [&](const auto& entry) {
-    return !entry.second.asked.empty() || wants_frame(entry.second, now);
+    return !entry.second.asked.empty() || wants_frame(entry.second, {}, now);
   });
 }
 
@@ -227,7 +243,7 @@ std::optional<Job> Audience::ask_of(uint64_t number, Guest& guest) {
   return Job{number, StillJob{*guest.look, *still}};
 }
 
-std::optional<Job> Audience::next() {
+std::optional<Job> Audience::next(const Allowed& allowed) {
   const std::lock_guard lock(mutex_);
   for (auto& [number, guest] : guests_) {
     while (!guest.asked.empty()) {
@@ -237,22 +253,14 @@ std::optional<Job> Audience::next() {
   const Clock::time_point now = Clock::now();
   std::pair<const uint64_t, Guest>* longest_waiting = nullptr;
   for (auto& entry : guests_) {
-    if (!wants_frame(entry.second, now)) continue;
+    if (!wants_frame(entry.second, allowed, now)) continue;
     if (longest_waiting == nullptr || entry.second.served < longest_waiting->second.served)
       longest_waiting = &entry;
   }
   if (longest_waiting == nullptr) return std::nullopt;
   Guest& guest = longest_waiting->second;
-  const Look& look = *guest.look;
-  Coarseness coarseness;
-  const bool refresh = guest.shown_final && guest.shown_scene != scene_;
-  if (look.moving || guest.shown_divisor == std::numeric_limits<double>::infinity()) {
-    coarseness = guest.pacer.moving(pixels_of(look));
-  } else if (!refresh) {
-    coarseness = guest.pacer.finer(pixels_of(look), guest.shown_divisor);
-  }
   guest.served = now;
-  return Job{longest_waiting->first, FrameJob{look, coarseness}};
+  return Job{longest_waiting->first, FrameJob{*guest.look, coarseness_for(guest, now)}};
 }
 
 void Audience::show_frame(const Job& job, nlohmann::ordered_json header, const std::string& picture,
@@ -265,7 +273,7 @@ void Audience::show_frame(const Job& job, nlohmann::ordered_json header, const s
   header["frame"] = ++guest.frames;
   const Outgoing message = picture_message(header, picture);
   const auto bytes = static_cast<double>(message.bytes->size());
-  guest.pacer.made(pixels, seconds, bytes);
+  guest.pacer.made(pixels, seconds, bytes, made.coarseness.quality);
   guest.on_their_way.push_back({guest.frames, bytes, Clock::now()});
   guest.send(message);
   guest.served = Clock::now();
@@ -296,6 +304,24 @@ void Audience::refuse(const Job& job, const std::string& why) {
              job.what);
 }
 
+void Audience::no_memory_for(const Job& job) {
+  const std::lock_guard lock(mutex_);
+  const auto found = guests_.find(job.guest);
+  if (found == guests_.end()) return;
+  const Clock::time_point now = Clock::now();
+  Guest& guest = found->second;
+  guest.least_divisor = 2 * std::get<FrameJob>(job.what).coarseness.divisor;
+  guest.coarse_until = now + coarse_for;
+  guest.not_before = now + breath;
+}
+
+bool Audience::anybody_lacks_memory() {
+  const std::lock_guard lock(mutex_);
+  const Clock::time_point now = Clock::now();
+  return std::any_of(guests_.begin(), guests_.end(),
+                     [&](const auto& entry) { return now < entry.second.coarse_until; });
+}
+
 void Audience::refuse_look(uint64_t number, int64_t id, const std::string& why) {
   {
     const std::lock_guard lock(mutex_);
@@ -305,6 +331,11 @@ void Audience::refuse_look(uint64_t number, int64_t id, const std::string& why) 
       found->second.look.reset();
   }
   refuse(number, "look", id, why);
+}
+
+bool Audience::is_here(uint64_t number) {
+  const std::lock_guard lock(mutex_);
+  return guests_.contains(number);
 }
 
 int64_t Audience::viewers() {

@@ -38,6 +38,13 @@ struct Job {
   std::variant<FrameJob, ProbeJob, StillJob, Photo, Path> what;
 };
 
+// Which frames may be made now, where time for them is short: those that a page has nothing of yet always
+// may.
+struct Allowed {
+  bool refining = true;    // finer ones of what a page sees
+  bool refreshing = true;  // of a scene that has changed since
+};
+
 // What is told to every page when it changes.
 struct State {
   bool paused = false;
@@ -76,7 +83,8 @@ class Audience : public Room {
   // Waits until there is a job, at most so long.
   bool wait(Clock::duration timeout);
   // The next job, in turns among the pages; what was asked for once comes before frames.
-  std::optional<Job> next();
+  std::optional<Job> next(const Allowed& allowed);
+  std::optional<Job> next() { return next({}); }
 
   // What came of a job. The header gets the frame's number. seconds: that it took; pixels: of the picture.
   void show_frame(const Job& job, nlohmann::ordered_json header, const std::string& picture, double pixels,
@@ -85,6 +93,10 @@ class Audience : public Room {
   // A request that could not be answered.
   void refuse(uint64_t guest, const std::string& request, int64_t id, const std::string& why);
   void refuse(const Job& job, const std::string& why);
+  // There was no memory for a frame: the page gets coarser ones for a while.
+  void no_memory_for(const Job& job);
+  bool anybody_lacks_memory();
+  bool is_here(uint64_t guest);
   int64_t viewers();
   // Pages that look now: not asleep.
   bool anybody_looks();
@@ -108,10 +120,14 @@ class Audience : public Room {
     double shown_divisor = std::numeric_limits<double>::infinity();
     bool shown_final = false;
     int64_t shown_scene = -1;
+    // Where memory ran out: no finer than this, until then; and nothing at all before.
+    double least_divisor = 1;
+    Clock::time_point coarse_until = {}, not_before = {};
   };
 
   void refuse_look(uint64_t guest, int64_t id, const std::string& why);
-  bool wants_frame(const Guest& guest, Clock::time_point now) const;
+  bool wants_frame(const Guest& guest, const Allowed& allowed, Clock::time_point now) const;
+  Coarseness coarseness_for(const Guest& guest, Clock::time_point now) const;
   std::optional<Job> ask_of(uint64_t number, Guest& guest);
   bool has_job(Clock::time_point now);
   void answer(Guest& guest, const Request& request);

@@ -17,6 +17,18 @@ constexpr int64_t largest_id = int64_t{1} << 53;
 constexpr int look_side = 4096;
 constexpr int still_side = 8192;
 constexpr size_t longest_word = 64;
+constexpr int deepest = 16;
+
+// Brackets inside words count too: that only refuses what no page says.
+bool nests_deeper_than(std::string_view text, int limit) {
+  int depth = 0;
+  for (const char c : text) {
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > limit) return true;
+  }
+  return false;
+}
 
 // An object of the message; every error names the field.
 class Fields {
@@ -137,6 +149,8 @@ Command command_of(const Fields& fields) {
 }  // namespace
 
 Request parse_request(std::string_view text) {
+  // What nests deeper than any message would be walked by recursion later.
+  if (nests_deeper_than(text, deepest)) throw InputError("message", "", "a deep nest", "a message");
   const Json json = Json::parse(text.begin(), text.end(), nullptr, false);
   if (json.is_discarded()) throw InputError("message", "", "text that is not JSON", "an object");
   const Fields fields(json, "");

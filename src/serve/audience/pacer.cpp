@@ -10,7 +10,22 @@ namespace {
 // Each has about half the pixels of the one before.
 constexpr std::array<double, 9> divisors = {1, 1.5, 2, 3, 4, 6, 8, 12, 16};
 constexpr double keep = 0.9;  // weight of the past at each new measurement
-constexpr int moving_quality = 75, final_quality = 92;
+constexpr int final_quality = 92;
+
+// A JPEG's quality while the camera moves, and its size relative to the first's, as pictures of scenes have
+// it.
+struct Quality {
+  int quality;
+  double size;
+};
+constexpr std::array<Quality, 3> moving_qualities = {{{75, 1}, {60, 0.75}, {45, 0.6}}};
+constexpr double final_size = 2;
+double relative_size(int quality) {
+  for (const Quality& q : moving_qualities) {
+    if (quality >= q.quality) return quality >= final_quality ? final_size : q.size;
+  }
+  return moving_qualities.back().size;
+}
 
 }  // namespace
 
@@ -34,38 +49,44 @@ double CostLine::seconds(double size) const {
   return fixed >= 0 ? fixed + slope * size : mean_seconds * size / mean_size;
 }
 
-void Pacer::made(double pixels, double seconds, double bytes) {
+void Pacer::made(double pixels, double seconds, double bytes, int quality) {
   making_.add(pixels, seconds);
-  if (pixels > 0) bytes_per_pixel_ += 0.2 * (bytes / pixels - bytes_per_pixel_);
+  if (pixels > 0) bytes_per_pixel_ += 0.2 * (bytes / pixels / relative_size(quality) - bytes_per_pixel_);
 }
 
 void Pacer::carried(double bytes, double seconds) { carrying_.add(bytes, seconds); }
 
-bool Pacer::fits(double pixels, double seconds) const {
-  return making_.seconds(pixels) <= seconds &&
-         carrying_.seconds(pixels * bytes_per_pixel_) <= options_.carrying_seconds;
+bool Pacer::can_be_carried(double pixels, double relative_size) const {
+  return carrying_.seconds(pixels * bytes_per_pixel_ * relative_size) <= options_.carrying_seconds;
 }
 
 Coarseness Pacer::moving(double pixels) const {
   // The first frame of all tells what a frame costs; it had better be cheap.
-  if (!making_.is_known()) return {4, moving_quality, false};
+  if (!making_.is_known()) return {4, moving_qualities.front().quality, false};
   for (const double divisor : divisors) {
-    if (fits(pixels / (divisor * divisor), options_.moving_seconds)) return {divisor, moving_quality, false};
+    const double made = pixels / (divisor * divisor);
+    if (making_.seconds(made) > options_.moving_seconds) continue;
+    for (const Quality& q : moving_qualities) {
+      if (can_be_carried(made, q.size)) return {divisor, q.quality, false};
+    }
   }
-  return {divisors.back(), moving_quality, false};
+  return {divisors.back(), moving_qualities.back().quality, false};
 }
 
 Coarseness Pacer::finer(double pixels, double shown_divisor) const {
   if (!making_.is_known()) return moving(pixels);
   for (const double divisor : divisors) {
     if (divisor >= shown_divisor) break;
-    if (fits(pixels / (divisor * divisor), options_.resting_seconds))
+    const double made = pixels / (divisor * divisor);
+    if (making_.seconds(made) <= options_.resting_seconds && can_be_carried(made, final_size))
       return {divisor, final_quality, divisor == 1};
   }
   // Nothing fits: at least twice as fine in every step, so that the last one comes at some time.
-  if (shown_divisor <= 2) return {1, final_quality, true};
+  if (shown_divisor <= 2) return whole();
   const Coarseness first = moving(pixels);
   return {std::min(first.divisor, shown_divisor / 2), final_quality, false};
 }
+
+Coarseness Pacer::whole() { return {1, final_quality, true}; }
 
 }  // namespace traceflow::serve

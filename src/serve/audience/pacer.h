@@ -37,7 +37,7 @@ class Pacer {
   explicit Pacer(const PacerOptions& options = {}) : options_(options) {}
 
   // A frame of so many pixels was rendered and encoded in so many bytes.
-  void made(double pixels, double seconds, double bytes);
+  void made(double pixels, double seconds, double bytes, int quality);
   // So many bytes were shown by the page, so long after they were sent.
   void carried(double bytes, double seconds);
 
@@ -45,14 +45,16 @@ class Pacer {
   Coarseness moving(double pixels) const;
   // At rest: finer than the frame that is shown now, whose divisor is given (infinity where there is none).
   Coarseness finer(double pixels, double shown_divisor) const;
+  // The last of those.
+  static Coarseness whole();
 
  private:
-  bool fits(double pixels, double seconds) const;
+  bool can_be_carried(double pixels, double relative_size) const;
 
   PacerOptions options_;
   CostLine making_;
   CostLine carrying_;
-  double bytes_per_pixel_ = 0.15;
+  double bytes_per_pixel_ = 0.15;  // at the quality of moving frames on a good line
 };
 
 }  // namespace traceflow::serve

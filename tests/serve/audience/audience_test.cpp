@@ -255,6 +255,42 @@ TEST(Audience, ALookThatCannotBeShownIsNotTriedAgain) {
   EXPECT_FALSE(audience.next());
 }
 
+TEST(Audience, AFrameWithoutMemoryComesCoarserAndNotAtOnce) {
+  Audience audience;
+  FakePage page(audience, 1);
+  page.say(look(1));
+  serve_all(audience, page);
+  page.say(look(2));
+  make_frame(audience, *audience.next());
+  page.see_frames();
+  const auto job = audience.next();
+  ASSERT_TRUE(job);
+  audience.no_memory_for(*job);
+  EXPECT_TRUE(audience.anybody_lacks_memory());
+  EXPECT_FALSE(audience.next()) << "a breath, not a loop";
+  page.leave();
+  EXPECT_FALSE(audience.anybody_lacks_memory());
+}
+
+TEST(Audience, MakesWhatIsAllowedAndAlwaysAFirstFrame) {
+  Audience audience;
+  FakePage page(audience, 1);
+  page.say(look(1));
+  const auto first = audience.next({false, false});
+  ASSERT_TRUE(first);
+  make_frame(audience, *first);
+  page.see_frames();
+  EXPECT_FALSE(audience.next({false, false}));
+  EXPECT_FALSE(audience.next({false, true}));
+  while (const auto job = audience.next({true, false})) {
+    make_frame(audience, *job);
+    page.see_frames();
+  }
+  audience.scene_changed({});
+  EXPECT_FALSE(audience.next({true, false}));
+  EXPECT_TRUE(audience.next({false, true}));
+}
+
 TEST(Audience, PassesCommandsOnWhereSomethingIsTrained) {
   std::vector<Do> done;
   Audience training([&](Do what) { done.push_back(what); });

@@ -99,7 +99,8 @@ TEST(Messages, WhatIsNoMessageIsRefused) {
        {std::string(), std::string("{"), std::string("[]"), std::string("null"), std::string("{}"),
         std::string(R"({"type":3})"), std::string(R"({"type":"dance"})"), std::string("\xff\xfe"),
         std::string(R"({"type":"command","do":"sing"})"), "\"" + std::string(60000, 'a') + "\"",
-        std::string(30000, '[') + std::string(30000, ']')}) {
+        std::string(30000, '[') + std::string(30000, ']'),
+        R"({"type":"path","id":1,"path":)" + std::string(17, '[') + std::string(17, ']') + "}"}) {
     EXPECT_NE(complaint(text), "") << text.substr(0, 40);
   }
 }

@@ -18,7 +18,7 @@ struct World {
   double seconds(double pixels) const { return fixed + per_pixel * pixels; }
   void frame(Pacer& pacer, const Coarseness& c) const {
     const double pixels = full / (c.divisor * c.divisor);
-    pacer.made(pixels, seconds(pixels), pixels * bytes_per_pixel);
+    pacer.made(pixels, seconds(pixels), pixels * bytes_per_pixel, c.quality);
     pacer.carried(pixels * bytes_per_pixel, pixels * bytes_per_pixel / bytes_a_second);
   }
   // Where the pacer settles while the camera moves.
@@ -87,6 +87,18 @@ TEST(Pacer, MakesSmallerFramesForASlowLink) {
   const double divisor = world.settled(far);
   EXPECT_GT(divisor, near.moving(full).divisor);
   EXPECT_LE(full / (divisor * divisor) * world.bytes_per_pixel / world.bytes_a_second, 0.15 * 1.3);
+}
+
+TEST(Pacer, GivesUpQualityBeforeSizeOnASlowLink) {
+  World world{0.001, 1e-9};
+  Pacer pacer;
+  world.settled(pacer);
+  const int best = pacer.moving(full).quality;
+  // A little too slow for the frames as they are.
+  world.bytes_a_second = full * world.bytes_per_pixel / 0.17;
+  world.settled(pacer);
+  EXPECT_EQ(pacer.moving(full).divisor, 1);
+  EXPECT_LT(pacer.moving(full).quality, best);
 }
 
 // At rest every frame is finer than the one before and the last is full and final, however slow the machine.
