@@ -40,13 +40,13 @@ Outgoing text_message(std::string text) {
   return {std::make_shared<const std::string>(std::move(text)), false};
 }
 
-Outgoing picture_message(const Json& json, const std::string& picture) {
-  const std::string header = dump(json);
-  const auto length = static_cast<uint32_t>(header.size());
+Outgoing picture_message(const Json& header, const std::string& picture) {
+  const std::string text = dump(header);
+  const auto length = static_cast<uint32_t>(text.size());
   std::string bytes;
-  bytes.reserve(4 + header.size() + picture.size());
+  bytes.reserve(4 + text.size() + picture.size());
   for (int byte = 0; byte < 4; ++byte) bytes += static_cast<char>((length >> (8 * byte)) & 255);
-  bytes += header;
+  bytes += text;
   bytes += picture;
   return {std::make_shared<const std::string>(std::move(bytes)), true};
 }

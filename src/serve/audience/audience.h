@@ -65,9 +65,9 @@ class Audience : public Room {
   // on_command: pause, resume, save, stop; called on the network's thread. Without it they are refused.
   explicit Audience(std::function<void(Do)> on_command = {}) : on_command_(std::move(on_command)) {}
 
-  void enter(uint64_t guest, Send send) override;
-  void hear(uint64_t guest, std::string_view text) override;
-  void leave(uint64_t guest) override;
+  void enter(uint64_t number, Send send) override;
+  void hear(uint64_t number, std::string_view text) override;
+  void leave(uint64_t number) override;
 
   // What every page hears first (messages.ts, Hello); those that are here hear it again.
   void greet_with(std::string hello);
@@ -89,14 +89,14 @@ class Audience : public Room {
   // What came of a job. The header gets the frame's number. seconds: that it took; pixels: of the picture.
   void show_frame(const Job& job, nlohmann::ordered_json header, const std::string& picture, double pixels,
                   double seconds);
-  void reply(uint64_t guest, Outgoing message);
+  void reply(uint64_t number, Outgoing message);
   // A request that could not be answered.
-  void refuse(uint64_t guest, const std::string& request, int64_t id, const std::string& why);
+  void refuse(uint64_t number, const std::string& request, int64_t id, const std::string& why);
   void refuse(const Job& job, const std::string& why);
   // There was no memory for a frame: the page gets coarser ones for a while.
   void no_memory_for(const Job& job);
   bool anybody_lacks_memory();
-  bool is_here(uint64_t guest);
+  bool is_here(uint64_t number);
   int64_t viewers();
   // Pages that look now: not asleep.
   bool anybody_looks();
@@ -125,7 +125,7 @@ class Audience : public Room {
     Clock::time_point coarse_until = {}, not_before = {};
   };
 
-  void refuse_look(uint64_t guest, int64_t id, const std::string& why);
+  void refuse_look(uint64_t number, int64_t id, const std::string& why);
   bool wants_frame(const Guest& guest, const Allowed& allowed, Clock::time_point now) const;
   Coarseness coarseness_for(const Guest& guest, Clock::time_point now) const;
   std::optional<Job> ask_of(uint64_t number, Guest& guest);

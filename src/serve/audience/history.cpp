@@ -34,6 +34,7 @@ void History::clear() { *this = {}; }
 
 std::vector<std::string> History::lines() const {
   std::vector<std::string> texts;
+  texts.reserve(lines_.size());
   for (const Line& line : lines_) texts.push_back(line.text);
   return texts;
 }
