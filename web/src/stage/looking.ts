@@ -44,6 +44,7 @@ export function current_wish(): Wish | null {
 export function start_looking(): void {
   effect(() => {
     const wish = current_wish();
+    looker.sleep(asleep.value);
     if (wish && !asleep.value) looker.want(wish);
   });
   effect(() => {

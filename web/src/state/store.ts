@@ -21,7 +21,7 @@ export const time = signal(0);
 export const layer = signal('rgb');
 export const exposure = signal(0);
 export const map = signal('');
-export const asleep = signal(false);
+export const asleep = signal(document.hidden);
 
 // ---- tools
 export type Mode = 'orbit' | 'fly';
