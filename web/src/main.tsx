@@ -24,6 +24,7 @@ start_connection({
   probe: take_probe,
   path: take_path,
   refused(reply) {
+    if (reply.request === 'look') looker.refused(reply.id);
     if (reply.request === 'probe') forget_probes();
     if (reply.request === 'still') give_up_still();
   },

@@ -25,6 +25,10 @@ export interface PhotoRef {
 
 // ---- page → server, JSON text
 
+// What the server takes at most; src/serve/audience/messages.cpp and src/serve/net/limits.h have these too.
+export const look_side = 4096; // pixels, width and height
+export const still_side = 8192;
+
 // What to show from now on; the newest one counts. Coarse while `moving`, then finer up to width × height.
 export interface Look {
   type: 'look';

@@ -69,6 +69,12 @@ export class Looker {
     return look;
   }
 
+  // No frame will answer this look.
+  refused(look: number): void {
+    this.answered = Math.max(this.answered, look);
+    this.pump();
+  }
+
   // Nobody looks: nothing is sent, whatever was to come, until somebody does and wants something.
   sleep(asleep: boolean): void {
     if (asleep === this.asleep) return;

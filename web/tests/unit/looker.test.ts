@@ -172,6 +172,22 @@ test('a look that sleep cut off holds nothing up', () => {
   assert.equal(b.answer(2)?.input, 10);
 });
 
+test('a refused look is answered: it is not waited for, and the next is sent', () => {
+  const b = bench();
+  b.looker.want(wish(0));
+  b.looker.want(wish(0.1));
+  b.pass(10);
+  b.looker.refused(1);
+  assert.deepEqual(
+    b.sent.map((l) => l.time),
+    [0, 0.1],
+  );
+  b.looker.refused(2);
+  b.pass(5000);
+  assert.equal(b.looker.waiting(), 0);
+  assert.equal(b.sent.length, 2);
+});
+
 test('after a reconnection the wish is sent again', () => {
   const b = bench();
   b.looker.want(wish(0));
