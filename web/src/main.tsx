@@ -25,8 +25,9 @@ start_connection({
   path: take_path,
   refused(reply) {
     if (reply.request === 'look') looker.refused(reply.id);
-    if (reply.request === 'probe') forget_probes();
-    if (reply.request === 'still') give_up_still();
+    // Without a request it is whatever was asked last: there were too many questions.
+    if (reply.request === 'probe' || reply.request === '') forget_probes();
+    if (reply.request === 'still' || reply.request === '') give_up_still();
   },
   greeted() {
     forget_request();

@@ -46,8 +46,9 @@ export function take_still(): void {
     id,
     file_name(`${there.name}${where}_${shown_layer()}${when}${trained}_${size.width}x${size.height}`) + '.png',
   );
-  if (send({ type: 'still', id, ...size })) still_wanted.value = id;
-  else notify('There is no connection to the server.');
+  if (send({ type: 'still', id, ...size })) return void (still_wanted.value = id);
+  names.delete(id);
+  notify('There is no connection to the server.');
 }
 
 export function save_still(picture: Picture): void {
