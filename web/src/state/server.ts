@@ -24,6 +24,12 @@ export function start_connection(handlers: Handlers): void {
     link: (now) => (link.value = now),
     reply: (reply) => batch(() => take(reply, handlers)),
     picture: handlers.picture,
+    too_long: (request) =>
+      notify(
+        request.type === 'path'
+          ? 'This camera path is too long to be shown here; it can still be exported and rendered.'
+          : 'This is too long for the server.',
+      ),
   });
 }
 

@@ -65,6 +65,6 @@ export const training = computed(() => hello.value?.source === 'training' && ser
 let keys = 0;
 export function notify(text: string): void {
   const key = keys++;
-  notices.value = [...notices.value.slice(-2), { key, text }];
+  notices.value = [...notices.peek().slice(-2), { key, text }]; // effects may notify
   setTimeout(() => (notices.value = notices.value.filter((n) => n.key !== key)), 6000);
 }
