@@ -37,7 +37,8 @@ export function current_wish(): Wish | null {
   const view = captured(photo.value);
   const box = pixels();
   const common = { time: time.value, layer: shown_layer(), exposure: exposure.value, map: map.value };
-  if (view && photo.value) return { photo: photo.value, ...whole(fit(view.width / view.height, box), look_side), ...common };
+  if (view && photo.value)
+    return { photo: photo.value, ...whole(fit(view.width / view.height, box), look_side), ...common };
   return { camera: widened(free, box.width / box.height), ...whole(box, look_side), ...common };
 }
 
