@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { charts_of } from '../../src/curves/charts.ts';
-import { seconds_left } from '../../src/curves/progress.ts';
+import { remarks, seconds_left } from '../../src/curves/progress.ts';
 import { series_of } from '../../src/curves/series.ts';
 import { thinned } from '../../src/curves/thin.ts';
 import { Training } from '../../dev/training.ts';
@@ -92,4 +92,26 @@ test('what is left is reckoned from the last part', () => {
   assert.equal(seconds_left([]), null);
   const events = [step(10, 1), step(400, 1), step(500, 1)];
   near(seconds_left(events) ?? NaN, 50);
+});
+
+test('ends, saves and warnings are said in words', () => {
+  assert.deepEqual(remarks([step(10)]), []);
+  const warnings = ['a', 'b', 'c', 'd'].map((text, i) => ({ event: 'warning' as const, iteration: i, text }));
+  const saved = { event: 'saved' as const, iteration: 1200, path: 'x', seconds: 0.1 };
+  assert.deepEqual(remarks([...warnings, { ...saved, iteration: 600 }, saved]), [
+    { text: 'Saved at iteration 1,200', wrong: false },
+    { text: 'Warning: b', wrong: true },
+    { text: 'Warning: c', wrong: true },
+    { text: 'Warning: d', wrong: true },
+  ]);
+  const end = { event: 'finished' as const, iteration: 1300, seconds: 9, psnr: 20, surfels: { main: 1, environment: 1 } };
+  assert.deepEqual(remarks([{ ...end, ending: 'completed', reason: '' }]), [
+    { text: 'Completed at iteration 1,300', wrong: false },
+  ]);
+  assert.deepEqual(remarks([{ ...end, ending: 'out_of_memory', reason: 'std::bad_alloc' }]), [
+    { text: 'Ran out of memory at iteration 1,300', wrong: true },
+  ]);
+  assert.deepEqual(remarks([{ ...end, ending: 'diverged', reason: 'the loss is not finite' }]), [
+    { text: 'Diverged at iteration 1,300: the loss is not finite', wrong: true },
+  ]);
 });
