@@ -16,6 +16,7 @@ export interface CapturedView extends Camera {
   time: number; // 0 to 1
   width: number;
   height: number;
+  centre?: [number, number]; // principal point, as shares of width and height; without it the middle
 }
 
 export interface PhotoRef {

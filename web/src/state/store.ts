@@ -1,5 +1,6 @@
 import { computed, signal } from '@preact/signals';
 import type { Camera, CapturedView, Hello, PhotoRef, State, TrainingEvent, Vec3 } from '../messages.ts';
+import type { Lens } from '../math/camera.ts';
 import type { Rectangle, Size } from '../math/fit.ts';
 import type { Link } from '../net/connection.ts';
 
@@ -41,7 +42,7 @@ export const pixel_ratio = signal(1); // device pixels to a CSS pixel, at most 2
 
 // What the canvas shows: whose camera it has, and where on the stage it is.
 export interface Shown {
-  camera: Camera; // as it was sent
+  camera: Lens; // as it was sent
   photo: PhotoRef | null;
   aspect: number;
   place: Rectangle; // CSS pixels
