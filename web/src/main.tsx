@@ -5,7 +5,7 @@ import { hide_token } from './net/token.ts';
 import { start_looking, looker } from './stage/looking.ts';
 import { forget_request, paint, request_photograph, show_frame, show_photograph } from './stage/pictures.ts';
 import { forget_probes, take_probe } from './state/rays.ts';
-import { take_path } from './state/path.ts';
+import { refuse_path, take_path } from './state/path.ts';
 import { give_up_still, save_still } from './state/still.ts';
 import { camera, comparing, hello, photo, pixel_ratio, split_at, stage } from './state/store.ts';
 import { start_connection } from './state/server.ts';
@@ -24,8 +24,11 @@ start_connection({
   probe: take_probe,
   path: take_path,
   refused(reply) {
-    if (reply.request === 'probe') forget_probes();
-    if (reply.request === 'still') give_up_still();
+    if (reply.request === 'look') looker.refused(reply.id);
+    if (reply.request === 'path') refuse_path(reply.id);
+    // Without a request it is whatever was asked last: there were too many questions.
+    if (reply.request === 'probe' || reply.request === '') forget_probes();
+    if (reply.request === 'still' || reply.request === '') give_up_still();
   },
   greeted() {
     forget_request();

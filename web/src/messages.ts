@@ -16,6 +16,7 @@ export interface CapturedView extends Camera {
   time: number; // 0 to 1
   width: number;
   height: number;
+  centre?: [number, number]; // principal point, as shares of width and height; without it the middle
 }
 
 export interface PhotoRef {
@@ -24,6 +25,11 @@ export interface PhotoRef {
 }
 
 // ---- page → server, JSON text
+
+// What the server takes at most; src/serve/audience/messages.cpp and src/serve/net/limits.h have these too.
+export const look_side = 4096; // pixels, width and height
+export const still_side = 8192;
+export const message_bytes = 64 * 1024; // a longer message ends the connection
 
 // What to show from now on; the newest one counts. Coarse while `moving`, then finer up to width × height.
 export interface Look {

@@ -1,4 +1,5 @@
 import type { TrainingEvent } from '../messages.ts';
+import { count } from '../parts/format.ts';
 
 type Step = Extract<TrainingEvent, { event: 'step' }>;
 
@@ -16,4 +17,33 @@ export function seconds_left(events: readonly TrainingEvent[]): number | null {
     : [now.iteration, now.seconds];
   if (iterations <= 0 || seconds <= 0) return null;
   return ((now.iterations - now.iteration) * seconds) / iterations;
+}
+
+export interface Remark {
+  text: string;
+  wrong: boolean;
+}
+
+const endings: Record<Extract<TrainingEvent, { event: 'finished' }>['ending'], string> = {
+  completed: 'Completed',
+  interrupted: 'Stopped',
+  diverged: 'Diverged',
+  out_of_memory: 'Ran out of memory',
+};
+const most_warnings = 3;
+
+// What is to be said of a training beside its figures: how it ended, the last save, the last warnings.
+export function remarks(events: readonly TrainingEvent[]): Remark[] {
+  const said: Remark[] = [];
+  const end = events.findLast((e) => e.event === 'finished');
+  if (end) {
+    const at = `${endings[end.ending] ?? 'Ended'} at iteration ${count(end.iteration)}`;
+    const good = end.ending === 'completed' || end.ending === 'interrupted';
+    const reason = end.reason.startsWith('std::') ? '' : end.reason; // a name of the program's, no words
+    said.push({ text: reason ? `${at}: ${reason}` : at, wrong: !good });
+  }
+  const saved = events.findLast((e) => e.event === 'saved');
+  if (saved) said.push({ text: `Saved at iteration ${count(saved.iteration)}`, wrong: false });
+  const warnings = events.filter((e) => e.event === 'warning').slice(-most_warnings);
+  return [...said, ...warnings.map(({ text }) => ({ text: `Warning: ${text}`, wrong: true }))];
 }

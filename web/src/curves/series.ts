@@ -1,6 +1,6 @@
 import type { TrainingEvent } from '../messages.ts';
 
-// The events of a training run, sorted into columns that can be drawn.
+// The events of a training run that count (state/history.ts), sorted into columns that can be drawn.
 
 export interface Steps {
   iteration: number[];
@@ -70,8 +70,6 @@ export function series_of(events: readonly TrainingEvent[]): Series {
 }
 
 function add_step(steps: Steps, event: Extract<TrainingEvent, { event: 'step' }>): void {
-  // A run that was resumed from an earlier state says again what it does again.
-  while ((steps.iteration.at(-1) ?? -1) >= event.iteration) drop_last(steps);
   const count = steps.iteration.length;
   steps.iteration.push(event.iteration);
   steps.loss.push(event.loss);
@@ -87,27 +85,7 @@ function add_step(steps: Steps, event: Extract<TrainingEvent, { event: 'step' }>
   }
 }
 
-function drop_last(steps: Steps): void {
-  for (const column of [
-    steps.iteration,
-    steps.loss,
-    steps.psnr,
-    steps.rate,
-    steps.memory,
-    steps.main,
-    steps.environment,
-  ]) {
-    column.pop();
-  }
-  for (const column of steps.terms.values()) column.length = Math.min(column.length, steps.iteration.length);
-}
-
 function add_density(density: Density, event: Extract<TrainingEvent, { event: 'density_changed' }>): void {
-  while ((density.iteration.at(-1) ?? -1) >= event.iteration) {
-    for (const column of [density.iteration, density.cloned, density.split, density.transparent, density.large])
-      column.pop();
-  }
-  while ((density.resets.at(-1) ?? -1) >= event.iteration) density.resets.pop();
   density.iteration.push(event.iteration);
   density.cloned.push(event.cloned);
   density.split.push(event.split);
@@ -117,7 +95,6 @@ function add_density(density: Density, event: Extract<TrainingEvent, { event: 'd
 }
 
 function enter_phase(phases: Phase[], name: string, iteration: number): void {
-  while ((phases.at(-1)?.first ?? -1) >= iteration) phases.pop();
   const before = phases.at(-1);
   if (before?.name === name) return;
   if (before) before.last = iteration;

@@ -7,6 +7,11 @@ export interface Point {
   y: number; // 0 (top) to 1
 }
 
+// A camera whose principal point may lie off the middle: shares of the picture's width and height.
+export interface Lens extends Camera {
+  centre?: [number, number];
+}
+
 export const radians = (degrees: number): number => (degrees * Math.PI) / 180;
 export const degrees = (angle: number): number => (angle * 180) / Math.PI;
 
@@ -24,19 +29,20 @@ export function look_at(position: Vec3, target: Vec3, up: Vec3, fov_y: number): 
 
 const to_camera = (c: Camera, point: Vec3): Vec3 => apply(transpose(c.rotation), subtract(point, c.position));
 
-function on_picture(c: Camera, aspect: number, [x, y, z]: Vec3): Point {
+function on_picture(c: Lens, aspect: number, [x, y, z]: Vec3): Point {
   const h = half_height(c) * z;
-  return { x: 0.5 + x / (2 * h * aspect), y: 0.5 + y / (2 * h) };
+  const [centre_x, centre_y] = c.centre ?? [0.5, 0.5];
+  return { x: centre_x + x / (2 * h * aspect), y: centre_y + y / (2 * h) };
 }
 
 // Where a point of the world is in the picture, which may be outside of it; null behind the camera.
-export function project(c: Camera, aspect: number, point: Vec3): Point | null {
+export function project(c: Lens, aspect: number, point: Vec3): Point | null {
   const seen = to_camera(c, point);
   return seen[2] > 1e-6 ? on_picture(c, aspect, seen) : null;
 }
 
 // The part of a line in front of the camera; null where none is. `near` is a depth, in units of length.
-export function project_line(c: Camera, aspect: number, a: Vec3, b: Vec3, near: number): [Point, Point] | null {
+export function project_line(c: Lens, aspect: number, a: Vec3, b: Vec3, near: number): [Point, Point] | null {
   let p = to_camera(c, a);
   let q = to_camera(c, b);
   if (p[2] < near && q[2] < near) return null;

@@ -15,8 +15,8 @@ export function fit(aspect: number, box: Size): Rectangle {
   return { left: (box.width - width) / 2, top: (box.height - height) / 2, width, height };
 }
 
-// Whole pixels, at least one.
-export const whole = ({ width, height }: Size): Size => ({
-  width: Math.max(1, Math.round(width)),
-  height: Math.max(1, Math.round(height)),
-});
+// Whole pixels, at least one; with the same aspect ratio no more than `most` a side.
+export function whole({ width, height }: Size, most: number): Size {
+  const scale = Math.min(1, most / Math.max(width, height));
+  return { width: Math.max(1, Math.round(width * scale)), height: Math.max(1, Math.round(height * scale)) };
+}

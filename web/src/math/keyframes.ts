@@ -1,4 +1,4 @@
-import type { Camera, CameraPath, Keyframe } from '../messages.ts';
+import type { Camera, CameraPath, Keyframe, Vec3 } from '../messages.ts';
 
 // What can be done to a camera path, as functions from a path to a path.
 
@@ -41,7 +41,24 @@ export function total_seconds({ keyframes, closed }: CameraPath): number {
   return counted.reduce((sum, k) => sum + k.seconds, 0);
 }
 
+// With numbers as exact as is of use, which makes a file and a message short.
+export function rounded_path(path: CameraPath): CameraPath {
+  const round = (x: number): number => Number(x.toPrecision(9));
+  const vector = ([x, y, z]: Vec3): Vec3 => [round(x), round(y), round(z)];
+  const keyframes = path.keyframes.map(({ position, rotation, fov_y, time, seconds }) => ({
+    position: vector(position),
+    rotation: [vector(rotation[0]), vector(rotation[1]), vector(rotation[2])] as Keyframe['rotation'],
+    fov_y: round(fov_y),
+    time: round(time),
+    seconds: round(seconds),
+  }));
+  return { ...path, keyframes };
+}
+
+// The ranges of what a path holds are those of src/show/camera_path.cpp.
 const is_number = (x: unknown): x is number => typeof x === 'number' && Number.isFinite(x);
+const is_in = (x: unknown, low: number, high: number): x is number => is_number(x) && x >= low && x <= high;
+const is_side = (x: unknown): x is number => is_in(x, 1, 16384) && Number.isInteger(x);
 const is_record = (x: unknown): x is Record<string, unknown> => typeof x === 'object' && x !== null;
 const is_vector = (x: unknown): boolean => Array.isArray(x) && x.length === 3 && x.every(is_number);
 
@@ -51,9 +68,9 @@ function keyframe_problem(k: unknown): string {
   const rotation = k['rotation'];
   if (!Array.isArray(rotation) || rotation.length !== 3 || !rotation.every(is_vector))
     return 'needs a rotation of 3×3 numbers';
-  if (!is_number(k['fov_y']) || k['fov_y'] <= 0 || k['fov_y'] >= 180) return 'needs a fov_y between 0 and 180 degrees';
-  if (!is_number(k['time']) || k['time'] < 0 || k['time'] > 1) return 'needs a time from 0 to 1';
-  if (!is_number(k['seconds']) || k['seconds'] < 0) return 'needs seconds that are not negative';
+  if (!is_in(k['fov_y'], 0.1, 179)) return 'needs a fov_y of 0.1 to 179 degrees';
+  if (!is_in(k['time'], 0, 1)) return 'needs a time from 0 to 1';
+  if (!is_in(k['seconds'], 0, 1e6)) return 'needs 0 to 1000000 seconds';
   return '';
 }
 
@@ -68,9 +85,9 @@ export function parse_path(text: string): CameraPath {
   if (!is_record(json) || json['format'] !== empty_path.format) throw new Error('This file is not a camera path.');
   if (json['version'] !== 1) throw new Error(`This camera path has version ${String(json['version'])}; 1 is known.`);
   const { width, height, fps, keyframes } = json;
-  if (!is_number(width) || !is_number(height) || width < 1 || height < 1)
-    throw new Error('The camera path has no size.');
-  if (!is_number(fps) || fps <= 0) throw new Error('The camera path has no frames per second.');
+  if (!is_side(width) || !is_side(height))
+    throw new Error('The camera path needs a width and a height of 1 to 16384 whole pixels.');
+  if (!is_in(fps, 0.1, 1000)) throw new Error('The camera path needs 0.1 to 1000 frames per second.');
   if (!Array.isArray(keyframes)) throw new Error('The camera path has no keyframes.');
   keyframes.forEach((k, i) => {
     const problem = keyframe_problem(k);

@@ -1,4 +1,4 @@
-import type { Reply, Request } from '../messages.ts';
+import { message_bytes, type Reply, type Request } from '../messages.ts';
 import { parse_picture, parse_reply, type Picture } from './wire.ts';
 
 export type Link =
@@ -11,6 +11,15 @@ export interface Listener {
   link(link: Link): void;
   reply(reply: Reply): void;
   picture(picture: Picture): void;
+  too_long(request: Request): void; // it was not sent: the server would end the connection
+}
+
+// As it is sent; null where the server would not take it.
+export function encoded(request: Request): string | null {
+  const text = JSON.stringify(request);
+  // Counting bytes is only worth it for what is long.
+  const short = text.length * 3 < message_bytes || new TextEncoder().encode(text).length < message_bytes;
+  return short ? text : null;
 }
 
 // Milliseconds to wait before the n-th attempt in a row (from 0) to connect again.
@@ -31,8 +40,10 @@ export class Connection {
   // Whether it could be sent.
   send(request: Request): boolean {
     if (this.socket?.readyState !== WebSocket.OPEN) return false;
-    this.socket.send(JSON.stringify(request));
-    return true;
+    const text = encoded(request);
+    if (text === null) this.listener.too_long(request);
+    else this.socket.send(text);
+    return text !== null;
   }
 
   retry_now(): void {

@@ -2,7 +2,7 @@ import { useSignal } from '@preact/signals';
 import { Button, Section } from '../parts/controls.tsx';
 import { count, duration } from '../parts/format.ts';
 import { Curves } from '../curves/Curves.tsx';
-import { latest_step, seconds_left } from '../curves/progress.ts';
+import { latest_step, remarks, seconds_left } from '../curves/progress.ts';
 import { events, hello, server, training } from '../state/store.ts';
 import { send } from '../state/server.ts';
 
@@ -10,6 +10,7 @@ export function TrainingTab() {
   return (
     <>
       {hello.value?.source === 'training' && <Progress />}
+      <Remarks />
       <Curves events={events.value} />
     </>
   );
@@ -49,6 +50,22 @@ function Progress() {
         {step && <span> · {duration(step.seconds)} so far</span>}
       </p>
       {training.value && <Commands paused={state?.paused ?? false} />}
+    </Section>
+  );
+}
+
+function Remarks() {
+  const said = remarks(events.value);
+  if (said.length === 0) return null;
+  return (
+    <Section title="Events">
+      <ul class="remarks" aria-live="polite" data-testid="remarks">
+        {said.map(({ text, wrong }) => (
+          <li key={text} class={wrong ? 'wrong' : ''}>
+            {text}
+          </li>
+        ))}
+      </ul>
     </Section>
   );
 }

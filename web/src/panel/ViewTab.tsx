@@ -2,7 +2,15 @@ import { Button, Choice, Section, Segments, Slider, Switch } from '../parts/cont
 import { figure, signed, title } from '../parts/format.ts';
 import { comparing, exposure, hello, layer, map, rays_on } from '../state/store.ts';
 import { pinned, toggle_rays, unpin, unpin_all, type Ray } from '../state/rays.ts';
-import { size_of, still_size, still_sizes, still_wanted, take_still, type StillSize } from '../state/still.ts';
+import {
+  chosen_size,
+  size_of,
+  still_size,
+  still_sizes,
+  still_wanted,
+  take_still,
+  type StillSize,
+} from '../state/still.ts';
 import { moving } from '../stage/looking.ts';
 
 export function ViewTab() {
@@ -99,14 +107,14 @@ function Pin({ ray, name }: { ray: Ray; name: string }) {
 function Screenshot() {
   const labels: Record<StillSize, string> = { '1': '1×', '2': '2×', '4': '4×', capture: 'Capture' };
   const options = still_sizes.filter((s) => size_of(s)).map((value) => ({ value, label: labels[value] }));
-  const size = size_of(still_size.value);
+  const size = size_of(chosen_size.value);
   return (
     <Section title="Screenshot" aside={size && <span class="hint">{`${size.width} × ${size.height}`}</span>}>
       <Segments
         id="still-size"
         label="Size"
         options={options}
-        value={still_size.value}
+        value={chosen_size.value}
         onChange={(v) => (still_size.value = v)}
       />
       <Button

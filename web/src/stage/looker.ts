@@ -30,6 +30,7 @@ export class Looker {
   private next = 1;
   private overhead = 0; // ms of an answer that were not spent rendering, running mean
   private rendering = 1;
+  private asleep = false;
 
   constructor(send: (look: Look) => boolean, clock: Clock) {
     this.send = send;
@@ -68,6 +69,20 @@ export class Looker {
     return look;
   }
 
+  // No frame will answer this look.
+  refused(look: number): void {
+    this.answered = Math.max(this.answered, look);
+    this.pump();
+  }
+
+  // Nobody looks: nothing is sent, whatever was to come, until somebody does and wants something.
+  sleep(asleep: boolean): void {
+    if (asleep === this.asleep) return;
+    this.asleep = asleep;
+    this.pending_input = null;
+    this.restart(); // what is under way may never be answered
+  }
+
   // After a reconnection nothing is under way any more.
   restart(): void {
     this.answered = this.next - 1;
@@ -91,7 +106,7 @@ export class Looker {
   }
 
   private pump(): void {
-    if (!this.wish || this.pending_input === null) return;
+    if (this.asleep || !this.wish || this.pending_input === null) return;
     const now = this.clock.now();
     const unanswered = this.sent.filter((s) => s.look.id > this.answered && now - s.sent < patience);
     // On a slow line a second look under way hides the way back; on a fast one it would only grow old.

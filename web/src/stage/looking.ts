@@ -1,5 +1,5 @@
 import { batch, effect } from '@preact/signals';
-import type { Look } from '../messages.ts';
+import { look_side, type Look } from '../messages.ts';
 import { fit, whole } from '../math/fit.ts';
 import { widened } from '../math/camera.ts';
 import {
@@ -37,13 +37,15 @@ export function current_wish(): Wish | null {
   const view = captured(photo.value);
   const box = pixels();
   const common = { time: time.value, layer: shown_layer(), exposure: exposure.value, map: map.value };
-  if (view && photo.value) return { photo: photo.value, ...whole(fit(view.width / view.height, box)), ...common };
-  return { camera: widened(free, box.width / box.height), ...whole(box), ...common };
+  if (view && photo.value)
+    return { photo: photo.value, ...whole(fit(view.width / view.height, box), look_side), ...common };
+  return { camera: widened(free, box.width / box.height), ...whole(box, look_side), ...common };
 }
 
 export function start_looking(): void {
   effect(() => {
     const wish = current_wish();
+    looker.sleep(asleep.value);
     if (wish && !asleep.value) looker.want(wish);
   });
   effect(() => {

@@ -1,6 +1,6 @@
 import { effect, signal, untracked } from '@preact/signals';
 import type { CameraPath, PathReply } from '../messages.ts';
-import { empty_path, parse_path, with_keyframe } from '../math/keyframes.ts';
+import { empty_path, parse_path, rounded_path, with_keyframe } from '../math/keyframes.ts';
 import { file_name } from '../parts/format.ts';
 import { moving } from '../stage/looking.ts';
 import { stop_flight } from '../stage/travel.ts';
@@ -39,8 +39,8 @@ effect(() => {
 effect(() => {
   const now = path.value;
   if (link.value.kind !== 'open' || !hello.value) return;
-  if (now.keyframes.length < 2) shots.value = [];
-  else send({ type: 'path', id: ++asked, path: now });
+  const sent = now.keyframes.length > 1 && send({ type: 'path', id: ++asked, path: rounded_path(now) });
+  if (!sent) shots.value = [];
 });
 
 function recall(run: string): CameraPath {
@@ -56,6 +56,11 @@ export function take_path(reply: PathReply): void {
   if (reply.id === asked) shots.value = reply.shots;
 }
 
+// There is no way along this path.
+export function refuse_path(id: number): void {
+  if (id === asked) shots.value = [];
+}
+
 export function add_keyframe(): void {
   const here = camera.value;
   if (!here) return;
@@ -64,7 +69,7 @@ export function add_keyframe(): void {
 }
 
 export function export_path(): void {
-  const text = JSON.stringify(path.value, null, 2) + '\n';
+  const text = JSON.stringify(rounded_path(path.value), null, 2) + '\n';
   save_file(new Blob([text], { type: 'application/json' }), `${file_name(hello.value?.name ?? '')}_path.json`);
 }
 

@@ -32,8 +32,9 @@ export function in_picture(x: number, y: number): Point | null {
 
 function ask(point: Point, purpose: Purpose): number {
   const id = next++;
+  if (!send({ type: 'probe', id, ...point })) return 0;
   asked.set(id, purpose);
-  return send({ type: 'probe', id, ...point }) ? id : 0;
+  return id;
 }
 
 export function take_probe(reply: ProbeReply): void {
@@ -72,9 +73,11 @@ export const pin = (point: Point): void =>
 export const unpin = (ray: Ray): void => void (pinned.value = pinned.value.filter((r) => r !== ray));
 export const unpin_all = (): void => void (pinned.value = []);
 
+// No answers will come: the next place of the cursor is asked for anew.
 export function forget_probes(): void {
   asked.clear();
   under_way = 0;
+  waiting = null;
 }
 
 export function toggle_rays(): void {

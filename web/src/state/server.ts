@@ -1,8 +1,9 @@
-import { batch } from '@preact/signals';
+import { batch, effect, signal } from '@preact/signals';
 import type { Hello, PathReply, ProbeReply, Refused, Reply, Request } from '../messages.ts';
 import { Connection } from '../net/connection.ts';
 import type { Picture } from '../net/wire.ts';
-import { camera, events, hello, layer, link, map, notify, photo, pivot, server, time, trouble } from './store.ts';
+import { History } from './history.ts';
+import { asleep, camera, events, hello, layer, link, map, notify, photo, pivot, server, time, trouble } from './store.ts';
 
 // The one connection of the page, and who is told what comes over it.
 
@@ -15,6 +16,13 @@ export interface Handlers {
 }
 
 let connection: Connection | null = null;
+let history = new History();
+const told = signal(0); // messages that went into it
+
+// Nothing is worked out from the events while nobody looks.
+effect(() => {
+  if (!asleep.value && told.value > 0) events.value = history.list();
+});
 
 export const send = (request: Request): boolean => connection?.send(request) ?? false;
 export const retry_now = (): void => connection?.retry_now();
@@ -24,6 +32,12 @@ export function start_connection(handlers: Handlers): void {
     link: (now) => (link.value = now),
     reply: (reply) => batch(() => take(reply, handlers)),
     picture: handlers.picture,
+    too_long: (request) =>
+      notify(
+        request.type === 'path'
+          ? 'This camera path is too long to be shown here; it can still be exported and rendered.'
+          : 'This is too long for the server.',
+      ),
   });
 }
 
@@ -36,7 +50,9 @@ function take(reply: Reply, handlers: Handlers): void {
       server.value = reply;
       return;
     case 'events':
-      events.value = reply.reset ? reply.events : [...events.value, ...reply.events];
+      if (reply.reset) history = new History();
+      for (const event of reply.events) history.add(event);
+      told.value++;
       return;
     case 'trouble':
       trouble.value = reply.text;

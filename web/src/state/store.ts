@@ -1,5 +1,6 @@
 import { computed, signal } from '@preact/signals';
 import type { Camera, CapturedView, Hello, PhotoRef, State, TrainingEvent, Vec3 } from '../messages.ts';
+import type { Lens } from '../math/camera.ts';
 import type { Rectangle, Size } from '../math/fit.ts';
 import type { Link } from '../net/connection.ts';
 
@@ -21,7 +22,7 @@ export const time = signal(0);
 export const layer = signal('rgb');
 export const exposure = signal(0);
 export const map = signal('');
-export const asleep = signal(false);
+export const asleep = signal(document.hidden);
 
 // ---- tools
 export type Mode = 'orbit' | 'fly';
@@ -41,7 +42,7 @@ export const pixel_ratio = signal(1); // device pixels to a CSS pixel, at most 2
 
 // What the canvas shows: whose camera it has, and where on the stage it is.
 export interface Shown {
-  camera: Camera; // as it was sent
+  camera: Lens; // as it was sent
   photo: PhotoRef | null;
   aspect: number;
   place: Rectangle; // CSS pixels
@@ -65,6 +66,6 @@ export const training = computed(() => hello.value?.source === 'training' && ser
 let keys = 0;
 export function notify(text: string): void {
   const key = keys++;
-  notices.value = [...notices.value.slice(-2), { key, text }];
+  notices.value = [...notices.peek().slice(-2), { key, text }]; // effects may notify
   setTimeout(() => (notices.value = notices.value.filter((n) => n.key !== key)), 6000);
 }

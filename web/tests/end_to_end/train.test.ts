@@ -67,6 +67,11 @@ describe('watching a training', { skip: !available('train') }, () => {
     await other.page.context().close();
   });
 
+  test('a save is said', async () => {
+    await press(page, 'save');
+    await page.getByTestId('remarks').getByText('Saved at iteration').waitFor({ timeout: patience });
+  });
+
   test('stopping asks first', async () => {
     await press(page, 'stop');
     await press(page, 'stop-cancel');
@@ -75,5 +80,6 @@ describe('watching a training', { skip: !available('train') }, () => {
     await press(page, 'stop-confirm');
     await page.getByTestId('stop').waitFor({ state: 'detached', timeout: patience });
     assert.equal(await page.getByTestId('pause').count(), 0);
+    await page.getByTestId('remarks').getByText('Stopped at iteration').waitFor({ timeout: patience });
   });
 });

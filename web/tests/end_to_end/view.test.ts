@@ -238,6 +238,19 @@ describe('looking at a run', { skip: !available('view') }, () => {
     await page.waitForTimeout(700);
     assert.equal(await newest_look(page), look);
     await then_rest(page, () => hide(false));
+
+    const playing = await newest_look(page);
+    await press(page, 'play');
+    await page.waitForFunction((known) => (window.traceflow.lastFrame?.look ?? 0) > known + 1, playing, {
+      timeout: patience,
+    });
+    await hide(true);
+    await page.waitForTimeout(500); // for what was under way
+    const last = await newest_look(page);
+    await page.waitForTimeout(1000);
+    assert.equal(await newest_look(page), last);
+    await press(page, 'play');
+    await then_rest(page, () => hide(false));
     await page.context().close();
   });
 

@@ -1,5 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import type { Vec3 } from '../../src/messages.ts';
 import {
   degrees,
   down_of,
@@ -103,4 +104,17 @@ test('right-handed about an axis', () => {
     [0, 1, 0],
   );
   near_vector(scale([1, 2, 3], 2), [2, 4, 6]);
+});
+
+test('a principal point off the middle moves all of the picture by the same', () => {
+  const view = look_at([0, -2, 1], [0, 0, 0], [0, 0, 1], 30);
+  const shifted = { ...view, centre: [0.52, 0.47] as [number, number] };
+  const [a, b] = [[0, 0, 0] as Vec3, [0.2, 0.1, 0.3] as Vec3];
+  for (const point of [a, b]) {
+    const [middle, moved] = [project(view, 1.5, point), project(shifted, 1.5, point)];
+    near((moved?.x ?? NaN) - (middle?.x ?? NaN), 0.02);
+    near((moved?.y ?? NaN) - (middle?.y ?? NaN), -0.03);
+  }
+  near(project(shifted, 1.5, a)?.x ?? NaN, 0.52);
+  near(project_line(shifted, 1.5, a, b, 0.01)?.[0].y ?? NaN, 0.47);
 });

@@ -1,25 +1,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import type { TrainingEvent } from '../../src/messages.ts';
 import { charts_of } from '../../src/curves/charts.ts';
-import { seconds_left } from '../../src/curves/progress.ts';
+import { remarks, seconds_left } from '../../src/curves/progress.ts';
 import { series_of } from '../../src/curves/series.ts';
 import { thinned } from '../../src/curves/thin.ts';
 import { Training } from '../../dev/training.ts';
 import { near } from './near.ts';
-
-const step = (iteration: number, loss: number, terms: Record<string, number> = {}): TrainingEvent => ({
-  event: 'step',
-  iteration,
-  iterations: 1000,
-  phase: 'diffuse',
-  loss,
-  terms,
-  psnr: 20,
-  seconds: iteration / 10,
-  rate: 10,
-  surfels: { main: 5, environment: 3 },
-});
+import { step } from './steps.ts';
 
 test('thinning keeps ends, extremes and order', () => {
   const values = Array.from({ length: 10000 }, (_, i) => Math.sin(i / 100));
@@ -46,12 +33,6 @@ test('a term that comes later is zero before', () => {
   const { steps } = series_of([step(10, 1, { l1: 0.5 }), step(20, 0.9, { l1: 0.4, normal: 0.1 })]);
   assert.deepEqual(steps.terms.get('normal'), [0, 0.1]);
   assert.deepEqual(steps.memory, [null, null]);
-});
-
-test('a resumed run says again what it does again', () => {
-  const { steps } = series_of([step(10, 1), step(20, 0.9), step(30, 0.8), step(20, 0.7)]);
-  assert.deepEqual(steps.iteration, [10, 20]);
-  assert.deepEqual(steps.loss, [1, 0.7]);
 });
 
 test('phases follow one another', () => {
@@ -111,4 +92,26 @@ test('what is left is reckoned from the last part', () => {
   assert.equal(seconds_left([]), null);
   const events = [step(10, 1), step(400, 1), step(500, 1)];
   near(seconds_left(events) ?? NaN, 50);
+});
+
+test('ends, saves and warnings are said in words', () => {
+  assert.deepEqual(remarks([step(10)]), []);
+  const warnings = ['a', 'b', 'c', 'd'].map((text, i) => ({ event: 'warning' as const, iteration: i, text }));
+  const saved = { event: 'saved' as const, iteration: 1200, path: 'x', seconds: 0.1 };
+  assert.deepEqual(remarks([...warnings, { ...saved, iteration: 600 }, saved]), [
+    { text: 'Saved at iteration 1,200', wrong: false },
+    { text: 'Warning: b', wrong: true },
+    { text: 'Warning: c', wrong: true },
+    { text: 'Warning: d', wrong: true },
+  ]);
+  const end = { event: 'finished' as const, iteration: 1300, seconds: 9, psnr: 20, surfels: { main: 1, environment: 1 } };
+  assert.deepEqual(remarks([{ ...end, ending: 'completed', reason: '' }]), [
+    { text: 'Completed at iteration 1,300', wrong: false },
+  ]);
+  assert.deepEqual(remarks([{ ...end, ending: 'out_of_memory', reason: 'std::bad_alloc' }]), [
+    { text: 'Ran out of memory at iteration 1,300', wrong: true },
+  ]);
+  assert.deepEqual(remarks([{ ...end, ending: 'diverged', reason: 'the loss is not finite' }]), [
+    { text: 'Diverged at iteration 1,300: the loss is not finite', wrong: true },
+  ]);
 });

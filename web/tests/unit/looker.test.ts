@@ -144,6 +144,50 @@ test('an answer that never comes does not hold up the page', () => {
   assert.ok(b.looker.waiting() >= 2000);
 });
 
+test('asleep, nothing is sent: neither the rest of a motion nor what an answer or patience held back', () => {
+  const b = bench();
+  b.looker.motion();
+  b.looker.want(wish(0.1));
+  b.looker.want(wish(0.2));
+  b.looker.sleep(true);
+  b.looker.motion();
+  b.pass(200);
+  b.answer(1);
+  b.pass(5000);
+  assert.equal(b.sent.length, 1);
+  b.looker.sleep(false);
+  b.looker.want(wish(0.3));
+  assert.deepEqual([b.sent.length, b.sent[1]?.time, b.sent[1]?.moving], [2, 0.3, false]);
+});
+
+test('a look that sleep cut off holds nothing up', () => {
+  const b = bench();
+  b.looker.want(wish(0.1));
+  b.looker.sleep(true);
+  assert.equal(b.looker.waiting(), 0);
+  b.pass(10);
+  b.looker.sleep(false);
+  b.looker.want(wish(0.2));
+  assert.equal(b.sent.length, 2);
+  assert.equal(b.answer(2)?.input, 10);
+});
+
+test('a refused look is answered: it is not waited for, and the next is sent', () => {
+  const b = bench();
+  b.looker.want(wish(0));
+  b.looker.want(wish(0.1));
+  b.pass(10);
+  b.looker.refused(1);
+  assert.deepEqual(
+    b.sent.map((l) => l.time),
+    [0, 0.1],
+  );
+  b.looker.refused(2);
+  b.pass(5000);
+  assert.equal(b.looker.waiting(), 0);
+  assert.equal(b.sent.length, 2);
+});
+
 test('after a reconnection the wish is sent again', () => {
   const b = bench();
   b.looker.want(wish(0));

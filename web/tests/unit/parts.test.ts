@@ -63,7 +63,9 @@ test('numbers are written for people', () => {
 test('pictures are fitted into the middle', () => {
   assert.deepEqual(fit(2, { width: 100, height: 100 }), { left: 0, top: 25, width: 100, height: 50 });
   assert.deepEqual(fit(0.5, { width: 100, height: 100 }), { left: 25, top: 0, width: 50, height: 100 });
-  assert.deepEqual(whole({ width: 0.2, height: 7.6 }), { width: 1, height: 8 });
+  assert.deepEqual(whole({ width: 0.2, height: 7.6 }, 4096), { width: 1, height: 8 });
+  assert.deepEqual(whole({ width: 5120, height: 2880 }, 4096), { width: 4096, height: 2304 });
+  assert.deepEqual(whole({ width: 1000, height: 9000 }, 4096), { width: 455, height: 4096 });
 });
 
 const kind: Kind = { key: 'lpips', label: '', unit: '', digits: 2, higher_is_better: false };
