@@ -142,6 +142,10 @@ void Progress::show(const events::Evaluated& e) {
 
 void Progress::show(const events::Warning& e) { print_line("warning: " + e.text); }
 
+void Progress::show(const events::Paused& e) {
+  print_line(e.paused ? fmt::format("paused by the viewer at iteration {}", e.iteration) : "going on");
+}
+
 void Progress::show(const events::Saved& e) {
   print_line(fmt::format("saved {} at iteration {}", e.path.string(), e.iteration));
 }

@@ -26,6 +26,7 @@ class Progress {
   void show(const events::PhaseEntered& e);
   void show(const events::Evaluated& e);
   void show(const events::Warning& e);
+  void show(const events::Paused& e);
   void show(const events::Saved& e);
   void show(const events::Measured& e);
   void show(const events::Finished& e);

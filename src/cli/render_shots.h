@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "cli/trained_run.h"
+#include "cli/loaded_scene.h"
 #include "show/shot.h"
 
 namespace CLI {
@@ -29,15 +29,6 @@ struct ShotArguments {
   void check() const;
 };
 void add_shot_arguments(CLI::App& verb, ShotArguments& arguments);
-
-// A scene to render and, when it comes from a run, what else is known of it.
-struct LoadedScene {
-  show::Subject subject;
-  std::optional<TrainedRun> run;
-};
-
-// A run's folder, a .ply or a folder that export wrote. environment: a .ply's own, or empty.
-LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment);
 
 struct ChosenShots {
   std::vector<show::Shot> shots;  // each with its time

@@ -15,7 +15,7 @@ void request_stop(int signal_number) {
 
 }  // namespace
 
-const std::atomic<bool>& stop_on_signals() {
+std::atomic<bool>& stop_on_signals() {
   stop_requested = false;
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);

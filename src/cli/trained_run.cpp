@@ -31,21 +31,11 @@ double metadata_number(const Safetensors& file, const std::string& where, const 
   return value;
 }
 
-// The parts of the scene that the last iteration trained with. A run stopped early has parts that never saw a
-// photograph.
-FrameRequest request_after(const TrainOptions& options, int64_t iterations) {
-  const Schedule schedule(options);
-  const int last = static_cast<int>(std::max<int64_t>(0, iterations - 1));
-  FrameRequest request;
-  request.sh_degree_main = schedule.sh_degree_main(last);
-  request.sh_degree_environment = schedule.sh_degree_environment(last);
-  request.deform_main = schedule.deforms_main(last);
-  request.deform_environment = schedule.deforms_environment(last);
-  request.specular = schedule.phase(last) != Phase::diffuse;
-  return request;
-}
-
 }  // namespace
+
+std::string run_name(const std::filesystem::path& folder) {
+  return (std::filesystem::absolute(folder) / "").lexically_normal().parent_path().filename().string();
+}
 
 TrainedRun read_run(const std::filesystem::path& folder) {
   const RunFolder files{folder};
@@ -57,7 +47,7 @@ TrainedRun read_run(const std::filesystem::path& folder) {
   run.subject.scene = get_scene(file);
   run.subject.render = run.options.render;
   run.iterations = std::llround(metadata_number(file, where, "iteration"));
-  run.subject.request = request_after(run.options, run.iterations);
+  run.subject.request = picture_request(run.options, run.iterations);
   run.train_seconds = metadata_number(file, where, "train_seconds");
   run.capture = metadata(file, where, "capture");
   run.capture_folder = metadata(file, where, "capture_folder");

@@ -19,6 +19,9 @@ struct TrainedRun {
   std::string note;  // one line when the checkpoint is not the newest; else empty
 };
 
+// The name of a run's folder, however its path is written.
+std::string run_name(const std::filesystem::path& folder);
+
 // Throws InputError.
 TrainedRun read_run(const std::filesystem::path& folder);
 

@@ -132,7 +132,7 @@ void add_render(CLI::App& program) {
   add_shot_arguments(*verb, a->shots);
   verb->add_option("--layers", a->layers,
                    "Of rgb, diffuse, specular, tint, alpha, normal, depth, median-depth, distortion, "
-                   "with commas between; or all")
+                   "surfels, with commas between; or all")
       ->capture_default_str();
   verb->add_option("--format", a->format, "png for the eye or npy (float32)")
       ->check(CLI::IsMember({"png", "npy"}))

@@ -1,31 +1,26 @@
 #include <fmt/core.h>
 
-#include <atomic>
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <memory>
+#include <optional>
 
 #include "cli/device_arguments.h"
 #include "cli/error_boundary.h"
 #include "cli/option_arguments.h"
 #include "cli/progress.h"
+#include "cli/server_arguments.h"
+#include "cli/stop_request.h"
+#include "cli/trained_run.h"
 #include "cli/verbs.h"
 #include "files/options_json.h"
+#include "serve/live_view.h"
 #include "train/event_log.h"
+#include "train/log_history.h"
 #include "train/trainer.h"
 
 namespace traceflow::cli {
 
 namespace {
-
-// Set by Ctrl-C and SIGTERM: the run saves after its current iteration and ends. A second Ctrl-C ends it at
-// once.
-std::atomic<bool> stop_requested{false};
-
-void request_stop(int signal_number) {
-  stop_requested = true;
-  std::signal(signal_number, SIG_DFL);
-}
 
 struct TrainArguments {
   std::string data;
@@ -33,6 +28,8 @@ struct TrainArguments {
   std::string preset_name = "paper";
   bool resume = false;
   bool quiet = false;
+  bool view = false;
+  serve::ViewOptions view_options;
 };
 
 // The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
@@ -67,7 +64,41 @@ std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& argument
   throw Exit{code};
 }
 
-void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices) {
+// A training and those who watch it in a browser.
+class Watched {
+ public:
+  Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where,
+          std::atomic<bool>& stop)
+      : view_(arguments.view_options,
+              serve::make_setting("training", run_name(arguments.output), &trainer.capture(),
+                                  trainer.scene().normalisation),
+              {[&trainer] { return stage_of(trainer); }, [&trainer] { trainer.save(); },
+               [&trainer](const events::Event& event) { trainer.stream().emit(event); }, &stop}) {
+    view_.recall(read_log(RunFolder{arguments.output}.log()));
+    server_ = where.start(view_.room());
+    trainer.stream().listen([this](const events::Event& event) { view_(event); });
+  }
+
+  // After the training, for as long as somebody looks.
+  void stay(bool quiet) {
+    if (!view_.is_wanted()) return;
+    if (!quiet) fmt::print(stderr, "still shown to those who look; Ctrl-C ends it\n");
+    view_.stay();
+  }
+
+ private:
+  static serve::Stage stage_of(const Trainer& trainer) {
+    return {trainer.scene(), trainer.options().render,
+            picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
+  }
+
+  serve::LiveView view_;
+  std::unique_ptr<serve::Server> server_;
+};
+
+void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices,
+           const ServerArguments& where) {
+  arguments.view_options.validate();
   const std::unique_ptr<Safetensors> checkpoint = checkpoint_to_resume(arguments);
   const TrainOptions options = settings(arguments, given, checkpoint.get());
   std::string data = arguments.data;
@@ -82,10 +113,12 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
   trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
   if (checkpoint) trainer.resume();
+  std::atomic<bool>& stop = stop_on_signals();
+  std::optional<Watched> watched;
+  if (arguments.view) watched.emplace(trainer, arguments, where, stop);
 
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
-  const events::Finished end = trainer.run(stop_requested);
+  const events::Finished end = trainer.run(stop);
+  if (watched) watched->stay(arguments.quiet);
   if (end.ending == events::Ending::diverged) end_with(exit_diverged, arguments, end);
   if (end.ending == events::Ending::out_of_memory) end_with(exit_memory, arguments, end);
   if (end.ending == events::Ending::interrupted) end_with(exit_interrupted, arguments, end);
@@ -107,12 +140,20 @@ void add_train(CLI::App& program) {
       ->capture_default_str();
   verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint");
   verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
+  CLI::Option* view =
+      verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
+  verb->add_option("--view-share", arguments->view_options.share,
+                   "Share of the time that the page may take while somebody looks")
+      ->needs(view)
+      ->option_text("X")
+      ->capture_default_str();
+  const ServerArguments where(*verb, view);
   // The presets differ in values alone, so any of them names the flags.
   auto defaults = std::make_shared<TrainOptions>();
   auto given =
       std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
   const DeviceArguments devices(*verb);
-  verb->callback([arguments, given, devices] { train(*arguments, *given, devices); });
+  verb->callback([arguments, given, devices, where] { train(*arguments, *given, devices, where); });
 }
 
 }  // namespace traceflow::cli

@@ -18,6 +18,7 @@ void add_trace(CLI::App& program);
 void add_export(CLI::App& program);
 void add_synth(CLI::App& program);
 void add_inspect(CLI::App& program);
+void add_view(CLI::App& program);
 
 // All verbs that are there, in alphabetical order.
 void add_verbs(CLI::App& program);

@@ -25,16 +25,29 @@ struct FrameRequest {
   // Skip main surfels that lie outside the view by more than the scene's reach. Training does; a picture does
   // not need to.
   bool cull = false;
+  // The scene and the renderer's options are, unchanged, those of the last forward(), which nothing checks:
+  // what is posed already as asked for here, and the tracer's BVH, are used again. The same picture, sooner.
+  // Culling and a forward() for a backward() pose anew.
+  bool reuse_pose = false;
+};
+
+// The rays that the traced pixels see mirrored, and what these meet.
+struct MirroredRays {
+  Tensor<float> origins, directions;  // P×3, world
+  Tensor<float> alpha, distance;      // P, as trace::Output has them; empty with an environment map
 };
 
 // A picture with all its layers, on the device of the scene that it shows.
 struct Frame {
+  Camera<float> camera;         // what it is seen by
+  raster::Options drawn_with;   // how it was rasterised
   PosedSurfels main;            // what was rasterised
   Tensor<int32_t> subset;       // which stored main surfels these are; empty means all
   PosedSurfels environment;     // what was traced
   raster::Output raster;        // diffuse colour, alpha, tint, normal, depths, distortion
   Tensor<float> pseudo_normal;  // H×W×3 when asked for
   surface::TracedPixels traced;
+  MirroredRays mirrored;
   Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
   Tensor<float> colour;         // H×W×3, the final image (method §6)
   Tensor<float> reach;          // one number: the largest distance by which the field moved a surfel of it

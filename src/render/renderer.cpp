@@ -82,29 +82,57 @@ bool Renderer::reflects(const Scene& scene, const FrameRequest& request) const {
   return scene.specular == Specular::environment_map && scene.environment_map.has_value();
 }
 
-const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
+void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
   const Field* field = field_if(scene.main_field, request.deform_main);
-  const raster::Options raster_options = options_.raster_options(scene.extent);
   const Device device = scene.device();
+  const int degree = std::min(request.sh_degree_main, stored_degree(scene.main));
+  const Pose pose{field ? request.time : 0, degree, field != nullptr};
+  const bool anew = keep_for_backward || request.cull;
+  if (!anew && main_pose_ == pose) return;
+  main_pose_.reset();
 
-  // Choose the surfels that can show, and pose them.
   frame_.subset.place(device).resize({0});
   if (request.cull) {
-    surfels_in_view(scene.main, request.camera, raster_options.near_plane,
+    surfels_in_view(scene.main, request.camera, frame_.drawn_with.near_plane,
                     field ? scene.main_reach.data() : nullptr, frame_.subset);
   }
   if (request.cull && frame_.subset.empty()) {
     frame_.main.reset_like(PosedSurfels{}.on(device));
   } else {
-    deform::forward(scene.main, field, request.time, frame_.subset,
-                    std::min(request.sh_degree_main, stored_degree(scene.main)), options_.precision,
-                    frame_.main, keep_for_backward ? &main_saved_ : nullptr);
+    deform::forward(scene.main, field, request.time, frame_.subset, degree, options_.precision, frame_.main,
+                    keep_for_backward ? &main_saved_ : nullptr);
   }
   frame_.reach.place(device).reset({1});
   if (field) find_reach(scene.main, frame_);
+  if (!request.cull) main_pose_ = pose;
+}
+
+void Renderer::pose_environment(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
+  const Field* field = field_if(scene.environment_field, request.deform_environment);
+  const int degree = std::min(request.sh_degree_environment, stored_degree(scene.environment));
+  const Pose pose{field ? request.time : 0, degree, field != nullptr};
+  if (!keep_for_backward && environment_pose_ == pose) return;
+  environment_pose_.reset();
+  deform::forward(scene.environment, field, request.time, {}, degree, options_.precision, frame_.environment,
+                  keep_for_backward ? &environment_saved_ : nullptr);
+  trace::build(frame_.environment, options_.trace_options(scene.extent), *bvh_);
+  environment_pose_ = pose;
+}
+
+const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
+  const Device device = scene.device();
+  frame_.camera = request.camera;
+  frame_.drawn_with = options_.raster_options(scene.extent);
+
+  // Choose the surfels that can show, and pose them.
+  if (!request.reuse_pose) {
+    main_pose_.reset();
+    environment_pose_.reset();
+  }
+  pose_main(scene, request, keep_for_backward);
 
   // Draw them.
-  raster::forward(frame_.main, request.camera, raster_options, frame_.raster, raster_saved_.get());
+  raster::forward(frame_.main, request.camera, frame_.drawn_with, frame_.raster, raster_saved_.get());
   if (request.pseudo_normals) {
     surface::pseudo_normals(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                             frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
@@ -114,6 +142,9 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   frame_.traced.pixel.place(device).resize({0});
   frame_.traced.weight.place(device).resize({0});
   frame_.specular_rays.place(device).resize({0, 3});
+  MirroredRays& rays = frame_.mirrored;
+  for (Tensor<float>* values : {&rays.origins, &rays.directions}) values->place(device).resize({0, 3});
+  for (Tensor<float>* values : {&rays.alpha, &rays.distance}) values->place(device).resize({0});
   if (reflects(scene, request)) {
     forward_specular(scene, request, keep_for_backward);
   }
@@ -123,24 +154,24 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
+  MirroredRays& rays = frame_.mirrored;
   surface::select_pixels(frame_.raster.alpha, frame_.raster.tint, frame_.raster.normal, options_.select,
                          request.probes, request.probe_seed, frame_.traced);
   surface::reflection_rays(request.camera, frame_.traced.pixel, frame_.raster.depth,
-                           frame_.raster.median_depth, frame_.raster.normal, options_.depth_ratio, origins_,
-                           directions_);
+                           frame_.raster.median_depth, frame_.raster.normal, options_.depth_ratio,
+                           rays.origins, rays.directions);
   if (scene.specular == Specular::environment_map) {
-    reflection_map::forward(*scene.environment_map, directions_, request.time, request.deform_environment,
+    reflection_map::forward(*scene.environment_map, rays.directions, request.time, request.deform_environment,
                             options_.precision, frame_.specular_rays, map_saved_);
     return;
   }
-  const trace::Options trace_options = options_.trace_options(scene.extent);
-  deform::forward(scene.environment, field_if(scene.environment_field, request.deform_environment),
-                  request.time, {}, std::min(request.sh_degree_environment, stored_degree(scene.environment)),
-                  options_.precision, frame_.environment, keep_for_backward ? &environment_saved_ : nullptr);
-  trace::build(frame_.environment, trace_options, *bvh_);
-  trace::forward(frame_.environment, *bvh_, origins_, directions_, trace_options, trace_output_,
+  pose_environment(scene, request, keep_for_backward);
+  trace::forward(frame_.environment, *bvh_, rays.origins, rays.directions,
+                 options_.trace_options(scene.extent), trace_output_,
                  keep_for_backward ? trace_saved_.get() : nullptr);
   frame_.specular_rays.swap(trace_output_.colour);
+  rays.alpha.swap(trace_output_.alpha);
+  rays.distance.swap(trace_output_.distance);
 }
 
 void Renderer::begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors) {
@@ -211,14 +242,14 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
   Tensor<float>* grad_origins = &grad_trace_input_.origins;
   Tensor<float>* grad_directions = &grad_trace_input_.directions;
   if (scene.specular == Specular::environment_map) {
-    grad_origins->place(scene.device()).reset(origins_.shape());
-    reflection_map::backward(*scene.environment_map, directions_, request.time, request.deform_environment,
-                             trainable.environment_field, map_saved_, grad_trace_.colour,
-                             gradient.environment_map, *grad_directions);
+    grad_origins->place(scene.device()).reset(frame_.mirrored.origins.shape());
+    reflection_map::backward(*scene.environment_map, frame_.mirrored.directions, request.time,
+                             request.deform_environment, trainable.environment_field, map_saved_,
+                             grad_trace_.colour, gradient.environment_map, *grad_directions);
   } else {
     const Field* field = field_if(scene.environment_field, request.deform_environment);
-    trace::backward(frame_.environment, origins_, directions_, options_.trace_options(scene.extent),
-                    *trace_saved_, grad_trace_, grad_trace_input_);
+    trace::backward(frame_.environment, frame_.mirrored.origins, frame_.mirrored.directions,
+                    options_.trace_options(scene.extent), *trace_saved_, grad_trace_, grad_trace_input_);
     gradient.environment_signal = grad_trace_input_.position_gradient;
     parallel_for(scene.device(), "render: flag signals", frame_.environment.count(),
                  FlagNonZero{gradient.environment_signal.data(), gradient.environment_visible.data()});

@@ -32,6 +32,17 @@ class Renderer {
                 const FrameGradient& grad_frame, SceneGradient& gradient);
 
  private:
+  // How a set was posed.
+  struct Pose {
+    float time;
+    int sh_degree;
+    bool deformed;
+    bool operator==(const Pose&) const = default;
+  };
+
+  void pose_main(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
+  // With the tracer's BVH.
+  void pose_environment(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
   void forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
   // Starts the gradient of the rasterised layers; those that nothing asks for stay empty. faces, mirrors:
   // whether gradients of pseudo-normals and of mirrored rays will be added.
@@ -42,14 +53,14 @@ class Renderer {
 
   RenderOptions options_;
   Frame frame_;
+  std::optional<Pose> main_pose_, environment_pose_;  // of all of the last scene's surfels, in frame_
   deform::Saved main_saved_, environment_saved_;
   raster::SavedPtr raster_saved_ = raster::make_saved();
   trace::BvhPtr bvh_ = trace::make_bvh();
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;
   reflection_map::Saved map_saved_;
-  Tensor<uint8_t> drawn_;               // which posed surfels were drawn
-  Tensor<float> origins_, directions_;  // P×3, the mirrored rays
+  Tensor<uint8_t> drawn_;  // which posed surfels were drawn
 
   raster::OutputGradient grad_raster_;
   raster::InputGradient grad_raster_input_;

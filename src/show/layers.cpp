@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <sstream>
 
+#include "base/parallel.h"
+#include "show/ellipses.h"
+
 namespace traceflow::show {
 
 namespace {
@@ -13,6 +16,14 @@ Tensor<float> divided(Tensor<float> depth, double scale) {
 }
 
 }  // namespace
+
+bool has_colours(Layer layer) {
+  constexpr std::array<Layer, 5> colours = {Layer::rgb, Layer::diffuse, Layer::specular, Layer::normal,
+                                            Layer::surfels};
+  return std::find(colours.begin(), colours.end(), layer) != colours.end();
+}
+
+bool needs_reflections(Layer layer) { return layer == Layer::rgb || layer == Layer::specular; }
 
 std::vector<Layer> parse_layers(const std::string& list) {
   std::vector<Layer> layers;
@@ -55,8 +66,23 @@ Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
       return divided(frame.raster.median_depth.on(Device::cpu), scale);
     case Layer::distortion:
       return frame.raster.distortion.on(Device::cpu);
+    case Layer::surfels:
+      return surfel_ellipses(frame.main, frame.camera, frame.drawn_with);
   }
   return {};
+}
+
+Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph) {
+  require(photograph.shape() == frame.colour.shape(), "photograph and render have one shape",
+          photograph.shape().to_string() + " and " + frame.colour.shape().to_string());
+  Tensor<float> fetched;
+  const Tensor<float>& render = on_host(frame.colour, fetched);
+  Tensor<float> difference(Shape{render.dim(0), render.dim(1)});
+  parallel_for("show: difference", difference.size(), [&](int64_t i) {
+    const Vec3<float> d = abs(load3<float>(photograph.data() + 3 * i) - load3<float>(render.data() + 3 * i));
+    difference[i] = (d.x + d.y + d.z) / 3;
+  });
+  return difference;
 }
 
 }  // namespace traceflow::show

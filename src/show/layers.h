@@ -9,17 +9,27 @@
 namespace traceflow::show {
 
 // The pictures that a frame is made of, as they are named in flags and folders.
-enum class Layer { rgb, diffuse, specular, tint, alpha, normal, depth, median_depth, distortion };
-inline constexpr std::array<const char*, 9> layer_names = {
-    "rgb", "diffuse", "specular", "tint", "alpha", "normal", "depth", "median-depth", "distortion"};
+enum class Layer { rgb, diffuse, specular, tint, alpha, normal, depth, median_depth, distortion, surfels };
+inline constexpr std::array<const char*, 10> layer_names = {
+    "rgb",    "diffuse", "specular",     "tint",       "alpha",
+    "normal", "depth",   "median-depth", "distortion", "surfels"};
 inline const char* to_string(Layer layer) { return layer_names[static_cast<size_t>(layer)]; }
+
+// Whether a layer's numbers are colours or normals (H×W×3), not one number a pixel.
+bool has_colours(Layer layer);
+// Whether a layer needs reflections to be traced, so that a frame for others can do without.
+bool needs_reflections(Layer layer);
 
 // "rgb,normal" → layers, each once, in the order given; "all" is all of them. Throws InputError.
 std::vector<Layer> parse_layers(const std::string& list);
 
 // The layer's numbers, H×W or H×W×3: colours; α_spec; alpha; normals in world axes as blended, not
 // renormalised; depths along the camera's z in units of 1/`scale` scene units, so that the capture's scale
-// gives the capture's units. On the host, wherever the frame is.
+// gives the capture's units; every surfel as an ellipse (show/ellipses.h). On the host, wherever the frame
+// is.
 Tensor<float> layer_values(const Frame& frame, Layer layer, double scale);
+
+// H×W: |photograph − render|, the mean of the three channels. The photograph is H×W×3 on the host.
+Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph);
 
 }  // namespace traceflow::show

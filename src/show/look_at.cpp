@@ -1,5 +1,6 @@
 #include "show/look_at.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace traceflow::show {
@@ -29,24 +30,51 @@ Camera<float> looking(Camera<float> camera, const V& from, const V& forward, con
   return camera;
 }
 
-V point_looked_at(const std::vector<Camera<float>>& cameras, double spread) {
+Aim aim_of(const std::vector<Camera<float>>& cameras) {
+  require(!cameras.empty(), "an aim has cameras to go by");
+  Aim aim;
+  V down(0), forward(0);
+  for (const Camera<float>& c : cameras) {
+    aim.middle += V(c.position) / static_cast<double>(cameras.size());
+    down += axis_of(c, 1);
+    forward += axis_of(c, 2);
+  }
+  for (const Camera<float>& c : cameras)
+    aim.spread = std::max(aim.spread, length(V(c.position) - aim.middle));
+  aim.up = unit(-down, V{0, -1, 0});
+  aim.forward = unit(forward, V{0, 0, 1});
+
   // A little ridge keeps parallel axes solvable.
   Mat3<double> a(1e-6);
-  V middle(0), b(0);
-  for (const Camera<float>& c : cameras) middle += V(c.position) / static_cast<double>(cameras.size());
-  V forward(0);
+  V b(0);
   for (const Camera<float>& c : cameras) {
     const V d = axis_of(c, 2);
     const Mat3<double> project = Mat3<double>(1.0) - outerProduct(d, d);
     a += project;
-    b += project * (V(c.position) - middle);
-    forward += d;
+    b += project * (V(c.position) - aim.middle);
   }
-  const V point = middle + inverse(a) * b;
+  aim.target = aim.middle + inverse(a) * b;
   double ahead = 0;
-  for (const Camera<float>& c : cameras) ahead += dot(point - V(c.position), axis_of(c, 2));
-  if (ahead > 0 && std::isfinite(ahead)) return point;
-  return middle + unit(forward, V{0, 0, 1}) * spread;
+  for (const Camera<float>& c : cameras) ahead += dot(aim.target - V(c.position), axis_of(c, 2));
+  if (!(ahead > 0) || !std::isfinite(ahead)) aim.target = aim.middle + aim.spread * aim.forward;
+  return aim;
+}
+
+V median_point(const Tensor<float>& points) {
+  V median(0);
+  if (points.empty()) return median;
+  std::vector<float> values;
+  for (int axis = 0; axis < 3; ++axis) {
+    values.clear();
+    for (int64_t i = 0; i < points.dim(0); ++i) {
+      if (std::isfinite(points(i, axis))) values.push_back(points(i, axis));
+    }
+    if (values.empty()) continue;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    median[axis] = *middle;
+  }
+  return median;
 }
 
 }  // namespace traceflow::show

@@ -24,16 +24,10 @@ struct Circle {
 };
 
 Circle circle_from(const std::vector<Camera<float>>& cameras) {
-  V middle(0), down(0);
-  for (const Camera<float>& c : cameras) {
-    middle += V(c.position) / static_cast<double>(cameras.size());
-    down += axis_of(c, 1);
-  }
-  double spread = 0;
-  for (const Camera<float>& c : cameras) spread = std::max(spread, length(V(c.position) - middle));
+  const Aim aim = aim_of(cameras);
   Circle circle;
-  circle.up = unit(-down, V{0, -1, 0});
-  circle.target = point_looked_at(cameras, std::max(1.0, spread));
+  circle.up = aim.up;
+  circle.target = aim.target;
 
   double radius = 0, height = 0;
   for (const Camera<float>& c : cameras) {
@@ -44,7 +38,7 @@ Circle circle_from(const std::vector<Camera<float>>& cameras) {
   }
   circle.radius = std::max(radius, 1e-6);
   circle.height = height;
-  const V mean_offset = middle - circle.target;
+  const V mean_offset = aim.middle - circle.target;
   circle.start = unit(mean_offset - dot(mean_offset, circle.up) * circle.up, perpendicular(circle.up));
 
   const V side = cross(circle.up, circle.start);
@@ -76,23 +70,6 @@ std::vector<Shot> path(const Camera<float>& like, const Circle& circle, int fram
   return shots;
 }
 
-// Middle value per axis, which a few strays do not move.
-V median_point(const Tensor<float>& points) {
-  V median(0);
-  std::vector<float> values;
-  for (int axis = 0; axis < 3; ++axis) {
-    values.clear();
-    for (int64_t i = 0; i < points.dim(0); ++i) {
-      if (std::isfinite(points(i, axis))) values.push_back(points(i, axis));
-    }
-    if (values.empty()) continue;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
-  }
-  return median;
-}
-
 }  // namespace
 
 std::vector<Shot> orbit_around_cameras(const std::vector<Camera<float>>& cameras, int frames) {
@@ -102,7 +79,7 @@ std::vector<Shot> orbit_around_cameras(const std::vector<Camera<float>>& cameras
 
 std::vector<Shot> orbit_around_points(const Tensor<float>& points, int width, int height, int frames) {
   Circle circle;
-  circle.target = points.empty() ? V(0) : median_point(points);
+  circle.target = median_point(points);
   std::vector<double> distances;
   for (int64_t i = 0; i < (points.empty() ? 0 : points.dim(0)); ++i) {
     const double d = length(load3<double>(points.row(i)) - circle.target);

@@ -1,9 +1,9 @@
 #include "show/picture.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "base/parallel.h"
 #include "files/png.h"
 
 namespace traceflow::show {
@@ -30,25 +30,12 @@ Tensor<float> halved(const Tensor<float>& normal) {
 
 }  // namespace
 
-Vec3<float> ramp_colour(float value) {
-  constexpr std::array<std::array<float, 3>, 6> stops = {{{0.18F, 0.06F, 0.30F},
-                                                          {0.20F, 0.22F, 0.53F},
-                                                          {0.12F, 0.44F, 0.56F},
-                                                          {0.16F, 0.63F, 0.50F},
-                                                          {0.52F, 0.80F, 0.32F},
-                                                          {0.98F, 0.93F, 0.42F}}};
-  const float place = std::clamp(value, 0.0F, 1.0F) * 5;
-  const auto low = std::min<size_t>(4, static_cast<size_t>(place));
-  return mix(load3<float>(stops[low].data()), load3<float>(stops[low + 1].data()),
-             place - static_cast<float>(low));
-}
-
-Painter::Range Painter::range_of(const Tensor<float>& values) {
+std::optional<Painter::Range> Painter::range_of(const Tensor<float>& values) {
   std::vector<float> seen;
   for (const float v : values.values()) {
     if (shown(v)) seen.push_back(v);
   }
-  if (seen.empty()) return {0, 1};
+  if (seen.empty()) return std::nullopt;
   // Two percent at either end are left to be clamped: a single stray hit would take the whole range.
   const auto at = [&](size_t percent) {
     const auto place = seen.begin() + static_cast<std::ptrdiff_t>(((seen.size() - 1) * percent + 50) / 100);
@@ -56,15 +43,32 @@ Painter::Range Painter::range_of(const Tensor<float>& values) {
     return *place;
   };
   const float low = at(2), high = at(98);
-  return {low, high > low ? high : low + 1};
+  return Range{low, high > low ? high : low + 1};
 }
 
-Tensor<uint8_t> Painter::ramp(const Tensor<float>& values, Range range) {
-  Tensor<float> colours(Shape{values.dim(0), values.dim(1), 3});
-  for (int64_t i = 0; i < values.size(); ++i) {
-    if (shown(values[i]))
-      store3(colours.data() + 3 * i, ramp_colour((values[i] - range.low) / (range.high - range.low)));
+Painter::Range Painter::followed(std::optional<Range>& range, const Tensor<float>& values) const {
+  if (range && options_.follow <= 0) return *range;
+  const std::optional<Range> own = range_of(values);
+  if (!range) {
+    // A picture without any values says nothing of the next ones, unless these must not differ.
+    if (!own && options_.follow > 0) return {0, 1};
+    range = own.value_or(Range{0, 1});
+  } else if (own) {
+    const float share = std::min(options_.follow, 1.0F);
+    range->low = std::lerp(range->low, own->low, share);
+    range->high = std::lerp(range->high, own->high, share);
   }
+  return *range;
+}
+
+Tensor<uint8_t> Painter::mapped(const Tensor<float>& values, Range range, bool zero_is_none) const {
+  const ColourMap map = options_.map.value_or(ColourMap::ramp);
+  Tensor<float> colours(Shape{values.dim(0), values.dim(1), 3});
+  parallel_for("show: map numbers to colours", values.size(), [&](int64_t i) {
+    const bool none = !std::isfinite(values[i]) || (zero_is_none && values[i] == 0);
+    if (!none)
+      store3(colours.data() + 3 * i, map_colour(map, (values[i] - range.low) / (range.high - range.low)));
+  });
   return to_8bit(colours);
 }
 
@@ -75,15 +79,28 @@ Tensor<uint8_t> Painter::paint(Layer layer, const Tensor<float>& values) {
     case Layer::depth:
     case Layer::median_depth: {
       const Tensor<float> nearness = inverse(values);
-      if (!inverse_depth_) inverse_depth_ = range_of(nearness);
-      return ramp(nearness, *inverse_depth_);
+      return mapped(nearness, followed(inverse_depth_, nearness), true);
     }
     case Layer::distortion:
-      if (!distortion_) distortion_ = range_of(values);
-      return ramp(values, *distortion_);
-    default:
-      return to_8bit(values);
+      return mapped(values, followed(distortion_, values), true);
+    case Layer::tint:
+    case Layer::alpha:
+      return options_.map ? mapped(values, {0, 1}, false) : to_8bit(values);
+    case Layer::rgb:
+    case Layer::diffuse:
+    case Layer::specular:
+    case Layer::surfels:
+      break;
   }
+  if (options_.exposure == 0) return to_8bit(values);
+  Tensor<float> exposed = values;
+  const float gain = std::exp2(options_.exposure);
+  for (float& v : exposed.values()) v *= gain;
+  return to_8bit(exposed);
+}
+
+Tensor<uint8_t> Painter::paint_difference(const Tensor<float>& values) const {
+  return mapped(values, {0, 0.25F / std::exp2(options_.exposure)}, false);
 }
 
 Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width) {

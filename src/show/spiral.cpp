@@ -33,18 +33,10 @@ double reach_along(const std::vector<Camera<float>>& cameras, const V& middle, c
 
 std::vector<Shot> spiral_around_cameras(const std::vector<Camera<float>>& cameras, int frames) {
   require(!cameras.empty(), "a spiral has cameras to go by");
-  V middle(0), down(0), forward(0);
-  for (const Camera<float>& c : cameras) {
-    middle += V(c.position) / static_cast<double>(cameras.size());
-    down += axis_of(c, 1);
-    forward += axis_of(c, 2);
-  }
-  double spread = 0;
-  for (const Camera<float>& c : cameras) spread = std::max(spread, length(V(c.position) - middle));
-  const V z = unit(forward, V{0, 0, 1}), up = unit(-down, V{0, -1, 0});
+  const Aim aim = aim_of(cameras);
+  const V middle = aim.middle, z = aim.forward, up = aim.up;
   const V x = unit(cross(z, up), perpendicular(z)), y = cross(z, x);
-  const V target = point_looked_at(cameras, std::max(1.0, spread));
-  const double distance = length(target - middle);
+  const double distance = length(aim.target - middle);
   const double wide = std::max(reach_along(cameras, middle, x), least_share * distance);
   const double high = std::max(reach_along(cameras, middle, y), least_share * distance);
   // Never through what is looked at.
@@ -55,8 +47,8 @@ std::vector<Shot> spiral_around_cameras(const std::vector<Camera<float>>& camera
     const double angle = 2 * std::numbers::pi * i / frames;
     const V from = middle + wide * std::cos(turns * angle) * x - high * std::sin(turns * angle) * y -
                    deep * std::sin(depth_turns * angle) * z;
-    shots.push_back(
-        {fmt::format("{:05}", i), std::nullopt, looking(cameras.front(), from, unit(target - from, z), up)});
+    shots.push_back({fmt::format("{:05}", i), std::nullopt,
+                     looking(cameras.front(), from, unit(aim.target - from, z), up)});
   }
   return shots;
 }

@@ -80,6 +80,10 @@ Json to_json(const events::Warning& e) {
   return {{"event", "warning"}, {"iteration", e.iteration}, {"text", e.text}};
 }
 
+Json to_json(const events::Paused& e) {
+  return {{"event", "paused"}, {"iteration", e.iteration}, {"paused", e.paused}};
+}
+
 Json to_json(const events::Saved& e) {
   return {{"event", "saved"}, {"iteration", e.iteration}, {"path", e.path.string()}, {"seconds", e.seconds}};
 }

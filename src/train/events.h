@@ -89,6 +89,12 @@ struct Warning {
   std::string text;  // one line
 };
 
+// Somebody who watches has stopped the training for a while, or lets it go on.
+struct Paused {
+  int64_t iteration = 0;
+  bool paused = false;
+};
+
 // The state of the run is on disk.
 struct Saved {
   int64_t iteration = 0;
@@ -117,8 +123,8 @@ struct Finished {
   std::string reason;  // one line where the ending is not `completed`
 };
 
-using Event =
-    std::variant<Started, Step, DensityChanged, PhaseEntered, Evaluated, Warning, Saved, Measured, Finished>;
+using Event = std::variant<Started, Step, DensityChanged, PhaseEntered, Evaluated, Warning, Paused, Saved,
+                           Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
 // Hands every event to every listener, in the order in which they were added.
@@ -132,13 +138,5 @@ class Stream {
  private:
   std::vector<Listener> listeners_;
 };
-
-// For std::visit with one lambda per kind of event: std::visit(Overloaded{[](const Step& s) {…}, …}, event).
-template <class... Visitors>
-struct Overloaded : Visitors... {
-  using Visitors::operator()...;
-};
-template <class... Visitors>
-Overloaded(Visitors...) -> Overloaded<Visitors...>;
 
 }  // namespace traceflow::events

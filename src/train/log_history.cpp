@@ -162,4 +162,10 @@ std::vector<LoggedPhase> phases_of(const std::vector<LoggedEvent>& events) {
   return phases;
 }
 
+std::vector<std::string> lines_of(const std::vector<LoggedEvent>& events) {
+  std::vector<std::string> lines;
+  for (const LoggedEvent& event : events) lines.push_back(event.line);
+  return lines;
+}
+
 }  // namespace traceflow

@@ -28,6 +28,9 @@ std::vector<LoggedEvent> read_log(const std::filesystem::path& path);
 // The events with at most `steps` (2 or more) of the kind "step", spread evenly, first and last among them.
 std::vector<LoggedEvent> thinned(const std::vector<LoggedEvent>& events, size_t steps = 2000);
 
+// Their lines.
+std::vector<std::string> lines_of(const std::vector<LoggedEvent>& events);
+
 // A phase of a run as its log tells it.
 struct LoggedPhase {
   std::string name;

@@ -123,4 +123,16 @@ double Schedule::map_rate(int iteration) const {
   return optimize::log_linear(options_.rates.map, options_.rates.map_end, iteration, options_.iterations);
 }
 
+FrameRequest picture_request(const TrainOptions& options, int64_t iterations) {
+  const Schedule schedule(options);
+  const int last = static_cast<int>(std::max<int64_t>(0, iterations - 1));
+  FrameRequest request;
+  request.sh_degree_main = schedule.sh_degree_main(last);
+  request.sh_degree_environment = schedule.sh_degree_environment(last);
+  request.deform_main = schedule.deforms_main(last);
+  request.deform_environment = schedule.deforms_environment(last);
+  request.specular = schedule.phase(last) != Phase::diffuse;
+  return request;
+}
+
 }  // namespace traceflow

@@ -53,4 +53,8 @@ class Schedule {
   TrainOptions options_;
 };
 
+// The parts of the scene that take part in a picture after so many iterations: those that the last one
+// trained with. A run stopped early has parts that never saw a photograph.
+FrameRequest picture_request(const TrainOptions& options, int64_t iterations);
+
 }  // namespace traceflow

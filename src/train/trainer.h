@@ -56,8 +56,13 @@ class Trainer {
   // One iteration of the loop, without saving; returns the loss.
   LossTerms step();
 
+  // Saves what stands. May be called between two iterations, so by a listener.
+  void save();
+
   events::Stream& stream() { return stream_; }
   const Scene& scene() const { return scene_; }
+  const Capture& capture() const { return capture_; }
+  const TrainOptions& options() const { return options_; }
   int iteration() const { return iteration_; }
 
  private:
@@ -70,7 +75,6 @@ class Trainer {
   void learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done);
   SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
-  void save();
   void tell_start();
   // Tells what was measured up to here, in the phase of the last iteration.
   void tell_measured();

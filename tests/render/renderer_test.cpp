@@ -31,6 +31,112 @@ TEST(Renderer, CullingChangesNoPixel) {
   expect_equal(depth, culled.raster.depth, "depth");
 }
 
+void expect_same_frame(const Frame& found, const Frame& expected) {
+  expect_equal(found.colour, expected.colour, "colour");
+  expect_equal(found.raster.colour, expected.raster.colour, "diffuse");
+  expect_equal(found.raster.tint, expected.raster.tint, "tint");
+  expect_equal(found.raster.normal, expected.raster.normal, "normal");
+  expect_equal(found.raster.depth, expected.raster.depth, "depth");
+  expect_equal(found.raster.distortion, expected.raster.distortion, "distortion");
+  expect_equal(found.main.position, expected.main.position, "main");
+  expect_equal(found.specular_rays, expected.specular_rays, "specular");
+  expect_equal(found.mirrored.distance, expected.mirrored.distance, "distance");
+  expect_equal(found.reach, expected.reach, "reach");
+}
+
+// What a viewer asks for, one after another: every frame is what a renderer without memory makes.
+void expect_reuse_changes_nothing(const Fixture& f) {
+  Renderer reusing(RenderOptions{});
+  FrameRequest request = f.request;
+  const auto look = [&](bool for_backward = false) {
+    SCOPED_TRACE(request.time);
+    const Frame& found = reusing.forward(f.scene, request, for_backward);
+    FrameRequest anew = request;
+    anew.reuse_pose = false;
+    Renderer fresh(RenderOptions{});
+    expect_same_frame(found, fresh.forward(f.scene, anew));
+  };
+  request.reuse_pose = true;
+  look();
+  request.camera.position.x = 0.4F;
+  look();
+  request.time = 0.2F;
+  look();
+  request.specular = false;
+  look();
+  request.time = 0.9F;
+  look();
+  request.specular = true;  // at a time at which the environment was never posed
+  look();
+  request.sh_degree_main = request.sh_degree_environment = 0;
+  look();
+  request.deform_main = request.deform_environment = false;
+  look();
+  request.cull = true;
+  look();
+  request.cull = false;
+  look();
+  look(true);
+  request.camera.position.y = -0.3F;
+  look();
+}
+
+TEST(Renderer, ReusingAPoseChangesNothing) {
+  Fixture f;
+  f.scene.main_reach[0] = 1;
+  expect_reuse_changes_nothing(f);
+  Random random(8);
+  NetworkOptions network;
+  network.width = 16;
+  network.depth = 2;
+  network.skip = 0;
+  f.scene.environment_field = make_field(network, residual::environment_outputs, random);
+  for (float& v : f.scene.environment_field->head_weight.values())
+    v = 0.05F * static_cast<float>(random.normal());
+  expect_reuse_changes_nothing(f);
+  f.scene.main_field.reset();
+  expect_reuse_changes_nothing(f);
+}
+
+TEST(Renderer, ReusingAPoseLeavesGradientsWhole) {
+  Fixture f;
+  f.request.reuse_pose = true;
+  Renderer looked(RenderOptions{}), fresh(RenderOptions{});
+  FrameRequest before = f.request;
+  before.time = 0.1F;
+  looked.forward(f.scene, before, true);
+  looked.forward(f.scene, f.request);
+  const auto gradient_of = [&](Renderer& renderer) {
+    const Frame& frame = renderer.forward(f.scene, f.request, true);
+    FrameGradient grad_frame;
+    grad_frame.colour.reset(frame.colour.shape());
+    grad_frame.colour.fill(1);
+    SceneGradient gradient;
+    gradient.reset(f.scene);
+    renderer.backward(f.scene, f.request, Trainable{}, grad_frame, gradient);
+    return gradient.main_field.head_weight;
+  };
+  expect_equal(gradient_of(looked), gradient_of(fresh), "field");
+}
+
+TEST(Renderer, APoseIsReusedOnlyWhereAskedFor) {
+  Fixture f;
+  Renderer renderer(RenderOptions{});
+  renderer.forward(f.scene, f.request);
+  f.scene.main.sh.fill(1);
+  f.scene.environment.sh.fill(2);
+  FrameRequest reuse = f.request;
+  reuse.reuse_pose = true;
+  Renderer fresh(RenderOptions{});
+  const Tensor<float> expected = fresh.forward(f.scene, f.request).colour;
+  EXPECT_NE(renderer.forward(f.scene, reuse).colour[3000], expected[3000]) << "the promise was broken";
+  // A frame without reflections in between, of another scene, leaves nothing of the first one's.
+  FrameRequest diffuse = f.request;
+  diffuse.specular = false;
+  renderer.forward(f.scene, diffuse);
+  expect_equal(renderer.forward(f.scene, reuse).colour, expected, "colour");
+}
+
 TEST(Renderer, TheReachGrowsAtOnceAndShrinksSlowly) {
   float found = 2, reach = 1;
   const FollowReach follow{&found, &reach};

@@ -78,6 +78,9 @@ Frame render(const Subject& subject, const Camera<float>& camera, float time) {
   request.time = time;
   const Frame& frame = renderer.forward(subject.scene, request);
   Frame copy;
+  copy.camera = frame.camera;
+  copy.drawn_with = frame.drawn_with;
+  copy.main = frame.main;
   copy.colour = frame.colour;
   copy.raster = frame.raster;
   copy.traced = frame.traced;

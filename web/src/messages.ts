@@ -262,6 +262,7 @@ export type TrainingEvent =
   | { event: 'phase_entered'; iteration: number; phase: string }
   | { event: 'evaluated'; iteration: number; split: string; views: number; psnr: number; ssim: number; seconds: number }
   | { event: 'warning'; iteration: number; text: string }
+  | { event: 'paused'; iteration: number; paused: boolean }
   | { event: 'saved'; iteration: number; path: string; seconds: number }
   | { event: 'measured'; iteration: number; phase: string; iterations: number; steps: OpTime[] }
   | {

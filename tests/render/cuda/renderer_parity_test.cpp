@@ -45,6 +45,22 @@ void expect_same_frames(const Frame& found, const Frame& expected) {
   EXPECT_EQ(list_of(found.subset.on(Device::cpu)), list_of(expected.subset));
 }
 
+TEST_F(RendererOnDevice, ReusesAPose) {
+  Fixture f;
+  const Scene placed = on_device(f.scene);
+  Renderer on_cpu(RenderOptions{}), on_cuda(RenderOptions{});
+  on_cuda.forward(placed, f.request);
+  f.request.camera.position.x = 0.3F;
+  const Frame& expected = on_cpu.forward(f.scene, f.request);
+  f.request.reuse_pose = true;
+  const Frame& found = on_cuda.forward(placed, f.request);
+  expect_same_frames(found, expected);
+  ASSERT_EQ(found.mirrored.distance.size(), found.traced.pixel.size());
+  if (found.traced.pixel.size() == expected.traced.pixel.size()) {
+    EXPECT_LE(share_beyond(found.mirrored.distance, expected.mirrored.distance, 1e-3), 1e-2);
+  }
+}
+
 TEST_F(RendererOnDevice, FramesAgreeWithTheCpu) {
   Fixture f;
   const Scene placed = on_device(f.scene);

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+
+#include "math/types.h"
+
+// What a page asks for, as it comes over the WebSocket (docs/view.md, web/src/messages.ts). Lengths and axes
+// are the capture's own: camera axes x right, y down, z forward.
+namespace traceflow::serve {
+
+// A camera that anybody can place: square pixels, the principal point in the middle.
+struct FreeCamera {
+  Vec3<double> position{0};
+  Mat3<double> world_from_camera{1};
+  double fov_y = 45;  // whole vertical angle, degrees
+};
+
+// One of the capture's views.
+struct PhotoRef {
+  bool test = false;  // of the test split, else of the training one
+  int64_t index = 0;
+  bool operator==(const PhotoRef&) const = default;
+};
+
+// What to show from now on.
+struct Look {
+  int64_t id = 0;
+  std::variant<FreeCamera, PhotoRef> camera;
+  float time = 0;             // 0 to 1
+  int width = 0, height = 0;  // pixels wanted when nothing moves
+  std::string layer = "rgb";
+  float exposure = 0;  // stops
+  std::string map = "viridis";
+  bool moving = false;  // the next Look is about to come
+};
+
+// Nobody looks: nothing is rendered until the next Look.
+struct Sleep {};
+
+// The page has shown a frame.
+struct Seen {
+  int64_t frame = 0;
+};
+
+// What the ray through a point of the last Look's picture meets; x and y from 0 (left, top) to 1.
+struct Probe {
+  int64_t id = 0;
+  double x = 0, y = 0;
+};
+
+// The last Look as a PNG.
+struct Still {
+  int64_t id = 0;
+  int width = 0, height = 0;
+};
+
+// A photograph, at most so many pixels wide.
+struct Photo {
+  PhotoRef photo;
+  int width = 0;
+};
+
+// The cameras along a camera path.
+struct Path {
+  int64_t id = 0;
+  std::string path;  // JSON text, as in the file that `render --camera-path` takes
+};
+
+enum class Do { pause, resume, save, stop };
+struct Command {
+  Do what = Do::pause;
+};
+
+using Request = std::variant<Look, Sleep, Seen, Probe, Still, Photo, Path, Command>;
+
+// Throws InputError naming the field, for text that is not JSON, is of no known type, lacks a field, or holds
+// values out of their range.
+Request parse_request(std::string_view text);
+
+}  // namespace traceflow::serve

@@ -1,0 +1,138 @@
+#include "serve/live_view.h"
+
+#include "train/event_log.h"
+
+namespace traceflow::serve {
+
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto between_events = 200ms;
+constexpr auto refresh = 500ms;
+constexpr auto nap = 100ms;
+// So much is saved up while nobody looks: enough for the first pictures of somebody who comes.
+constexpr double most_credit = 1;
+
+double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
+
+}  // namespace
+
+void ViewOptions::validate() const {
+  check_option(share > 0 && share < 1, "view-share", share, "above 0 and under 1");
+}
+
+LiveView::LiveView(const ViewOptions& options, Setting setting, TrainingHooks hooks)
+    : options_(options),
+      hooks_(std::move(hooks)),
+      audience_([this](Do what) { command(what); }),
+      projector_(audience_, std::move(setting)),
+      returned_(Clock::now()) {}
+
+void LiveView::command(Do what) {
+  switch (what) {
+    case Do::pause:
+      pause_ = true;
+      break;
+    case Do::resume:
+      pause_ = false;
+      break;
+    case Do::save:
+      save_ = true;
+      break;
+    case Do::stop:
+      if (!*hooks_.stop) stopped_by_page_ = true;
+      *hooks_.stop = true;
+      break;
+  }
+}
+
+void LiveView::operator()(const events::Event& event) {
+  if (const auto* step = std::get_if<events::Step>(&event)) {
+    on_step(*step);
+    return;
+  }
+  unsent_.push_back(to_json_line(event));
+  if (const auto* started = std::get_if<events::Started>(&event)) {
+    state_ = {false,
+              false,
+              started->iteration,
+              started->iterations,
+              started->surfels.main,
+              started->surfels.environment};
+    projector_.greet(hooks_.stage());
+    audience_.set_state(state_);
+    returned_ = Clock::now();
+  }
+  flush_events();
+  if (const auto* finished = std::get_if<events::Finished>(&event)) on_finished(*finished);
+}
+
+void LiveView::on_step(const events::Step& step) {
+  const Clock::time_point now = Clock::now();
+  credit_ = std::min(most_credit, credit_ + seconds(now - returned_) * options_.share / (1 - options_.share));
+  last_step_ = to_json_line(step);
+  state_.iteration = step.iteration;
+  state_.main_surfels = step.surfels.main;
+  state_.environment_surfels = step.surfels.environment;
+  if (now - sent_ >= between_events) flush_events();
+
+  audience_.scene_changed(refresh);
+  while (credit_ > 0) {
+    const Clock::time_point start = Clock::now();
+    if (!serve()) break;
+    credit_ -= seconds(Clock::now() - start);
+  }
+  projector_.scene_changed(hooks_.stage().scene.device());
+  if (save_.exchange(false)) hooks_.save();
+  if (pause_) serve_while_paused();
+  returned_ = Clock::now();
+}
+
+void LiveView::serve_while_paused() {
+  state_.paused = true;
+  hooks_.emit(events::Paused{state_.iteration, true});
+  flush_events();
+  while (pause_ && !*hooks_.stop) {
+    if (save_.exchange(false)) hooks_.save();
+    if (audience_.wait(nap)) serve();
+  }
+  pause_ = false;
+  state_.paused = false;
+  hooks_.emit(events::Paused{state_.iteration, false});
+  flush_events();
+  projector_.scene_changed(hooks_.stage().scene.device());
+}
+
+bool LiveView::serve() {
+  const std::optional<Job> job = audience_.next();
+  if (job) projector_.answer(*job, hooks_.stage());
+  return job.has_value();
+}
+
+void LiveView::flush_events() {
+  if (!last_step_.empty()) unsent_.push_back(std::exchange(last_step_, {}));
+  audience_.tell(unsent_);
+  unsent_.clear();
+  audience_.set_state(state_);
+  sent_ = Clock::now();
+}
+
+void LiveView::on_finished(const events::Finished& finished) {
+  state_.iteration = finished.iteration;
+  state_.over = true;
+  audience_.set_state(state_);
+  audience_.scene_changed({});
+}
+
+bool LiveView::is_wanted() { return audience_.viewers() > 0 && (!*hooks_.stop || stopped_by_page_); }
+
+void LiveView::stay() {
+  // A page that has stopped the training still looks at what came of it.
+  if (stopped_by_page_) *hooks_.stop = false;
+  while (audience_.viewers() > 0 && !*hooks_.stop) {
+    if (audience_.wait(nap)) serve();
+  }
+}
+
+}  // namespace traceflow::serve

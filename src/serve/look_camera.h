@@ -1,0 +1,26 @@
+#pragma once
+
+#include "serve/audience/messages.h"
+#include "serve/stage.h"
+
+namespace traceflow::serve {
+
+// The camera of a Look's picture, in the scene's units, its sides divided by `divisor`. A photograph's camera
+// keeps its shape: the picture is as large as fits into the Look's size. Throws InputError when there is no
+// such photograph.
+Camera<float> camera_of(const Look& look, const Setting& setting, const SceneNormalisation& normalisation,
+                        double divisor = 1);
+
+// The same camera with another number of pixels.
+Camera<float> resized(Camera<float> camera, int width, int height);
+
+// A captured camera. Throws InputError when there is none.
+const CapturedCamera& captured(const PhotoRef& photo, const Setting& setting);
+
+// A camera in the capture's units with its vertical angle; the principal point is taken to the middle.
+FreeCamera free_camera(const Camera<float>& camera, const SceneNormalisation& normalisation);
+
+// Between the scene's units and the capture's.
+Vec3<double> in_capture(const Vec3<double>& in_scene, const SceneNormalisation& normalisation);
+
+}  // namespace traceflow::serve

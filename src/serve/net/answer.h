@@ -1,0 +1,37 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/embedded_file.h"
+#include "serve/net/gate.h"
+
+namespace traceflow::serve {
+
+struct Answer {
+  int status = 200;  // 101: the connection becomes a WebSocket
+  std::string type;  // of the body
+  std::string body;
+  std::vector<std::pair<std::string, std::string>> fields;  // beside those that every answer has
+};
+
+// What a request is answered.
+Answer answer(const Gate& gate, std::span<const EmbeddedFile> page, const Request& request);
+
+// An answer that is one line of plain text.
+Answer plain_answer(int status, std::string words);
+
+// Fields that every answer has: what a browser may do with it.
+std::span<const Field> safety_fields();
+
+struct Form {
+  bool body = true;    // false: the answer to a HEAD
+  bool stays = false;  // the connection may be used again
+};
+
+// The answer as it goes over the wire, in HTTP/1.1.
+std::string wire_text(const Answer& answer, const Form& form);
+
+}  // namespace traceflow::serve

@@ -1,0 +1,84 @@
+// Bytes as what a page says over its live connection, a message in each line: read, kept by the audience, and
+// turned into jobs.
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/overloaded.h"
+#include "fuzz/promise.h"
+#include "serve/audience/audience.h"
+
+using namespace traceflow;
+using fuzz::promise;
+
+namespace {
+
+void check(const serve::Look& look) {
+  promise(look.id >= 0, "a number is not negative");
+  promise(look.width >= 1 && look.width <= 4096 && look.height >= 1 && look.height <= 4096,
+          "a size is in its range");
+  promise(look.time >= 0 && look.time <= 1, "a time is in its range");
+  promise(std::abs(look.exposure) <= 10, "an exposure is in its range");
+  promise(look.layer.size() <= 64 && look.map.size() <= 64, "a word is short");
+  const auto* free = std::get_if<serve::FreeCamera>(&look.camera);
+  if (free == nullptr)
+    return promise(std::get<serve::PhotoRef>(look.camera).index >= 0, "an index is not negative");
+  promise(free->fov_y > 0 && free->fov_y < 180, "an angle is in its range");
+  promise(std::abs(determinant(free->world_from_camera) - 1) < 0.1, "a rotation is one");
+  promise(length(free->position) < 1e17, "a position is finite");
+}
+
+void check(const serve::Request& request) {
+  std::visit(Overloaded{[](const serve::Look& look) { check(look); },
+                        [](const serve::Still& still) {
+                          promise(still.width >= 1 && still.width <= 8192 && still.height >= 1 &&
+                                      still.height <= 8192,
+                                  "a still has a size");
+                        },
+                        [](const serve::Probe& probe) {
+                          promise(probe.x >= 0 && probe.x <= 1 && probe.y >= 0 && probe.y <= 1,
+                                  "a probe is in the picture");
+                        },
+                        [](const auto&) {}},
+             request);
+}
+
+// Every message to a page is JSON, or begins with some.
+void check(const serve::Outgoing& message) {
+  const std::string& bytes = *message.bytes;
+  if (message.binary) {
+    promise(bytes.size() >= 4, "a picture has a header");
+    return;
+  }
+  promise(nlohmann::json::accept(bytes), "what is sent is JSON");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  std::string_view rest(reinterpret_cast<const char*>(data), size);
+  serve::Audience audience([](serve::Do) {});
+  audience.greet_with("{}");
+  audience.enter(1, [](const serve::Outgoing& message) { check(message); });
+  while (!rest.empty()) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+    try {
+      check(serve::parse_request(line));
+    } catch (const InputError&) {
+    }
+    audience.hear(1, line);
+    const auto job = audience.next();
+    if (!job) continue;
+    if (std::holds_alternative<serve::FrameJob>(job->what)) {
+      audience.show_frame(*job, {{"type", "frame"}}, "picture", 100, 0.01);
+    } else {
+      audience.refuse(*job, "not here");
+    }
+  }
+  int jobs = 0;
+  while (audience.next() && jobs < 1000) ++jobs;
+  audience.leave(1);
+  promise(!audience.next(), "nothing is done for who has left");
+  return 0;
+}

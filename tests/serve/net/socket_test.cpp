@@ -1,0 +1,295 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "serve/net/house.h"
+
+namespace traceflow::serve {
+namespace {
+
+using std::chrono::milliseconds;
+
+Outgoing outgoing(std::string text, bool binary = false) {
+  return {std::make_shared<const std::string>(std::move(text)), binary};
+}
+
+// No limit of time but those that a test sets: what else would end a connection must not.
+Limits patient() {
+  Limits limits;
+  limits.request = limits.piece = limits.silence = std::chrono::hours(1);
+  limits.linger = milliseconds(100);
+  return limits;
+}
+
+int close_code(const std::optional<Frame>& frame) {
+  if (!frame || frame->opcode != 8 || frame->payload.size() < 2) return 0;
+  return static_cast<unsigned char>(frame->payload[0]) << 8 | static_cast<unsigned char>(frame->payload[1]);
+}
+
+TEST(Socket, WelcomesThePage) {
+  House house;
+  SocketClient guest = house.guest();
+  ASSERT_TRUE(guest.welcome());
+  EXPECT_EQ(guest.welcome()->status, 101);
+  const auto& fields = guest.welcome()->fields;
+  EXPECT_EQ(fields.at("sec-websocket-accept"), "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=");
+  EXPECT_EQ(fields.at("x-content-type-options"), "nosniff");
+  EXPECT_EQ(fields.at("cache-control"), "no-store");
+  EXPECT_FALSE(fields.contains("sec-websocket-extensions"));
+}
+
+TEST(Socket, WelcomesNobodyElse) {
+  const House house;
+  const std::string host = house.host_line();
+  const std::string origin = house.origin_line();
+  const std::string cookie = house.cookie_line();
+  const auto status = [&](const std::string& lines) {
+    const SocketClient client(house.server.port(), lines);
+    return client.welcome() ? client.welcome()->status : 0;
+  };
+  EXPECT_EQ(status(host + origin), 403);
+  EXPECT_EQ(status(host + cookie), 403);
+  EXPECT_EQ(status(origin + cookie), 400);
+  EXPECT_EQ(status(host + cookie + "Origin: null\r\n"), 403);
+  EXPECT_EQ(status(host + cookie + "Origin: http://evil.example\r\n"), 403);
+  EXPECT_EQ(status(host + cookie + "Origin: http://127.0.0.1\r\n"), 403);
+  EXPECT_EQ(status(host + cookie + origin + origin), 403);
+  EXPECT_EQ(status(host + cookie + origin + "Sec-Fetch-Site: cross-site\r\n"), 403);
+  EXPECT_EQ(status("Host: evil.example\r\n" + origin + cookie), 421);
+  EXPECT_EQ(status(host + origin + cookie + "Content-Length: 3\r\n"), 413);
+  EXPECT_EQ(house.status("GET /ws", host + cookie), 426);
+  EXPECT_EQ(house.status("GET /ws?token=" + house.token, host), 403);
+  const std::string upgrade = "Upgrade: websocket\r\nConnection: Upgrade\r\n";
+  EXPECT_EQ(house.status("GET /", host + origin + cookie + upgrade), 404);
+  EXPECT_EQ(house.status("GET /?token=" + house.token, host + origin + upgrade), 403);
+  // Of the right origin, but not by the protocol.
+  EXPECT_EQ(house.status("GET /ws", host + origin + cookie + upgrade), 400);
+}
+
+TEST(Socket, ARefusedHandshakeHasTheSafetyFieldsToo) {
+  const House house;
+  const auto reply = house.ask("GET /ws", house.host_line() + house.origin_line() + house.cookie_line() +
+                                              "Upgrade: websocket\r\nConnection: Upgrade\r\n");
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->fields.at("cross-origin-resource-policy"), "same-origin");
+}
+
+TEST(Socket, CarriesMessagesBothWays) {
+  House house;
+  SocketClient guest = house.guest();
+  guest.send_text("hello");
+  auto back = guest.message();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->opcode, 1);
+  EXPECT_EQ(back->payload, "hello");
+  house.room.send_to(1)(outgoing(std::string("\0\1\xFF", 3), true));
+  back = guest.message();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->opcode, 2);
+  EXPECT_EQ(back->payload, std::string("\0\1\xFF", 3));
+  house.room.send_to(1)(outgoing(""));
+  back = guest.message();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->opcode, 1);
+  EXPECT_EQ(back->payload, "");
+}
+
+TEST(Socket, PutsTogetherWhatComesInParts) {
+  House house;
+  SocketClient guest = house.guest();
+  guest.send_frame(1, "one ", false);
+  guest.send_frame(9, "still there?");
+  guest.send_frame(0, "two");
+  const auto pong = guest.frame();
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->opcode, 10);
+  EXPECT_EQ(pong->payload, "still there?");
+  const auto back = guest.message();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->payload, "one two");
+}
+
+TEST(Socket, CarriesBigPictures) {
+  House house;
+  SocketClient guest = house.guest();
+  house.room.wait_entered(1);
+  std::string picture(5'000'001, '\0');
+  for (size_t i = 0; i < picture.size(); ++i) picture[i] = static_cast<char>(i * i >> 3);
+  house.room.send_to(1)(outgoing(picture, true));
+  house.room.send_to(1)(outgoing("after"));
+  auto back = guest.message();
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(back->payload == picture);
+  back = guest.message();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->payload, "after");
+}
+
+TEST(Socket, KeepsTheOrderOfThousandsFromSeveralThreads) {
+  Limits limits = patient();
+  limits.waiting_messages = 100'000;
+  House house(limits);
+  SocketClient guest = house.guest();
+  house.room.wait_entered(1);
+  constexpr int threads = 4;
+  constexpr int count = 2000;
+  std::vector<std::thread> writers;
+  for (int t = 0; t < threads; ++t) {
+    writers.emplace_back([send = house.room.send_to(1), t] {
+      for (int i = 0; i < count; ++i) send(outgoing(std::to_string(t) + " " + std::to_string(i)));
+    });
+  }
+  std::vector<int> next(threads, 0);
+  for (int i = 0; i < threads * count; ++i) {
+    const auto message = guest.message();
+    ASSERT_TRUE(message);
+    const int t = std::stoi(message->payload);
+    EXPECT_EQ(message->payload, std::to_string(t) + " " + std::to_string(next.at(static_cast<size_t>(t))++));
+  }
+  for (std::thread& writer : writers) writer.join();
+}
+
+TEST(Socket, KeepsTheOrderOfWhatItHears) {
+  House house;
+  SocketClient guest = house.guest();
+  constexpr int count = 3000;
+  std::thread writer([&] {
+    for (int i = 0; i < count; ++i) guest.send_text(std::to_string(i));
+  });
+  for (int i = 0; i < count; ++i) {
+    const auto message = guest.message();
+    ASSERT_TRUE(message);
+    EXPECT_EQ(message->payload, std::to_string(i));
+  }
+  writer.join();
+}
+
+TEST(Socket, ClosesWithAReasonWhenTheRoomThrows) {
+  House house;
+  SocketClient other = house.guest();
+  house.room.wait_entered(1);
+  SocketClient guest = house.guest();
+  guest.send_text("throw");
+  const auto farewell = guest.message();
+  EXPECT_EQ(close_code(farewell), 1011);
+  EXPECT_EQ(farewell->payload.substr(2), "asked to throw");
+  house.room.wait_left(1);
+  EXPECT_EQ(house.room.left(), std::vector<uint64_t>{2});
+  other.send_text("the others stay");
+  const auto back = other.message();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->payload, "the others stay");
+}
+
+TEST(Socket, RefusesMessagesThatAreNotText) {
+  House house;
+  SocketClient guest = house.guest();
+  guest.send_frame(2, "bytes");
+  EXPECT_EQ(close_code(guest.message()), 1003);
+  house.room.wait_left(1);
+}
+
+TEST(Socket, RefusesWhatBreaksTheProtocol) {
+  House house(patient());
+  const auto code_after = [&](auto send) {
+    SocketClient guest = house.guest();
+    send(guest);
+    const auto farewell = guest.message();
+    EXPECT_TRUE(guest.client().ends());
+    return close_code(farewell);
+  };
+  EXPECT_EQ(
+      code_after([](SocketClient& c) { c.send_text(std::string(64 << 10, 'x')), c.send_text("throw"); }), 0);
+  EXPECT_EQ(code_after([](SocketClient& c) { c.send_text(std::string((64 << 10) + 1, 'x')); }), 1009);
+  EXPECT_EQ(code_after([](SocketClient& c) { c.send_frame(1, "not masked", true, false); }), 1002);
+  EXPECT_EQ(code_after([](SocketClient& c) { c.send_frame(3, "no such kind"); }), 1002);
+  EXPECT_EQ(code_after([](SocketClient& c) { c.send_frame(0, "goes on with nothing"); }), 1002);
+  EXPECT_EQ(code_after([](SocketClient& c) { c.send_text("\xC0\xAF"); }), 1007);
+  house.room.wait_left(6);
+}
+
+TEST(Socket, AGuestThatClosesHasLeft) {
+  House house;
+  SocketClient guest = house.guest();
+  house.room.wait_entered(1);
+  guest.send_frame(8, std::string("\x03\xE8", 2));
+  EXPECT_EQ(close_code(guest.message()), 1000);
+  EXPECT_TRUE(guest.client().ends());
+  house.room.wait_left(1);
+}
+
+TEST(Socket, AGuestThatVanishesHasLeft) {
+  House house;
+  { const SocketClient guest = house.guest(); }
+  house.room.wait_left(1);
+  house.room.send_to(1)(outgoing("to nobody"));
+  EXPECT_EQ(house.room.left(), std::vector<uint64_t>{1});
+}
+
+TEST(Socket, SendingIsHarmlessWhenTheServerIsGone) {
+  Send send;
+  std::optional<House> house(std::in_place);
+  SocketClient guest = house->guest();
+  house->room.wait_entered(1);
+  send = house->room.send_to(1);
+  std::thread writer([send] {
+    for (int i = 0; i < 20'000; ++i) send(outgoing("to whom it may concern"));
+  });
+  house.reset();
+  writer.join();
+  send(outgoing("to nobody"));
+}
+
+TEST(Socket, DropsAGuestThatDoesNotAnswerPings) {
+  Limits limits = patient();
+  limits.silence = milliseconds(200);
+  House house(limits);
+  SocketClient deaf = house.guest();
+  house.room.wait_left(1);
+  const auto ping = deaf.frame();
+  ASSERT_TRUE(ping);
+  EXPECT_EQ(ping->opcode, 9);
+  EXPECT_TRUE(deaf.client().ends());
+}
+
+TEST(Socket, DropsAGuestThatDoesNotRead) {
+  Limits limits = patient();
+  limits.piece = milliseconds(200);
+  House house(limits);
+  SocketClient idle = house.guest();
+  house.room.wait_entered(1);
+  house.room.send_to(1)(outgoing(std::string(100 << 20, 'x'), true));
+  house.room.wait_left(1);
+}
+
+TEST(Socket, DropsAGuestForWhomTooMuchWaits) {
+  Limits limits = patient();
+  limits.waiting_messages = 10;
+  House house(limits);
+  SocketClient slow = house.guest();
+  house.room.wait_entered(1);
+  const Send send = house.room.send_to(1);
+  // The first is more than the system's buffers hold.
+  send(outgoing(std::string(100 << 20, 'x'), true));
+  for (int i = 0; i < 20; ++i) send(outgoing("more"));
+  house.room.wait_left(1);
+}
+
+TEST(Socket, DropsAHandshakeThatTricklesIn) {
+  Limits limits = patient();
+  limits.request = milliseconds(200);
+  const House house(limits);
+  Client slow(house.server.port());
+  slow.send("GET /ws HTTP/1.1\r\nUpgrade: websocket\r\n" + house.host_line());
+  int bytes = 0;
+  while (bytes < 2000 && slow.send("x")) {
+    std::this_thread::sleep_for(milliseconds(5));
+    ++bytes;
+  }
+  EXPECT_LT(bytes, 2000);
+}
+
+}  // namespace
+}  // namespace traceflow::serve

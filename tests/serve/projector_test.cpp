@@ -1,0 +1,243 @@
+#include "serve/projector.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <numeric>
+#include <set>
+
+#include "files/png.h"
+#include "serve/audience/fake_page.h"
+#include "show/layers.h"
+#include "support/temp_folder.h"
+#include "train/small_run.h"
+
+namespace traceflow::serve {
+namespace {
+
+using nlohmann::json;
+using serve::testing::FakePage;
+using serve::testing::look;
+using serve::testing::Received;
+
+// A page that looks at the scene that a training begins with.
+struct Screening {
+  explicit Screening(const std::string& name)
+      : trainer(make_trainer(small_run(20), name)),
+        projector(audience, make_setting("run", name, &trainer.capture(), trainer.scene().normalisation)),
+        page(audience, 1) {}
+
+  Stage stage() {
+    return {trainer.scene(), trainer.options().render, picture_request(trainer.options(), 20), 7};
+  }
+  void project() {
+    while (const auto job = audience.next()) {
+      projector.answer(*job, stage());
+      page.see_frames();
+    }
+  }
+  // What comes of a message.
+  std::vector<Received> answer(const json& message, const std::string& type) {
+    page.say(message);
+    project();
+    return page.of(type);
+  }
+  // The last Look's pixels.
+  Tensor<uint8_t> still(int width, int height) {
+    const std::string png =
+        answer({{"type", "still"}, {"id", 1}, {"width", width}, {"height", height}}, "still").back().picture;
+    std::ofstream(folder / "still.png", std::ios::binary) << png;
+    return read_png(folder / "still.png");
+  }
+
+  Trainer trainer;
+  Audience audience;
+  Projector projector;
+  FakePage page;
+  TempFolder folder;
+};
+
+json at_photo(int64_t id, const std::string& layer) {
+  json message = look(id);
+  message["photo"] = {{"split", "train"}, {"index", 1}};
+  message["layer"] = layer;
+  return message;
+}
+
+TEST(Projector, GreetsWithWhatThereIsToSee) {
+  Screening s("greets");
+  s.projector.greet(s.stage());
+  const json hello = s.page.of("hello").at(0).json;
+  const Capture& capture = s.trainer.capture();
+  EXPECT_EQ(hello["source"], "run");
+  EXPECT_EQ(hello["capture"], capture.name);
+  EXPECT_EQ(hello["cameras"]["train"].size(), capture.train.size());
+  EXPECT_EQ(hello["cameras"]["test"].size(), capture.test.size());
+  EXPECT_EQ(hello["layers"].back(), json::parse(R"({"name":"difference","kind":"number"})"));
+  EXPECT_EQ(hello["maps"].size(), 5U);
+  // A captured camera in the capture's own units.
+  const View& view = capture.train[1];
+  const Vec3<double> position =
+      Vec3<double>(view.camera.position) / capture.normalisation.scale + capture.normalisation.centre;
+  const json& told = hello["cameras"]["train"][1];
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(told["position"][static_cast<size_t>(axis)].get<double>(), position[axis], 1e-6);
+    // Rows of world_from_camera are columns of camera_from_world.
+    EXPECT_NEAR(told["rotation"][0][static_cast<size_t>(axis)].get<double>(),
+                view.camera.camera_from_world[0][axis], 1e-6);
+  }
+}
+
+TEST(Projector, SendsFramesOfTheSizesThatItNames) {
+  Screening s("sizes");
+  const std::vector<Received> frames = s.answer(look(4), "frame");
+  ASSERT_GE(frames.size(), 2U);
+  const json& last = frames.back().json;
+  EXPECT_EQ(last["look"], 4);
+  EXPECT_EQ(last["width"], 96);
+  EXPECT_EQ(last["height"], 64);
+  EXPECT_EQ(last["final"], true);
+  EXPECT_EQ(last["iteration"], 7);
+  for (const Received& frame : frames) {
+    EXPECT_EQ(frame.picture.substr(0, 3), "\xff\xd8\xff");
+    EXPECT_NEAR(frame.json["width"].get<double>() / frame.json["height"].get<double>(), 1.5, 0.1);
+  }
+}
+
+// A still at a photograph's camera is the picture that the verb render makes of it.
+TEST(Projector, ShowsACapturedCameraAsRenderDoes) {
+  Screening s("captured");
+  s.page.say(at_photo(1, "rgb"));
+  const Camera<float>& camera = s.trainer.capture().train[1].camera;
+  const Tensor<uint8_t> shown = s.still(camera.width, camera.height);
+
+  Renderer renderer(s.trainer.options().render);
+  FrameRequest request = s.stage().request;
+  request.camera = camera;
+  request.time = 0;
+  const Tensor<uint8_t> expected = to_8bit(renderer.forward(s.trainer.scene(), request).colour);
+  ASSERT_EQ(shown.shape(), expected.shape());
+  for (int64_t i = 0; i < shown.size(); ++i) ASSERT_NEAR(shown[i], expected[i], 1) << i;
+}
+
+// The same view through a free camera: a picture does not depend on how its camera was said.
+TEST(Projector, AFreeCameraStandsWhereItIsPut) {
+  Screening s("free");
+  s.projector.greet(s.stage());
+  const Camera<float>& camera = s.trainer.capture().train[1].camera;
+  const json told = s.page.of("hello").at(0).json["cameras"]["train"][1];
+  json message = look(1);
+  message["camera"] = {
+      {"position", told["position"]}, {"rotation", told["rotation"]}, {"fov_y", told["fov_y"]}};
+  s.page.say(message);
+  const Tensor<uint8_t> free = s.still(camera.width, camera.height);
+  s.page.say(at_photo(2, "rgb"));
+  const Tensor<uint8_t> captured = s.still(camera.width, camera.height);
+  ASSERT_EQ(free.shape(), captured.shape());
+  for (int64_t i = 0; i < free.size(); ++i) ASSERT_NEAR(free[i], captured[i], 1) << i;
+}
+
+TEST(Projector, EveryLayerIsAPictureOfItsOwn) {
+  Screening s("layers");
+  std::set<std::vector<uint8_t>> pictures;
+  int64_t id = 0;
+  std::vector<std::string> names(show::layer_names.begin(), show::layer_names.end());
+  names.emplace_back("difference");
+  for (const std::string& name : names) {
+    s.page.say(at_photo(++id, name));
+    const Tensor<uint8_t> picture = s.still(40, 24);
+    EXPECT_TRUE(pictures.insert({picture.data(), picture.data() + picture.size()}).second) << name;
+  }
+  EXPECT_TRUE(s.page.of("refused").empty());
+}
+
+TEST(Projector, ExposureAndMapsChangeThePicture) {
+  Screening s("exposure");
+  const auto picture_with = [&](const char* layer, double exposure, const char* map) {
+    json message = at_photo(static_cast<int64_t>(s.page.all().size()), layer);
+    message["exposure"] = exposure;
+    message["map"] = map;
+    s.page.say(message);
+    const Tensor<uint8_t> picture = s.still(40, 24);
+    return std::vector<uint8_t>(picture.data(), picture.data() + picture.size());
+  };
+  const auto sum = [](const std::vector<uint8_t>& v) {
+    return std::accumulate(v.begin(), v.end(), int64_t{0});
+  };
+  EXPECT_GT(sum(picture_with("rgb", 1, "grey")), sum(picture_with("rgb", 0, "grey")));
+  EXPECT_EQ(picture_with("rgb", 0, "turbo"), picture_with("rgb", 0, "grey"));
+  EXPECT_NE(picture_with("depth", 0, "turbo"), picture_with("depth", 0, "grey"));
+}
+
+TEST(Projector, SendsPhotographs) {
+  Screening s("photographs");
+  const Received photo =
+      s.answer({{"type", "photo"}, {"split", "test"}, {"index", 0}, {"width", 20}}, "photo").at(0);
+  EXPECT_EQ(photo.json["split"], "test");
+  EXPECT_EQ(photo.json["width"], 20);
+  EXPECT_EQ(photo.json["height"], 12);
+  EXPECT_EQ(photo.picture.substr(0, 3), "\xff\xd8\xff");
+  // Never larger than it is.
+  EXPECT_EQ(s.answer({{"type", "photo"}, {"split", "test"}, {"index", 0}, {"width", 4000}}, "photo")
+                .back()
+                .json["width"],
+            40);
+}
+
+TEST(Projector, SaysWhatARayMeets) {
+  Screening s("probes");
+  s.page.say(at_photo(1, "rgb"));
+  const json found = s.answer({{"type", "probe"}, {"id", 3}, {"x", 0.5}, {"y", 0.6}}, "probe").at(0).json;
+  EXPECT_EQ(found["id"], 3);
+  ASSERT_EQ(found["hit"], true);
+  // The point lies on the pixel's ray: it is `depth` away along the camera's z.
+  const View& view = s.trainer.capture().train[1];
+  const SceneNormalisation& n = s.trainer.capture().normalisation;
+  Vec3<double> surface;
+  for (int axis = 0; axis < 3; ++axis) surface[axis] = found["surface"][static_cast<size_t>(axis)];
+  const Vec3<float> in_camera = view.camera.point_in_camera(Vec3<float>((surface - n.centre) * n.scale));
+  EXPECT_NEAR(in_camera.z / n.scale, found["depth"].get<double>(), 1e-3 * in_camera.z);
+  const Vec2<float> pixel = view.camera.project(in_camera);
+  EXPECT_NEAR(pixel.x / static_cast<float>(view.camera.width), 0.5, 1.0 / view.camera.width);
+  EXPECT_NEAR(pixel.y / static_cast<float>(view.camera.height), 0.6, 1.0 / view.camera.height);
+}
+
+TEST(Projector, SaysInWordsWhatItCannotShow) {
+  Screening s("refuses");
+  json no_layer = look(1);
+  no_layer["layer"] = "smell";
+  EXPECT_THAT(s.answer(no_layer, "refused").back().json["text"].get<std::string>(),
+              ::testing::HasSubstr("smell"));
+  json no_map = look(2);
+  no_map["map"] = "rainbow";
+  EXPECT_EQ(s.answer(no_map, "refused").size(), 2U);
+  json no_photo = look(3);
+  no_photo["layer"] = "difference";
+  EXPECT_EQ(s.answer(no_photo, "refused").size(), 3U);
+  json no_view = look(4);
+  no_view["photo"] = {{"split", "test"}, {"index", 999}};
+  EXPECT_EQ(s.answer(no_view, "refused").size(), 4U);
+  EXPECT_EQ(s.answer({{"type", "photo"}, {"split", "test"}, {"index", 999}, {"width", 9}}, "refused").size(),
+            5U);
+  EXPECT_EQ(s.answer({{"type", "path"}, {"id", 1}, {"path", json::object()}}, "refused").size(), 6U);
+  EXPECT_TRUE(s.page.of("frame").empty());
+}
+
+// Another page's frames do not change what this one sees, nor does having looked before.
+TEST(Projector, RemembersNothingThatChangesAPicture) {
+  Screening s("remembers");
+  s.page.say(at_photo(1, "rgb"));
+  const Tensor<uint8_t> before = s.still(40, 24);
+  FakePage other(s.audience, 2);
+  auto elsewhere = look(1);
+  elsewhere["time"] = 0.7;
+  other.say(elsewhere);
+  s.project();
+  s.page.say(at_photo(2, "rgb"));
+  const Tensor<uint8_t> after = s.still(40, 24);
+  EXPECT_TRUE(std::equal(before.data(), before.data() + before.size(), after.data()));
+}
+
+}  // namespace
+}  // namespace traceflow::serve

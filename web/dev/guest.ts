@@ -1,0 +1,155 @@
+import type { WebSocket } from 'ws';
+import type { Camera, CameraPath, Hello, Look, PathReply, PictureHeader, Reply, Request } from '../src/messages.ts';
+import { between } from '../src/math/flight.ts';
+import { ray_through } from '../src/math/camera.ts';
+import { png } from './png.ts';
+import { probe, render } from './tracer.ts';
+
+interface Host {
+  hello: Hello;
+  slow: number; // ms added to each frame
+  iteration(): number;
+  command(what: 'pause' | 'resume' | 'save' | 'stop'): void;
+}
+
+const steps = [8, 4, 2, 1]; // how many times coarser, one after the other
+
+// One page that is connected.
+export class Guest {
+  private look: Look | null = null;
+  private step = 0;
+  private frame = 0;
+  private seen = 0;
+  private busy = false;
+  private readonly socket: WebSocket;
+  private readonly host: Host;
+
+  constructor(socket: WebSocket, host: Host) {
+    this.socket = socket;
+    this.host = host;
+    socket.on('message', (data: Buffer) => this.hear(JSON.parse(String(data)) as Request));
+  }
+
+  tell(reply: Reply): void {
+    this.socket.send(JSON.stringify(reply));
+  }
+
+  // The scene has changed.
+  refresh(): void {
+    this.step = this.look?.moving ? 0 : 2;
+    this.work();
+  }
+
+  private picture(header: PictureHeader, bytes: Buffer): void {
+    const text = Buffer.from(JSON.stringify(header));
+    const size = Buffer.alloc(4);
+    size.writeUInt32LE(text.length);
+    this.socket.send(Buffer.concat([size, text, bytes]));
+  }
+
+  private hear(request: Request): void {
+    switch (request.type) {
+      case 'look':
+        this.look = request;
+        this.step = 0;
+        return this.work();
+      case 'sleep':
+        this.look = null;
+        return;
+      case 'seen':
+        this.seen = Math.max(this.seen, request.frame);
+        return this.work();
+      case 'command':
+        return this.host.command(request.do);
+      case 'photo': {
+        const view = this.host.hello.cameras[request.split][request.index];
+        if (!view) return this.tell({ type: 'refused', request: 'photo', id: 0, text: 'There is no such photograph.' });
+        const width = Math.min(request.width, view.width);
+        const height = Math.round((width * view.height) / view.width);
+        const wanted = { layer: 'photograph', exposure: 0, map: '' };
+        const { split, index } = request;
+        return void render(view, view.time, width, height, wanted).then((rows) => {
+          if (rows)
+            this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
+        });
+      }
+      case 'probe': {
+        const from = this.camera();
+        if (!this.look || !from) return;
+        const along = ray_through(from, this.look.width / this.look.height, request);
+        return this.tell(probe(from, this.look.time, along, request.id));
+      }
+      case 'still': {
+        const from = this.camera();
+        if (!this.look || !from) return;
+        const { id, width, height } = request;
+        if (width * height > 3e7)
+          return this.tell({
+            type: 'refused',
+            request: 'still',
+            id,
+            text: 'A picture of this size would not fit into memory.',
+          });
+        return void render(from, this.look.time, width, height, this.look).then((rows) => {
+          if (rows) this.picture({ type: 'still', id, width, height, format: 'png' }, png(rows, width, height));
+        });
+      }
+      case 'path':
+        return this.tell({ type: 'path', id: request.id, shots: shots(request.path, this.host.hello) });
+    }
+  }
+
+  private camera(): Camera | undefined {
+    const ref = this.look?.photo;
+    return ref ? this.host.hello.cameras[ref.split][ref.index] : this.look?.camera;
+  }
+
+  private work(): void {
+    if (this.busy || !this.look || this.frame - this.seen >= 2 || this.step >= steps.length) return;
+    this.busy = true;
+    setTimeout(() => {
+      void this.draw().then(() => {
+        this.busy = false;
+        this.work();
+      });
+    }, this.host.slow);
+  }
+
+  private async draw(): Promise<void> {
+    const { look } = this;
+    const from = this.camera();
+    if (!look || !from) return;
+    const coarse = look.moving ? Math.max(2, Math.sqrt((look.width * look.height) / 30000)) : (steps[this.step] ?? 1);
+    const width = Math.max(1, Math.round(look.width / coarse));
+    const height = Math.max(1, Math.round(look.height / coarse));
+    const begin = performance.now();
+    const rows = await render(from, look.time, width, height, look, () => !look.moving && look !== this.look);
+    if (!rows) return;
+    const bytes = png(rows, width, height);
+    this.step = look.moving ? steps.length : this.step + 1;
+    const header = {
+      type: 'frame' as const,
+      frame: ++this.frame,
+      look: look.id,
+      width,
+      height,
+      final: !look.moving && this.step === steps.length,
+      milliseconds: performance.now() - begin,
+      iteration: this.host.iteration(),
+      format: 'jpeg' as const,
+    };
+    this.picture(header, bytes);
+  }
+}
+
+function shots(path: CameraPath, hello: Hello): PathReply['shots'] {
+  const keys = path.closed ? [...path.keyframes, ...path.keyframes.slice(0, 1)] : path.keyframes;
+  return keys.slice(1).flatMap((to, i) => {
+    const from = keys[i] ?? to;
+    const frames = Math.max(1, Math.round(from.seconds * path.fps));
+    return Array.from({ length: frames }, (_, k) => ({
+      camera: between(from, to, hello.target, k / frames),
+      time: from.time + ((to.time - from.time) * k) / frames,
+    }));
+  });
+}

@@ -1,0 +1,38 @@
+import { pause, Visitor } from './visitor.ts';
+
+// What a viewer costs a training: node .build/dev/share.js ADDRESS [SECONDS [ROUNDS]]. Turn about, nobody looks, somebody looks at a
+// picture at rest, and somebody turns the camera without end; prints the iterations a second of each.
+
+const [address = '', seconds = '15', rounds = '4'] = process.argv.slice(2);
+const visitor = await Visitor.enter(address);
+const size = [480, 270] as const;
+
+const kinds = ['nobody', 'at rest', 'moving'] as const;
+const totals = new Map(kinds.map((kind) => [kind, { iterations: 0, seconds: 0, frames: 0 }]));
+for (let round = 0; round < Number(rounds); round++) {
+  for (const kind of kinds) {
+    let turn = 0;
+    visitor.onframe = () => kind === 'moving' && visitor.look((turn += 0.1), ...size, true);
+    if (kind === 'nobody') visitor.say({ type: 'sleep' });
+    else visitor.look(turn, ...size, kind === 'moving');
+    await pause(1000); // what was begun ends, and the state is told
+    const total = totals.get(kind);
+    if (!total) break;
+    const [iteration, frames, start] = [visitor.state?.iteration ?? 0, visitor.frames, performance.now()];
+    await pause(1000 * Number(seconds));
+    total.iterations += (visitor.state?.iteration ?? 0) - iteration;
+    total.frames += visitor.frames - frames;
+    total.seconds += (performance.now() - start) / 1000;
+  }
+}
+const rate = (kind: (typeof kinds)[number]): number => {
+  const total = totals.get(kind);
+  return total ? total.iterations / total.seconds : 0;
+};
+for (const [kind, total] of totals) {
+  const lost = 100 * (1 - rate(kind) / rate('nobody'));
+  console.log(
+    `${kind.padEnd(8)} ${rate(kind).toFixed(2)} iterations/s, ${(total.frames / total.seconds).toFixed(1)} frames/s, ${lost.toFixed(1)} % lost`,
+  );
+}
+visitor.leave();
