@@ -16,7 +16,7 @@ constexpr double line_seconds = 15;
 }  // namespace
 
 std::string frame_line(int64_t done, int64_t frames, double seconds) {
-  const std::string count = fmt::format("{}/{} frames", done, frames);
+  std::string count = fmt::format("{}/{} frames", done, frames);
   if (done <= 0 || !(seconds > 0)) return count;
   const double rate = static_cast<double>(done) / seconds;
   return fmt::format("{}  {:.3g} a second  {} left", count, rate,

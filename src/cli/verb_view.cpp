@@ -28,9 +28,8 @@ float extent_of(const Surfels& surfels, const serve::Setting& setting) {
   return show::extent_seen_from(surfels, shots);
 }
 
-serve::RunView::Shown shown_of(TrainedRun run, Device device) {
-  run.subject.scene.move_to(device);
-  return {std::move(run.subject), run.iterations, run.options.iterations};
+serve::RunView::Shown shown_of(TrainedRun run) {
+  return {std::move(run.subject), run.iterations, run.options.iterations, std::move(run.note)};
 }
 
 // The capture, where there is one: a run can be looked at without its photographs.
@@ -51,6 +50,7 @@ std::optional<Capture> capture_beside(const ViewArguments& a, const std::optiona
 }
 
 void view(const ViewArguments& a, const DeviceArguments& devices, const ServerArguments& where) {
+  serve::RunWatch watch(RunFolder{a.scene});
   LoadedScene loaded = load_scene(a.scene, a.environment);
   Scene& scene = loaded.subject.scene;
   if (!loaded.subject.warning.empty()) fmt::print(stderr, "{}\n", loaded.subject.warning);
@@ -58,17 +58,15 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
   serve::Setting setting = serve::make_setting(loaded.run ? "run" : "ply", run_name(a.scene),
                                                capture ? &*capture : nullptr, scene.normalisation);
   if (!(scene.extent > 0)) scene.extent = extent_of(scene.main, setting);
-  const Device device = devices.choose();
-  scene.move_to(device);
 
   serve::RunView::Shown shown{std::move(loaded.subject)};
   if (loaded.run) {
     shown.iteration = loaded.run->iterations;
     shown.iterations = loaded.run->options.iterations;
+    shown.note = loaded.run->note;
   }
-  serve::RunView view(std::move(setting), std::move(shown));
-  if (loaded.run)
-    view.follow(RunFolder{a.scene}, [&a, device] { return shown_of(read_run(a.scene), device); });
+  serve::RunView view(std::move(setting), std::move(shown), devices.choose());
+  if (loaded.run) view.follow(std::move(watch), [&a] { return shown_of(read_run(a.scene)); });
   const auto server = where.start(view.room());
   view.run(stop_on_signals());
 }

@@ -2,11 +2,13 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 
 #include "serve/audience/audience.h"
 #include "serve/projector.h"
 #include "serve/run_watch.h"
 #include "show/subject.h"
+#include "train/log_tail.h"
 
 namespace traceflow::serve {
 
@@ -19,34 +21,42 @@ class RunView {
     show::Subject subject;
     int64_t iteration = 0;
     int64_t iterations = 0;  // that the run is to have in all; 0 for what is no run
+    std::string note;        // one line when it is not what was saved last; else empty
   };
 
-  RunView(Setting setting, Shown shown);
+  // Takes what is shown to the device. Throws what that throws, here alone.
+  RunView(Setting setting, Shown shown, Device device);
 
   // Whom the server talks to.
   Room& room() { return audience_; }
 
-  // Follows a run: `reread` reads it anew when it has been saved, and throws InputError when that cannot be.
-  void follow(const RunFolder& run, std::function<Shown()> reread);
+  // Follows a run. `reread` reads it anew, to the host, when it has been saved; whatever it throws is told to
+  // the pages, what was read before stays, and it is called again at the next look.
+  void follow(RunWatch watch, std::function<Shown()> reread,
+              Audience::Clock::duration between_looks = std::chrono::seconds(1));
 
   // Until `stop` is set.
   void run(const std::atomic<bool>& stop);
+  // One turn of that: answers one page, when one asks within `nap`, and looks after the run when it is time.
+  void turn(Audience::Clock::duration nap);
 
  private:
   Stage stage() const;
   void take(Shown shown);
-  // Looks at the run's folder, now and then.
+  // A scene for which the device has no memory is shown from the host.
+  void move_to_device();
   void look_after_run();
+  void tell_log();
 
-  Setting setting_;
+  Device device_;
   Shown shown_;
   Audience audience_;
   Projector projector_;
-  RunFolder folder_;
   std::function<Shown()> reread_;
   std::optional<RunWatch> watch_;
+  std::optional<LogTail> log_;
+  Audience::Clock::duration between_looks_ = {};
   Audience::Clock::time_point looked_ = {};
-  std::string trouble_;
 };
 
 }  // namespace traceflow::serve

@@ -2,9 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "scene/run_folder.h"
 
@@ -13,16 +10,19 @@ namespace traceflow::serve {
 // Looks whether a run that is shown goes on: another process may train it, or somebody move it away.
 class RunWatch {
  public:
-  // Takes what is there now for known.
+  // Takes the checkpoint that is there now for read; so make it before reading, lest one be missed that comes
+  // meanwhile.
   explicit RunWatch(RunFolder run);
 
   struct Change {
     bool vanished = false;  // the run's checkpoints are not there
-    bool returned = false;  // they are there again
-    bool saved = false;     // there is another checkpoint than the last time
-    bool logged = false;    // the log has become longer, or another one
+    bool saved = false;     // there is another checkpoint than the one read last
   };
   Change look();
+  // What the last look saw has been read: until this is said, it is another at every look.
+  void accept() { read_ = seen_; }
+
+  const RunFolder& run() const { return run_; }
 
  private:
   // What tells one version of a file from the next.
@@ -34,8 +34,7 @@ class RunWatch {
   static Version version_of(const std::filesystem::path& path);
 
   RunFolder run_;
-  Version checkpoint_, log_;
-  bool gone_ = false;
+  Version seen_, read_;
 };
 
 }  // namespace traceflow::serve

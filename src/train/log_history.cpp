@@ -4,7 +4,6 @@
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
 
 namespace traceflow {
@@ -32,14 +31,6 @@ std::string text_in(const Json& json, const char* key) {
 double number_in(const Json& json, const char* key) {
   const auto found = json.find(key);
   return found != json.end() && found->is_number() ? found->get<double>() : 0;
-}
-
-std::optional<LoggedEvent> event_in(const Json& json) {
-  const auto iteration = json.is_object() ? json.find("iteration") : json.end();
-  if (iteration == json.end() || !iteration->is_number_integer()) return std::nullopt;
-  LoggedEvent event{text_in(json, "event"), iteration->get<int64_t>(), json.dump()};
-  if (event.kind.empty() || event.iteration < 0) return std::nullopt;
-  return event;
 }
 
 // Events so far, of which a later line may take some back.
@@ -97,12 +88,27 @@ void add_measured(const Json& json, double iterations, std::vector<profile::Entr
 
 }  // namespace
 
-std::vector<LoggedEvent> read_log(std::istream& log) {
+std::optional<LoggedEvent> read_event(const std::string& line) {
+  const Json json = parsed(line);
+  const auto iteration = json.is_object() ? json.find("iteration") : json.end();
+  if (iteration == json.end() || !iteration->is_number_integer()) return std::nullopt;
+  LoggedEvent event{text_in(json, "event"), iteration->get<int64_t>(), json.dump()};
+  if (event.kind.empty() || event.iteration < 0) return std::nullopt;
+  return event;
+}
+
+std::vector<LoggedEvent> that_count(std::vector<LoggedEvent> logged) {
   History history;
-  for (std::string line; std::getline(log, line);) {
-    if (auto event = event_in(parsed(line))) history.add(std::move(*event));
-  }
+  for (LoggedEvent& event : logged) history.add(std::move(event));
   return history.take();
+}
+
+std::vector<LoggedEvent> read_log(std::istream& log) {
+  std::vector<LoggedEvent> logged;
+  for (std::string line; std::getline(log, line);) {
+    if (auto event = read_event(line)) logged.push_back(std::move(*event));
+  }
+  return that_count(std::move(logged));
 }
 
 std::vector<LoggedEvent> read_log(const std::filesystem::path& path) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,12 @@ struct LoggedEvent {
   int64_t iteration = 0;
   std::string line;  // without its end
 };
+
+// Nothing for a line that cannot be read.
+std::optional<LoggedEvent> read_event(const std::string& line);
+
+// Of all events that were logged, those that count, in order: see read_log.
+std::vector<LoggedEvent> that_count(std::vector<LoggedEvent> logged);
 
 // The events that count, in order. A log may hold several sessions: a resumed one goes back to its
 // checkpoint, and what came after that is dropped, as are the endings of sessions that were continued and

@@ -130,8 +130,9 @@ RC_GTEST_PROP(LogHistory, sessions_read_as_one, ()) {
 }
 
 RC_GTEST_PROP(LogHistory, thinning_keeps_first_last_and_all_that_is_no_step, ()) {
-  std::vector<LoggedEvent> events;
   const int count = *rc::gen::inRange(0, 400);
+  std::vector<LoggedEvent> events;
+  events.reserve(static_cast<size_t>(count));
   for (int i = 0; i < count; ++i)
     events.push_back({*rc::gen::inRange(0, 3) == 0 ? "saved" : "step", i, std::to_string(i)});
   const auto wanted = static_cast<size_t>(*rc::gen::inRange(2, 60));

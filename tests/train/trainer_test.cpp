@@ -65,7 +65,7 @@ TEST(Trainer, TellsWhereTheTimeWentPhaseByPhase) {
     double inside = 0, training = 0;
     trainer.stream().listen([&](const events::Event& event) {
       EXPECT_EQ(profile::is_on(), profiled);
-      if (std::holds_alternative<events::Saved>(event)) told.push_back("saved");
+      if (std::holds_alternative<events::Saved>(event)) told.emplace_back("saved");
       if (const auto* phase = std::get_if<events::PhaseEntered>(&event)) told.push_back(phase->phase);
       if (const auto* end = std::get_if<events::Finished>(&event)) training = end->seconds;
       const auto* measured = std::get_if<events::Measured>(&event);
