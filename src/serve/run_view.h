@@ -37,8 +37,8 @@ class RunView {
 
   // Until `stop` is set.
   void run(const std::atomic<bool>& stop);
-  // One turn of that: answers one page, when one asks within `nap`, and looks after the run when it is time.
-  void turn(Audience::Clock::duration nap);
+  // One turn of that: answers one page, when one asks within `most`, and looks after the run when it is time.
+  void turn(Audience::Clock::duration most);
 
  private:
   Stage stage() const;
