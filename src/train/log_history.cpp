@@ -170,6 +170,7 @@ std::vector<LoggedPhase> phases_of(const std::vector<LoggedEvent>& events) {
 
 std::vector<std::string> lines_of(const std::vector<LoggedEvent>& events) {
   std::vector<std::string> lines;
+  lines.reserve(events.size());
   for (const LoggedEvent& event : events) lines.push_back(event.line);
   return lines;
 }
