@@ -21,7 +21,7 @@ class RunView {
     show::Subject subject;
     int64_t iteration = 0;
     int64_t iterations = 0;  // that the run is to have in all; 0 for what is no run
-    std::string note{};      // one line when it is not what was saved last; else empty
+    std::string note = {};   // one line when it is not what was saved last; else empty
   };
 
   // Takes what is shown to the device. Throws what that throws, here alone.
@@ -37,8 +37,8 @@ class RunView {
 
   // Until `stop` is set.
   void run(const std::atomic<bool>& stop);
-  // One turn of that: answers one page, when one asks within `nap`, and looks after the run when it is time.
-  void turn(Audience::Clock::duration nap);
+  // One turn of that: answers one page, when one asks within `most`, and looks after the run when it is time.
+  void turn(Audience::Clock::duration most);
 
  private:
   Stage stage() const;
