@@ -101,6 +101,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   fuzz::promise(caller.heard.empty() || end != std::string::npos, "an answer is whole");
   if (end != std::string::npos) fuzz::check_head(std::string_view(caller.heard).substr(0, end + 2), asked);
   fuzz::promise(room.entered == 0 || asked.find(fuzz::token) != std::string_view::npos, "no stranger enters");
+  const bool long_head = asked.substr(0, asked.find("\r\n\r\n")).size() > serve::Limits().header_bytes;
+  fuzz::promise(!long_head || !caller.heard.starts_with("HTTP/1.1 200"), "no long header is read");
   fuzz::promise(!full || caller.heard.empty() || caller.heard.starts_with("HTTP/1.1 503") ||
                     caller.heard.starts_with("HTTP/1.1 4"),
                 "a full house lets nobody in");

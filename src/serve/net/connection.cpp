@@ -23,7 +23,7 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
       : stream_(std::move(stream)),
         common_(common),
         deadline_(stream_.get_executor()),
-        buffer_(2 * common.limits.header_bytes),
+        buffer_(common.limits.header_bytes),
         full_(full) {}
 
   void start() { read(); }
@@ -91,7 +91,7 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
   Stream stream_;
   Common& common_;
   Deadline deadline_;
-  boost::beast::flat_buffer buffer_;
+  boost::beast::flat_buffer buffer_;  // its size is the limit: the parser's own counts the first line apart
   std::optional<Parser> parser_;
   std::string out_;
   Farewell<Connection> farewell_;

@@ -132,6 +132,9 @@ TEST(Server, RefusesWhatIsTooLongOrNotHttp) {
   const std::string lines = house.host_line() + house.cookie_line();
   EXPECT_EQ(house.status("GET /", lines + "X: " + std::string(7000, 'x') + "\r\n"), 200);
   EXPECT_EQ(house.status("GET /", lines + "X: " + std::string(9000, 'x') + "\r\n"), 431);
+  const std::string half(5000, 'x');
+  EXPECT_EQ(house.status("GET /" + half, lines), 404);
+  EXPECT_EQ(house.status("GET /" + half, lines + "X: " + half + "\r\n"), 431);
   EXPECT_EQ(house.status("GET /" + std::string(100'000, 'x'), lines), 431);
   EXPECT_EQ(house.status("no such thing", lines), 400);
   EXPECT_EQ(house.status("GET /", "Host : a b\r\n"), 400);
@@ -201,6 +204,7 @@ TEST(Server, ManyConnectionsAtOnceEndNothing) {
   limits.linger = milliseconds(100);
   const House house(limits);
   std::vector<Client> crowd;
+  crowd.reserve(100);
   for (int i = 0; i < 100; ++i) crowd.emplace_back(house.server.port());
   int ended = 0;
   for (Client& client : crowd) {

@@ -148,6 +148,7 @@ TEST(Socket, KeepsTheOrderOfThousandsFromSeveralThreads) {
   constexpr int threads = 4;
   constexpr int count = 2000;
   std::vector<std::thread> writers;
+  writers.reserve(threads);
   for (int t = 0; t < threads; ++t) {
     writers.emplace_back([send = house.room.send_to(1), t] {
       for (int i = 0; i < count; ++i) send(outgoing(std::to_string(t) + " " + std::to_string(i)));
