@@ -12,7 +12,7 @@
 namespace traceflow::serve::testing {
 
 // What a page has been sent: a message, or the header of a picture with the picture.
-struct Received {
+struct Received {  // NOLINT(bugprone-exception-escape): its JSON is moved without any
   nlohmann::json json;
   std::string picture;
 };

@@ -17,7 +17,7 @@ TEST(History, KeepsAShortRunWhole) {
   History history;
   std::vector<std::string> told;
   for (int64_t i = 1; i <= 100; ++i) told.push_back(step(i));
-  told.push_back(R"({"event":"saved","iteration":100})");
+  told.emplace_back(R"({"event":"saved","iteration":100})");
   for (const std::string& line : told) history.add(line);
   EXPECT_EQ(history.lines(), told);
 }
