@@ -4,7 +4,7 @@
 #include <set>
 
 #include "base/error.h"
-#include "capture/json_file.h"
+#include "files/json_document.h"
 
 namespace traceflow {
 
@@ -115,8 +115,7 @@ void read_times(const std::filesystem::path& folder, CaptureLayout& layout,
 
 void read_scene(const std::filesystem::path& folder, CaptureLayout& layout) {
   const JsonFile scene(folder / "scene.json");
-  const std::vector<double> centre = scene["center"].numbers(3);
-  layout.normalisation.centre = load3<double>(centre.data());
+  layout.normalisation.centre = scene["center"].vector();
   layout.normalisation.scale = scene["scale"].positive();
   if (scene.has("near")) layout.near_plane = scene["near"].number();
   if (scene.has("far")) layout.far_plane = scene["far"].number();

@@ -175,12 +175,8 @@ class Loader {
     camera.centre_x = lens.centre.x / source.factor;
     camera.centre_y = lens.centre.y / source.factor;
     camera.camera_from_world = captured.camera_from_world;
-    camera.position = in_scene(captured.position);
+    camera.position = layout_.normalisation.in_scene(captured.position);
     return {id, static_cast<float>(layout_.time_id.at(id) / last_time_), convert<float>(camera)};
-  }
-
-  Vec3<double> in_scene(const Vec3<double>& x) const {
-    return (x - layout_.normalisation.centre) * layout_.normalisation.scale;
   }
 
   void warn_about_sizes() {
@@ -223,7 +219,7 @@ class Loader {
     std::vector<float> kept;
     kept.reserve(static_cast<size_t>(raw.size()));
     for (int64_t i = 0; i < raw.dim(0); ++i) {
-      const Vec3<float> x(in_scene(load3<double>(raw.row(i))));
+      const Vec3<float> x(layout_.normalisation.in_scene(load3<double>(raw.row(i))));
       if (!std::isfinite(x.x) || !std::isfinite(x.y) || !std::isfinite(x.z)) continue;
       kept.insert(kept.end(), {x.x, x.y, x.z});
     }

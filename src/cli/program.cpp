@@ -9,9 +9,9 @@
 #include "base/parallel.h"
 #include "base/profile.h"
 #include "base/version.h"
-#include "cli/error_boundary.h"
-#include "cli/option_page.h"
-#include "cli/verbs.h"
+#include "cli/arguments/option_page.h"
+#include "cli/terminal/error_boundary.h"
+#include "cli/verbs/verbs.h"
 
 namespace traceflow::cli {
 

@@ -205,8 +205,7 @@ void write_ply(const std::filesystem::path& path, const PlyScene& scene) {
 void undo_normalisation(const SceneNormalisation& normalisation, Surfels& surfels) {
   const auto log_factor = static_cast<float>(std::log(normalisation.scale));
   for (int64_t i = 0; i < surfels.count(); ++i) {
-    store3(surfels.position.row(i),
-           load3<double>(surfels.position.row(i)) / normalisation.scale + normalisation.centre);
+    store3(surfels.position.row(i), normalisation.in_capture(load3<double>(surfels.position.row(i))));
   }
   for (float& log_scale : surfels.log_scale.values()) log_scale -= log_factor;
 }

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string_view>
 
-#include "math/types.h"
 #include "scene/environment_map.h"
 #include "scene/field.h"
+#include "scene/normalisation.h"
 #include "scene/surfels.h"
 
 namespace traceflow {
@@ -16,12 +16,6 @@ enum class Specular { none, environment_gaussians, environment_map };
 constexpr std::array<std::string_view, 3> enum_names(Specular) {
   return {"none", "environment-gaussians", "environment-map"};
 }
-
-// x_in_scene = (x_in_capture - centre) · scale, as scene.json says (method §2); undone on export.
-struct SceneNormalisation {
-  Vec3<double> centre{0};
-  double scale = 1;
-};
 
 // What is reconstructed (method §1): two sets of surfels and a residual field for each, or a cube map in the
 // place of the second set. A field that is absent is F ≡ 0.

@@ -4,10 +4,10 @@
 
 #include "base/version.h"
 #include "serve/look_camera.h"
+#include "show/cameras/look_at.h"
+#include "show/cameras/orbit.h"
 #include "show/colour_map.h"
 #include "show/layers.h"
-#include "show/look_at.h"
-#include "show/orbit.h"
 
 namespace traceflow::serve {
 
@@ -15,8 +15,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json to_json(const CapturedCamera& view, const SceneNormalisation& normalisation) {
-  Json json = to_json(free_camera(view.camera, normalisation));
+Json captured_json(const CapturedCamera& view, const SceneNormalisation& normalisation) {
+  Json json = to_json(viewpoint_of(view.camera, normalisation));
   json["id"] = view.id;
   json["time"] = view.time;
   json["width"] = view.camera.width;
@@ -26,9 +26,9 @@ Json to_json(const CapturedCamera& view, const SceneNormalisation& normalisation
   return json;
 }
 
-Json to_json(const std::vector<CapturedCamera>& views, const SceneNormalisation& normalisation) {
+Json captured_json(const std::vector<CapturedCamera>& views, const SceneNormalisation& normalisation) {
   Json list = Json::array();
-  for (const CapturedCamera& view : views) list.push_back(to_json(view, normalisation));
+  for (const CapturedCamera& view : views) list.push_back(captured_json(view, normalisation));
   return list;
 }
 
@@ -63,7 +63,7 @@ Start start_of(const Stage& stage, const Setting& setting) {
 
 Json to_json(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
 
-Json to_json(const FreeCamera& camera) {
+Json to_json(const Viewpoint& camera) {
   const Mat3<double> rows = transpose(camera.world_from_camera);
   return {{"position", to_json(camera.position)},
           {"rotation", {to_json(rows[0]), to_json(rows[1]), to_json(rows[2])}},
@@ -76,22 +76,22 @@ std::string hello_text(const Stage& stage, const Setting& setting) {
   const Start start = start_of(stage, setting);
   Json maps = Json::array();
   for (const std::string_view name : enum_names(show::ColourMap{})) maps.push_back(std::string(name));
-  const Json hello = {
-      {"type", "hello"},
-      {"version", version()},
-      {"source", setting.source},
-      {"name", setting.name},
-      {"capture", setting.capture != nullptr ? setting.capture->name : ""},
-      {"device", name_of(scene.device())},
-      {"moves", scene.main_field.has_value() || scene.environment_field.has_value()},
-      {"layers", layers(setting.capture != nullptr)},
-      {"maps", std::move(maps)},
-      {"cameras",
-       {{"train", to_json(setting.train, normalisation)}, {"test", to_json(setting.test, normalisation)}}},
-      {"start", to_json(free_camera(start.camera, normalisation))},
-      {"target", to_json(in_capture(start.aim.target, normalisation))},
-      {"up", to_json(start.aim.up)},
-      {"extent", scene.extent / normalisation.scale}};
+  const Json hello = {{"type", "hello"},
+                      {"version", version()},
+                      {"source", setting.source},
+                      {"name", setting.name},
+                      {"capture", setting.capture != nullptr ? setting.capture->name : ""},
+                      {"device", name_of(scene.device())},
+                      {"moves", scene.main_field.has_value() || scene.environment_field.has_value()},
+                      {"layers", layers(setting.capture != nullptr)},
+                      {"maps", std::move(maps)},
+                      {"cameras",
+                       {{"train", captured_json(setting.train, normalisation)},
+                        {"test", captured_json(setting.test, normalisation)}}},
+                      {"start", to_json(viewpoint_of(start.camera, normalisation))},
+                      {"target", to_json(normalisation.in_capture(start.aim.target))},
+                      {"up", to_json(start.aim.up)},
+                      {"extent", scene.extent / normalisation.scale}};
   return hello.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

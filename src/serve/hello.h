@@ -12,7 +12,7 @@ namespace traceflow::serve {
 std::string hello_text(const Stage& stage, const Setting& setting);
 
 // {"position": …, "rotation": rows of world_from_camera, "fov_y": …}.
-nlohmann::ordered_json to_json(const FreeCamera& camera);
+nlohmann::ordered_json to_json(const Viewpoint& camera);
 nlohmann::ordered_json to_json(const Vec3<double>& v);
 
 }  // namespace traceflow::serve

@@ -11,8 +11,6 @@ using namespace std::chrono_literals;
 constexpr auto between_events = 200ms;
 constexpr auto refresh = 500ms;
 constexpr auto nap = 100ms;
-// So much is saved up while nobody looks: enough for the first pictures of somebody who comes.
-constexpr double most_credit = 1, most_debt = 1;
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
@@ -23,10 +21,10 @@ void ViewOptions::validate() const {
 }
 
 LiveView::LiveView(const ViewOptions& options, Setting setting, TrainingHooks hooks)
-    : options_(options),
-      hooks_(std::move(hooks)),
+    : hooks_(std::move(hooks)),
       audience_([this](Do what) { command(what); }),
       projector_(audience_, std::move(setting)),
+      share_(options.share),
       returned_(Clock::now()) {}
 
 void LiveView::command(Do what) {
@@ -71,8 +69,12 @@ void LiveView::operator()(const events::Event& event) {
 }
 
 void LiveView::on_step(const events::Step& step) {
-  const Clock::time_point now = Clock::now();
-  credit_ = std::min(most_credit, credit_ + seconds(now - returned_) * options_.share / (1 - options_.share));
+  Clock::time_point now = Clock::now();
+  share_.trained(seconds(now - returned_));
+  const auto charge = [&] {
+    const Clock::time_point before = std::exchange(now, Clock::now());
+    share_.spent(seconds(now - before));
+  };
   last_step_ = to_json_line(step);
   state_.iteration = step.iteration;
   state_.main_surfels = step.surfels.main;
@@ -80,14 +82,9 @@ void LiveView::on_step(const events::Step& step) {
   if (now - sent_ >= between_events) flush_events();
 
   audience_.scene_changed(refresh);
-  // Whoever moves the camera is served at once, on credit; what only becomes finer or newer waits until there
-  // is time for it.
-  while (credit_ > -most_debt) {
-    const Clock::time_point start = Clock::now();
-    if (!serve({credit_ > 0, credit_ >= most_credit / 2})) break;
-    credit_ -= seconds(Clock::now() - start);
-  }
+  while (share_.is_open() && serve(share_.allowed())) charge();
   projector_.scene_changed(hooks_.stage().scene.device());
+  charge();
   if (save_.exchange(false)) save();
   if (pause_) serve_while_paused();
   returned_ = Clock::now();

@@ -6,6 +6,7 @@
 #include "base/options.h"
 #include "serve/audience/audience.h"
 #include "serve/projector.h"
+#include "serve/time_share.h"
 #include "train/events.h"
 #include "train/log_history.h"
 
@@ -58,7 +59,6 @@ class LiveView {
   void flush_events();
   void command(Do what);
 
-  ViewOptions options_;
   TrainingHooks hooks_;
   Audience audience_;
   Projector projector_;
@@ -67,8 +67,8 @@ class LiveView {
   std::vector<std::string> unsent_;
   std::string last_step_;
   Clock::time_point sent_ = {};
+  TimeShare share_;
   Clock::time_point returned_;
-  double credit_ = 0;  // seconds that pages may take now
 };
 
 }  // namespace traceflow::serve

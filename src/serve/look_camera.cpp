@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace traceflow::serve {
 
@@ -10,23 +9,7 @@ namespace {
 
 int side(double pixels) { return std::max(1, static_cast<int>(std::lround(pixels))); }
 
-Camera<float> placed(const FreeCamera& free, int width, int height, const SceneNormalisation& normalisation) {
-  Camera<double> camera;
-  camera.width = width;
-  camera.height = height;
-  camera.focal_x = camera.focal_y = height / 2.0 / std::tan(free.fov_y * std::numbers::pi / 360);
-  camera.centre_x = width / 2.0;
-  camera.centre_y = height / 2.0;
-  camera.camera_from_world = transpose(free.world_from_camera);
-  camera.position = (free.position - normalisation.centre) * normalisation.scale;
-  return convert<float>(camera);
-}
-
 }  // namespace
-
-Vec3<double> in_capture(const Vec3<double>& in_scene, const SceneNormalisation& normalisation) {
-  return in_scene / normalisation.scale + normalisation.centre;
-}
 
 const CapturedCamera& captured(const PhotoRef& photo, const Setting& setting) {
   const std::vector<CapturedCamera>& split = photo.test ? setting.test : setting.train;
@@ -51,9 +34,8 @@ Camera<float> resized(Camera<float> camera, int width, int height) {
 
 Camera<float> camera_of(const Look& look, const Setting& setting, const SceneNormalisation& normalisation,
                         double divisor) {
-  if (const auto* free = std::get_if<FreeCamera>(&look.camera)) {
-    return placed(*free, side(look.width / divisor), side(look.height / divisor), normalisation);
-  }
+  if (const auto* free = std::get_if<Viewpoint>(&look.camera))
+    return camera_at(*free, side(look.width / divisor), side(look.height / divisor), normalisation);
   const Camera<float>& camera = captured(std::get<PhotoRef>(look.camera), setting).camera;
   double fit = std::min(look.width / static_cast<double>(camera.width),
                         look.height / static_cast<double>(camera.height));
@@ -61,15 +43,6 @@ Camera<float> camera_of(const Look& look, const Setting& setting, const SceneNor
   if (look.layer == "difference") fit = std::min(fit, 1.0);
   fit /= divisor;
   return resized(camera, side(camera.width * fit), side(camera.height * fit));
-}
-
-FreeCamera free_camera(const Camera<float>& camera, const SceneNormalisation& normalisation) {
-  FreeCamera free;
-  free.position = in_capture(Vec3<double>(camera.position), normalisation);
-  free.world_from_camera = transpose(Mat3<double>(camera.camera_from_world));
-  free.fov_y =
-      2 * std::atan(camera.height / (2.0 * static_cast<double>(camera.focal_y))) * 180 / std::numbers::pi;
-  return free;
 }
 
 }  // namespace traceflow::serve

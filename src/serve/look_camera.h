@@ -17,10 +17,4 @@ Camera<float> resized(Camera<float> camera, int width, int height);
 // A captured camera. Throws InputError when there is none.
 const CapturedCamera& captured(const PhotoRef& photo, const Setting& setting);
 
-// A camera in the capture's units with its vertical angle; the principal point is taken to the middle.
-FreeCamera free_camera(const Camera<float>& camera, const SceneNormalisation& normalisation);
-
-// Between the scene's units and the capture's.
-Vec3<double> in_capture(const Vec3<double>& in_scene, const SceneNormalisation& normalisation);
-
 }  // namespace traceflow::serve

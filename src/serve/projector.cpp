@@ -8,7 +8,7 @@
 #include "files/png.h"
 #include "serve/hello.h"
 #include "serve/look_camera.h"
-#include "show/camera_path.h"
+#include "show/cameras/camera_path.h"
 #include "show/probe.h"
 
 namespace traceflow::serve {
@@ -25,8 +25,6 @@ constexpr int64_t most_previewed = 20'000;  // frames of a camera path
 constexpr int photo_quality = 90;
 // How fast the ranges of depth and distortion follow the picture: settled after some ten frames.
 constexpr float follow = 0.25F;
-
-std::string dump(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -209,10 +207,9 @@ void Projector::answer(const Job& job, const Path& path, const Stage& stage) {
   Json shots = Json::array();
   for (const show::Shot& shot : show::shots_of(asked, normalisation)) {
     shots.push_back(
-        {{"camera", to_json(free_camera(shot.camera, normalisation))}, {"time", shot.time.value_or(0.0F)}});
+        {{"camera", to_json(viewpoint_of(shot.camera, normalisation))}, {"time", shot.time.value_or(0.0F)}});
   }
-  audience_.reply(job.guest,
-                  text_message(dump({{"type", "path"}, {"id", path.id}, {"shots", std::move(shots)}})));
+  audience_.reply(job.guest, json_message({{"type", "path"}, {"id", path.id}, {"shots", std::move(shots)}}));
 }
 
 void Projector::answer(const Job& job, const ProbeJob& probe, const Stage& stage) {
@@ -222,7 +219,7 @@ void Projector::answer(const Job& job, const ProbeJob& probe, const Stage& stage
   std::optional<show::ProbeResult> found = show::probe(renderer(stage), stage.scene, request, x, y);
   posed_ = true;
   if (found) found = show::in_capture(*found, stage.scene.normalisation);
-  audience_.reply(job.guest, text_message(dump(to_json(probe.probe.id, found))));
+  audience_.reply(job.guest, json_message(to_json(probe.probe.id, found)));
 }
 
 }  // namespace traceflow::serve

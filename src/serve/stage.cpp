@@ -1,20 +1,16 @@
 #include "serve/stage.h"
 
+#include "scene/viewpoint.h"
+
 namespace traceflow::serve {
 
 namespace {
 
 std::vector<CapturedCamera> cameras_of(const std::vector<View>& views, const SceneNormalisation& capture,
                                        const SceneNormalisation& scene) {
-  const bool same = capture.centre == scene.centre && capture.scale == scene.scale;
   std::vector<CapturedCamera> cameras;
-  for (const View& view : views) {
-    cameras.push_back({view.id, view.time, view.camera});
-    if (same) continue;
-    Vec3<float>& position = cameras.back().camera.position;
-    const Vec3<double> in_capture = Vec3<double>(position) / capture.scale + capture.centre;
-    position = Vec3<float>((in_capture - scene.centre) * scene.scale);
-  }
+  for (const View& view : views)
+    cameras.push_back({view.id, view.time, carried(view.camera, capture, scene)});
   return cameras;
 }
 

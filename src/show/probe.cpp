@@ -65,7 +65,7 @@ std::optional<ProbeResult> probe(Renderer& renderer, const Scene& scene, const F
 
 ProbeResult in_capture(ProbeResult result, const SceneNormalisation& normalisation) {
   const auto place = [&](const Vec3<float>& x) {
-    return Vec3<float>(Vec3<double>(x) / normalisation.scale + normalisation.centre);
+    return Vec3<float>(normalisation.in_capture(Vec3<double>(x)));
   };
   const auto length = [&](float l) { return static_cast<float>(l / normalisation.scale); };
   result.surface = place(result.surface);

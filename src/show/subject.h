@@ -6,7 +6,7 @@
 
 #include "render/renderer.h"
 #include "scene/scene.h"
-#include "show/shot.h"
+#include "show/cameras/shot.h"
 
 namespace traceflow::show {
 

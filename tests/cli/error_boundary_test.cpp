@@ -1,4 +1,4 @@
-#include "cli/error_boundary.h"
+#include "cli/terminal/error_boundary.h"
 
 #include <gtest/gtest.h>
 

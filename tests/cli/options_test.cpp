@@ -6,9 +6,9 @@
 #include <sstream>
 
 #include "base/error.h"
-#include "cli/option_arguments.h"
-#include "cli/option_page.h"
-#include "cli/option_toml.h"
+#include "cli/arguments/option_arguments.h"
+#include "cli/arguments/option_page.h"
+#include "cli/arguments/option_toml.h"
 #include "files/options_json.h"
 #include "support/temp_folder.h"
 #include "train/options.h"

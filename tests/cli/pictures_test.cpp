@@ -5,8 +5,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "cli/error_boundary.h"
 #include "cli/program.h"
+#include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "scene/ply.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "base/parallel.h"
-#include "cli/error_boundary.h"
+#include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
 #include "scene/ply.h"
 

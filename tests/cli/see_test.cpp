@@ -9,9 +9,9 @@
 #include <thread>
 
 #include "capture/synth.h"
-#include "cli/error_boundary.h"
-#include "cli/frame_progress.h"
 #include "cli/program.h"
+#include "cli/terminal/error_boundary.h"
+#include "cli/terminal/frame_progress.h"
 #include "files/png.h"
 
 // `report`, `eval`'s page and the films of `render`, from a run's folder to the files they leave.

@@ -20,7 +20,7 @@ void check(const serve::Look& look) {
   promise(look.time >= 0 && look.time <= 1, "a time is in its range");
   promise(std::abs(look.exposure) <= 10, "an exposure is in its range");
   promise(look.layer.size() <= 64 && look.map.size() <= 64, "a word is short");
-  const auto* free = std::get_if<serve::FreeCamera>(&look.camera);
+  const auto* free = std::get_if<Viewpoint>(&look.camera);
   if (free == nullptr)
     return promise(std::get<serve::PhotoRef>(look.camera).index >= 0, "an index is not negative");
   promise(free->fov_y > 0 && free->fov_y < 180, "an angle is in its range");

@@ -1,4 +1,4 @@
-#include "show/camera_path.h"
+#include "show/cameras/camera_path.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "base/error.h"
 #include "math/rotation.h"
-#include "show/path_curve.h"
+#include "show/cameras/path_curve.h"
 
 namespace traceflow::show {
 namespace {
@@ -225,21 +226,21 @@ TEST(CameraPath, RefusalsNameKeyframeAndField) {
       {"/fps", "0", "fps"},
       {"/fps", "1e300", "fps"},
       {"/closed", "1", "closed"},
-      {"/closed", "true", "keyframe 1, seconds"},
+      {"/closed", "true", "keyframes[1].seconds"},
       {"/keyframes", "[]", "keyframes"},
       {"/keyframes", "{}", "keyframes"},
-      {"/keyframes/1", "7", "keyframe 1"},
-      {"/keyframes/0/position", "[1,2]", "keyframe 0, position"},
-      {"/keyframes/0/position", "[1,2,1e40]", "keyframe 0, position"},
-      {"/keyframes/0/position", "[1,2,null]", "keyframe 0, position"},
-      {"/keyframes/1/rotation", "[[1,0,0],[0,1,0]]", "keyframe 1, rotation"},
-      {"/keyframes/1/rotation", "[[1,0,0],[0,1,0],[0,0,-1]]", "keyframe 1, rotation"},
-      {"/keyframes/1/rotation", "[[1,0,0],[0,2,0],[0,0,1]]", "keyframe 1, rotation"},
-      {"/keyframes/1/rotation", "[[0,0,0],[0,0,0],[0,0,0]]", "keyframe 1, rotation"},
-      {"/keyframes/0/fov_y", "180", "keyframe 0, fov_y"},
-      {"/keyframes/0/time", "-0.1", "keyframe 0, time"},
-      {"/keyframes/0/seconds", "0", "keyframe 0, seconds"},
-      {"/keyframes/0/seconds", "-1", "keyframe 0, seconds"},
+      {"/keyframes/1", "7", "keyframes[1]"},
+      {"/keyframes/0/position", "[1,2]", "keyframes[0].position"},
+      {"/keyframes/0/position", "[1,2,1e40]", "keyframes[0].position"},
+      {"/keyframes/0/position", "[1,2,null]", "keyframes[0].position"},
+      {"/keyframes/1/rotation", "[[1,0,0],[0,1,0]]", "keyframes[1].rotation"},
+      {"/keyframes/1/rotation", "[[1,0,0],[0,1,0],[0,0,-1]]", "keyframes[1].rotation"},
+      {"/keyframes/1/rotation", "[[1,0,0],[0,2,0],[0,0,1]]", "keyframes[1].rotation"},
+      {"/keyframes/1/rotation", "[[0,0,0],[0,0,0],[0,0,0]]", "keyframes[1].rotation"},
+      {"/keyframes/0/fov_y", "180", "keyframes[0].fov_y"},
+      {"/keyframes/0/time", "-0.1", "keyframes[0].time"},
+      {"/keyframes/0/seconds", "0", "keyframes[0].seconds"},
+      {"/keyframes/0/seconds", "-1", "keyframes[0].seconds"},
       {"/keyframes/0/seconds", "100000", "frames"},
   };
   for (const Case& c : cases) {

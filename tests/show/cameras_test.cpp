@@ -7,8 +7,8 @@
 #include <limits>
 #include <numbers>
 
-#include "show/camera_file.h"
-#include "show/orbit.h"
+#include "show/cameras/camera_file.h"
+#include "show/cameras/orbit.h"
 
 namespace traceflow::show {
 namespace {
@@ -83,8 +83,8 @@ TEST_F(CameraFile, BadInputIsRefusedByName) {
       {"", "not JSON"},
       {"{}", "list of cameras"},
       {"[]", "at least one"},
-      {"[3]", "camera 0"},
-      {std::string(100000, '['), "not JSON"},
+      {"[3]", "[0]: found 3, expected an object"},
+      {std::string(100000, '['), "64 deep"},
       {"[" + turned + "," + turned + "]", "second time"},
       {"[" + with(turned, "\"fx\": 50,", "") + "]", "fx"},
       {"[" + with(turned, "\"fx\": 50", "\"fx\": 0") + "]", "fx"},

@@ -1,4 +1,4 @@
-#include "show/spiral.h"
+#include "show/cameras/spiral.h"
 
 #include <gtest/gtest.h>
 

@@ -2,48 +2,19 @@
 
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <functional>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
-#include <variant>
 #include <vector>
 
+#include "serve/audience/guest.h"
 #include "serve/audience/history.h"
-#include "serve/audience/messages.h"
-#include "serve/audience/pacer.h"
-#include "serve/net/room.h"
+#include "serve/audience/replies.h"
 
 namespace traceflow::serve {
-
-// One thing that a page waits for.
-struct FrameJob {
-  Look look;
-  Coarseness coarseness;
-};
-struct ProbeJob {
-  Look look;
-  Probe probe;
-};
-struct StillJob {
-  Look look;
-  Still still;
-};
-struct Job {
-  uint64_t guest = 0;
-  std::variant<FrameJob, ProbeJob, StillJob, Photo, Path> what;
-};
-
-// Which frames may be made now, where time for them is short: those that a page has nothing of yet always
-// may.
-struct Allowed {
-  bool refining = true;    // finer ones of what a page sees
-  bool refreshing = true;  // of a scene that has changed since
-};
 
 // What is told to every page when it changes.
 struct State {
@@ -89,9 +60,8 @@ class Audience : public Room {
   // What came of a job. The header gets the frame's number. seconds: that it took; pixels: of the picture.
   void show_frame(const Job& job, nlohmann::ordered_json header, const std::string& picture, double pixels,
                   double seconds);
-  void reply(uint64_t number, Outgoing message);
-  // A request that could not be answered.
-  void refuse(uint64_t number, const std::string& request, int64_t id, const std::string& why);
+  void reply(uint64_t number, const Outgoing& message);
+  // It could not be done.
   void refuse(const Job& job, const std::string& why);
   // There was no memory for a frame: the page gets coarser ones for a while.
   void no_memory_for(const Job& job);
@@ -102,39 +72,12 @@ class Audience : public Room {
   bool anybody_looks();
 
  private:
-  struct Sent {
-    int64_t frame;
-    double bytes;
-    Clock::time_point when;
-  };
-  struct Guest {
-    Send send;
-    std::optional<Look> look;
-    bool asleep = true;
-    std::deque<std::variant<Probe, Still, Photo, Path>> asked;
-    Pacer pacer;
-    std::deque<Sent> on_their_way;
-    int64_t frames = 0;
-    Clock::time_point served = {};  // when it got its last frame
-    // The finest frame of the present look that was made, and of which state of the scene.
-    double shown_divisor = std::numeric_limits<double>::infinity();
-    bool shown_final = false;
-    int64_t shown_scene = -1;
-    // Where memory ran out: no finer than this, until then; and nothing at all before.
-    double least_divisor = 1;
-    Clock::time_point coarse_until = {}, not_before = {};
-  };
-
-  void refuse_look(uint64_t number, int64_t id, const std::string& why);
-  bool wants_frame(const Guest& guest, const Allowed& allowed, Clock::time_point now) const;
-  Coarseness coarseness_for(const Guest& guest, Clock::time_point now) const;
-  std::optional<Job> ask_of(uint64_t number, Guest& guest);
-  bool has_job(Clock::time_point now);
+  Guest* find(uint64_t number);
+  void send_to_all(const Outgoing& message);
   void answer(Guest& guest, const Request& request);
-  void send_to(Guest& guest, const std::string& text);
-  void send_to_all(const std::string& text);
-  std::string state_text() const;
-  std::string trouble_text() const;
+  Outgoing state_message() const;
+  Outgoing trouble_message() const;
+  bool has_job(Clock::time_point now);
 
   std::function<void(Do)> on_command_;
   std::mutex mutex_;
@@ -144,12 +87,7 @@ class Audience : public Room {
   std::map<std::string, std::string> troubles_;
   State state_;
   History history_;
-  int64_t scene_ = 0;
-  Clock::duration refresh_ = {};
+  SceneState scene_;
 };
-
-// A picture with its header: length of the header (32 bit, little endian), header, picture.
-Outgoing picture_message(const nlohmann::ordered_json& header, const std::string& picture);
-Outgoing text_message(std::string text);
 
 }  // namespace traceflow::serve

@@ -6,18 +6,11 @@
 #include <string_view>
 #include <variant>
 
-#include "math/types.h"
+#include "scene/viewpoint.h"
 
 // What a page asks for, as it comes over the WebSocket (docs/view.md, web/src/messages.ts). Lengths and axes
 // are the capture's own: camera axes x right, y down, z forward.
 namespace traceflow::serve {
-
-// A camera that anybody can place: square pixels, the principal point in the middle.
-struct FreeCamera {
-  Vec3<double> position{0};
-  Mat3<double> world_from_camera{1};
-  double fov_y = 45;  // whole vertical angle, degrees
-};
 
 // One of the capture's views.
 struct PhotoRef {
@@ -29,7 +22,7 @@ struct PhotoRef {
 // What to show from now on.
 struct Look {
   int64_t id = 0;
-  std::variant<FreeCamera, PhotoRef> camera;
+  std::variant<Viewpoint, PhotoRef> camera;
   float time = 0;             // 0 to 1
   int width = 0, height = 0;  // pixels wanted when nothing moves
   std::string layer = "rgb";

@@ -33,6 +33,7 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
     stream_.close(ignored);
     deadline_.clear();
   }
+  bool known() const override { return known_; }
 
  private:
   // One deadline for the whole request, so that trickling bytes gain nothing.
@@ -59,6 +60,7 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
     const Answer reply = answer(common_.gate, common_.page, request);
     if (reply.status == 101) return become_socket();
     const bool goes_on = request.stays && (reply.status == 200 || reply.status == 404);
+    known_ |= reply.status < 400 || reply.status == 404;
     send(reply, {request.method != "HEAD", goes_on});
   }
 
@@ -96,6 +98,7 @@ class Connection final : public Session, public std::enable_shared_from_this<Con
   std::string out_;
   Farewell<Connection> farewell_;
   bool full_;
+  bool known_ = false;
 };
 
 }  // namespace

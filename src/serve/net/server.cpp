@@ -104,8 +104,8 @@ struct Server::State {
     acceptor.async_accept([this](error_code error, auto socket) {
       if (error == asio::error::operation_aborted) return;
       if (error) return accept_later();
+      accept();  // first: greeting may fail
       greet(std::move(socket));
-      accept();
     });
   }
 
@@ -123,12 +123,25 @@ struct Server::State {
     sessions.erase(
         std::remove_if(sessions.begin(), sessions.end(), [](const auto& s) { return s.expired(); }),
         sessions.end());
+    if (sessions.size() >= connections) make_room();
     if (sessions.size() >= connections + spare_connections) return;
     error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
     keep_from_children(socket.native_handle());
     const bool full = sessions.size() >= connections;
     sessions.push_back(start_connection(Stream(std::move(socket)), common, full));
+  }
+
+  // Nobody without the token can keep out who has it: the longest of those waiting makes way.
+  void make_room() {
+    auto& sessions = common.sessions;
+    const auto stranger = std::find_if(sessions.begin(), sessions.end(), [](const auto& s) {
+      const auto alive = s.lock();
+      return alive && !alive->known();
+    });
+    if (stranger == sessions.end()) return;
+    stranger->lock()->end();
+    sessions.erase(stranger);
   }
 
   void run() {

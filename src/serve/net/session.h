@@ -36,6 +36,8 @@ class Session {
   virtual ~Session() = default;
   // Cuts the connection, so that nothing is waited for any more.
   virtual void end() = 0;
+  // Whether whoever is at the other end has shown the token.
+  virtual bool known() const = 0;
 };
 
 // What all connections of a server share. Outlives them.

@@ -61,6 +61,7 @@ class Socket final : public Session, public std::enable_shared_from_this<Socket>
     error_code ignored;
     stream_.next_layer().close(ignored);
   }
+  bool known() const override { return true; }
 
  private:
   void on_accepted(error_code error) {

@@ -5,8 +5,8 @@
 #include <fstream>
 
 #include "capture/synth.h"
-#include "cli/error_boundary.h"
 #include "cli/program.h"
+#include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "support/device.h"

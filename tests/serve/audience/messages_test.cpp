@@ -31,7 +31,7 @@ std::string complaint(const std::string& text) {
 TEST(Messages, ALookIsRead) {
   const Look look = std::get<Look>(parse_request(good_look().dump()));
   EXPECT_EQ(look.id, 7);
-  const FreeCamera& camera = std::get<FreeCamera>(look.camera);
+  const Viewpoint& camera = std::get<Viewpoint>(look.camera);
   EXPECT_EQ(camera.position, Vec3<double>(1, 2, 3));
   // Rows are world_from_camera's: the camera's x axis is the world's y.
   EXPECT_EQ(camera.world_from_camera * Vec3<double>(1, 0, 0), Vec3<double>(0, 1, 0));
@@ -100,7 +100,7 @@ TEST(Messages, WhatIsNoMessageIsRefused) {
         std::string(R"({"type":3})"), std::string(R"({"type":"dance"})"), std::string("\xff\xfe"),
         std::string(R"({"type":"command","do":"sing"})"), "\"" + std::string(60000, 'a') + "\"",
         std::string(30000, '[') + std::string(30000, ']'),
-        R"({"type":"path","id":1,"path":)" + std::string(17, '[') + std::string(17, ']') + "}"}) {
+        R"({"type":"path","id":1,"path":)" + std::string(64, '[') + std::string(64, ']') + "}"}) {
     EXPECT_NE(complaint(text), "") << text.substr(0, 40);
   }
 }

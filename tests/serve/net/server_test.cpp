@@ -199,6 +199,21 @@ TEST(Server, TurnsAwayMoreThanItsConnections) {
   while (house.status("GET /", house.host_line() + house.cookie_line()) != 200) std::this_thread::yield();
 }
 
+TEST(Server, StrangersDoNotKeepOutWhoHasTheToken) {
+  ServerOptions options;
+  options.connections = 4;
+  House house({}, options);
+  SocketClient guest = house.guest();
+  house.room.wait_entered(1);
+  std::vector<Client> strangers;
+  for (int i = 0; i < 20; ++i) strangers.emplace_back(house.server.port());
+  EXPECT_EQ(house.status("GET /", house.host_line() + house.cookie_line()), 200);
+  EXPECT_TRUE(strangers.front().ends());
+  // Who is known is not sent away for them.
+  ASSERT_TRUE(guest.send_text("hello"));
+  EXPECT_TRUE(guest.message());
+}
+
 TEST(Server, ManyConnectionsAtOnceEndNothing) {
   Limits limits;
   limits.linger = milliseconds(100);

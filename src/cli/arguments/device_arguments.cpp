@@ -1,0 +1,57 @@
+#include "cli/arguments/device_arguments.h"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "base/device_memory.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "primitives/products.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+std::string cuda_text() {
+  const cuda::DeviceFacts facts = cuda::facts();
+  return fmt::format("{} ({}.{}), {} of {} MiB free", facts.name, facts.major, facts.minor,
+                     facts.free_bytes >> 20, facts.total_bytes >> 20);
+}
+
+}  // namespace
+
+struct DeviceArguments::State {
+  std::string device = "auto";
+  bool deterministic = false;
+};
+
+DeviceArguments::DeviceArguments(CLI::App& verb) : state_(std::make_shared<State>()) {
+  verb.add_option("--device", state_->device, "auto (CUDA where a device answers), cpu or cuda")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->option_text("DEVICE")
+      ->capture_default_str();
+  verb.add_flag("--deterministic", state_->deterministic,
+                "On CUDA: sums in a fixed order, the same bytes every run, somewhat slower. On the CPU they "
+                "always are");
+}
+
+Device DeviceArguments::choose(bool quiet) const {
+  cuda::set_deterministic(state_->deterministic);
+  const std::string& asked = state_->device;
+  std::string why_not = "asked for with --device cpu";
+  const bool cuda = asked != "cpu" && cuda::is_ready(why_not);
+  if (asked == "cuda" && !cuda) {
+    throw InputError("--device", "", "cuda, but " + why_not, "a CUDA device", "use --device cpu");
+  }
+  if (!quiet) {
+    const std::string reason = asked == "auto" ? "it answers" : "asked for with --device cuda";
+    fmt::print(
+        stderr, "{}\n",
+        cuda ? fmt::format("device: cuda, {}; {}", cuda_text(), reason)
+             : fmt::format("device: cpu, {} thread{}; {}", thread_count(), thread_count() == 1 ? "" : "s",
+                           asked == "auto" ? "no CUDA: " + why_not : why_not));
+  }
+  return cuda ? Device::cuda : Device::cpu;
+}
+
+}  // namespace traceflow::cli

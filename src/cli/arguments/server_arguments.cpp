@@ -1,0 +1,70 @@
+#include "cli/arguments/server_arguments.h"
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <optional>
+
+#include "base/error.h"
+#include "serve/net/page.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+constexpr int usual_port = 7180;
+
+}  // namespace
+
+struct ServerArguments::State {
+  std::string bind = "127.0.0.1";
+  std::optional<int> port;
+  std::vector<std::string> allowed_hosts;
+};
+
+ServerArguments::ServerArguments(CLI::App& verb, CLI::Option* needs) : state_(std::make_shared<State>()) {
+  const auto for_viewer = [&](CLI::Option* option) {
+    if (needs != nullptr) option->needs(needs);
+    return option;
+  };
+  for_viewer(verb.add_option("--port", state_->port, "Port of the viewer's page; 0 for any [7180, or any]"))
+      ->check(CLI::Range(0, 65535))
+      ->option_text("PORT");
+  for_viewer(
+      verb.add_option("--bind", state_->bind,
+                      "Address to listen on; others than 127.0.0.1 can be reached from other machines"))
+      ->option_text("ADDRESS")
+      ->capture_default_str();
+  for_viewer(
+      verb.add_option("--allow-host", state_->allowed_hosts,
+                      "NAME:PORT that the page is opened under, where it is reached by another way; may be "
+                      "repeated"))
+      ->option_text("NAME:PORT");
+}
+
+std::unique_ptr<serve::Server> ServerArguments::start(serve::Room& room) const {
+  serve::ServerOptions options;
+  options.bind = state_->bind;
+  options.allowed_hosts = state_->allowed_hosts;
+  options.port = state_->port.value_or(usual_port);
+  const auto listen = [&] { return std::make_unique<serve::Server>(options, serve::embedded_files(), room); };
+  std::unique_ptr<serve::Server> server;
+  try {
+    server = listen();
+  } catch (const InputError&) {
+    // With other names or addresses a port is part of an agreement.
+    const bool as_usual = state_->allowed_hosts.empty() && state_->bind == serve::ServerOptions().bind;
+    if (state_->port || !as_usual) throw;
+    options.port = 0;
+    server = listen();
+  }
+  fmt::print("view: {}\n", server->address());
+  if (state_->bind == serve::ServerOptions().bind)
+    fmt::print("      from elsewhere: ssh -L {0}:127.0.0.1:{0} THIS-MACHINE, then the same address\n",
+               server->port());
+  std::fflush(stdout);  // whoever waits for the address at the other end of a pipe
+  return server;
+}
+
+}  // namespace traceflow::cli

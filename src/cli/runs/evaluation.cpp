@@ -1,0 +1,116 @@
+#include "cli/runs/evaluation.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <ctime>
+
+#include "base/atomic_file.h"
+#include "base/option_fields.h"
+#include "base/version.h"
+#include "scene/run_folder.h"
+#include "show/cameras/camera_file.h"
+#include "train/log_history.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+std::optional<lpips::Network> read_lpips(const std::string& path) {
+  if (!path.empty()) return lpips::network_of(lpips::read_weights(path));
+  fmt::print(stderr,
+             "LPIPS is null: it needs weights. scripts/export_lpips.py writes them, --lpips FILE reads them "
+             "(docs/eval.md)\n");
+  return std::nullopt;
+}
+
+// The options beside those of the preset that they differ least from: a run does not say which it began with.
+std::vector<eval::Setting> settings_of(const TrainOptions& options) {
+  TrainOptions copy = options;
+  const std::vector<OptionField> fields = option_fields(copy);
+  std::vector<eval::Setting> nearest;
+  size_t fewest = fields.size() + 1;
+  for (const char* name : {"paper", "cpu", "demo"}) {
+    TrainOptions usual = preset(name);
+    const std::vector<OptionField> usual_fields = option_fields(usual);
+    std::vector<eval::Setting> settings;
+    size_t changed = 0;
+    for (size_t i = 0; i < fields.size(); ++i) {
+      settings.push_back({fields[i].path, option_text(fields[i].get()), option_text(usual_fields[i].get()),
+                          fields[i].unit, fields[i].full_help()});
+      changed += settings.back().value != settings.back().usual ? 1 : 0;
+    }
+    if (changed >= fewest) continue;
+    fewest = changed;
+    nearest = std::move(settings);
+  }
+  return nearest;
+}
+
+void put_log(const std::filesystem::path& log, eval::ReportPage& page) {
+  const std::vector<LoggedEvent> events = read_log(log);
+  for (LoggedPhase& phase : phases_of(events))
+    page.phases.push_back(
+        {std::move(phase.name), phase.first, phase.last, phase.seconds, std::move(phase.steps)});
+  for (LoggedEvent& event : thinned(events)) page.events.push_back(std::move(event.line));
+}
+
+}  // namespace
+
+void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& a) {
+  verb.add_option("RUN", a.run, "Folder of the run")->required();
+  verb.add_option("--split", a.split, "Views to measure: test or train")
+      ->check(CLI::IsMember({"test", "train"}));
+  verb.add_option("-d,--data", a.capture, "The capture's folder, where it is not where the run found it");
+  verb.add_option("--downscale", a.downscale, "Measure at another size than the run was trained at")
+      ->check(CLI::Range(1, 64));
+  verb.add_option("--lpips", a.lpips, "Weights for LPIPS, as scripts/export_lpips.py writes them")
+      ->envname("TRACEFLOW_LPIPS");
+}
+
+Evaluation::Evaluation(const EvaluationArguments& a, const DeviceArguments& devices)
+    : folder_(a.run),
+      run_(read_run(a.run)),
+      capture_(capture_of(run_, a.capture, a.downscale)),
+      views_(&views_of(capture_, a.split)),
+      pictures_(views_->size()) {
+  if (!run_.note.empty()) fmt::print(stderr, "{}\n", run_.note);
+  for (const View& view : *views_) show::check_name(capture_.folder.string(), "view id", view.id);
+  network_ = read_lpips(a.lpips);
+  device_ = devices.choose();
+  run_.subject.scene.move_to(device_);
+  if (network_) network_ = network_->on(device_);
+  report_.capture = capture_.name;
+  report_.split = a.split;
+  report_.downscale = a.downscale > 0 ? a.downscale : run_.options.capture.downscale;
+  report_.device = name_of(device_);
+  report_.iterations = run_.iterations;
+  report_.train_seconds = run_.train_seconds;
+}
+
+void Evaluation::measure(const eval::ViewListener& listener) {
+  eval::evaluate(
+      run_.subject, capture_, *views_, network_ ? &*network_ : nullptr,
+      [&](const View& view, const ViewImages& images, const Frame& frame) {
+        if (pictures_.wants(static_cast<size_t>(&view - views_->data())))
+          pictures_.add(view.id, images.colour, frame);
+        if (listener) listener(view, images, frame);
+      },
+      report_);
+}
+
+void Evaluation::write_page(const std::filesystem::path& path) {
+  eval::ReportPage page;
+  page.version = version();
+  page.made = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  page.run = run_name(folder_);
+  page.machine = this_machine(device_);
+  page.report = report_;
+  page.settings = settings_of(run_.options);
+  put_log(RunFolder{folder_}.log(), page);
+  page.pictures = pictures_.take();
+  write_atomically(path, eval::report_page(page));
+}
+
+}  // namespace traceflow::cli

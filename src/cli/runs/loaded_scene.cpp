@@ -1,0 +1,30 @@
+#include "cli/runs/loaded_scene.h"
+
+namespace traceflow::cli {
+
+LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
+  if (std::filesystem::is_regular_file(path))
+    return {show::read_ply_subject(path, environment), std::nullopt};
+  if (std::filesystem::is_regular_file(path / "main.ply")) {
+    return {show::read_ply_subject(path / "main.ply", environment), std::nullopt};
+  }
+  if (!std::filesystem::exists(path)) {
+    throw InputError(path.string(), "", "no such file or folder", "a run's folder or a .ply");
+  }
+  if (!environment.empty()) {
+    throw InputError("option", "environment", "a run, which has its own", "a .ply to go with");
+  }
+  TrainedRun run = read_run(path);
+  show::Subject subject = std::move(run.subject);
+  subject.warning = run.note;
+  return {std::move(subject), std::move(run)};
+}
+
+Capture capture_of(const LoadedScene& scene, const std::filesystem::path& folder, int downscale) {
+  if (scene.run) return capture_of(*scene.run, folder, downscale);
+  CaptureOptions options;
+  if (downscale > 0) options.downscale = downscale;
+  return load_capture(folder, options);
+}
+
+}  // namespace traceflow::cli

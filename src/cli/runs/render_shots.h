@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/runs/loaded_scene.h"
+#include "show/cameras/shot.h"
+
+namespace CLI {
+class App;
+}
+
+namespace traceflow::cli {
+
+// Which pictures `render` takes: the flags that choose cameras and times.
+struct ShotArguments {
+  std::string split, cameras, camera_path, freeze_camera, capture;
+  bool orbit = false, spiral = false;
+  bool compare = false;
+  std::optional<float> time;
+  std::optional<int> frames;
+  std::optional<std::pair<int, int>> size;
+  std::optional<double> frames_per_second;
+  int downscale = 0;
+
+  // Throws InputError, in words, for flags that do not go together.
+  void check() const;
+};
+void add_shot_arguments(CLI::App& verb, ShotArguments& arguments);
+
+struct ChosenShots {
+  std::vector<show::Shot> shots;  // each with its time
+  // To compare with: one view for each shot, and where their pictures are. Else empty.
+  std::vector<View> photographs;
+  std::optional<Capture> capture;
+  double frames_per_second = 30;
+};
+
+// Throws InputError.
+ChosenShots choose_shots(const ShotArguments& arguments, const LoadedScene& scene);
+
+}  // namespace traceflow::cli

@@ -1,0 +1,49 @@
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <memory>
+
+#include "cli/runs/trained_run.h"
+#include "cli/verbs/verbs.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+struct ExportArguments {
+  std::string run, output;
+  float time = 0;
+  bool undeformed = false;
+};
+
+void run_export(const ExportArguments& a) {
+  // The parser's range lets "nan" through.
+  check_option(a.time >= 0 && a.time <= 1, "time", a.time, "0 to 1");
+  const TrainedRun run = read_run(a.run);
+  if (!run.note.empty()) fmt::print(stderr, "{}\n", run.note);
+  if (run.subject.request.specular && run.subject.scene.specular == Specular::environment_map) {
+    fmt::print(
+        stderr,
+        "this run's reflections are a cube map, which a .ply cannot hold: main.ply alone is written\n");
+  }
+  const std::optional<float> time = a.undeformed ? std::nullopt : std::optional(a.time);
+  for (const auto& path : show::export_subject(run.subject, time, a.output))
+    fmt::print("{}\n", path.string());
+}
+
+}  // namespace
+
+void add_export(CLI::App& program) {
+  CLI::App* verb = program.add_subcommand("export", "Write a run's surfels as 2DGS .ply files");
+  const auto a = std::make_shared<ExportArguments>();
+  verb->add_option("RUN", a->run, "Folder of the run")->required();
+  verb->add_option("-o,--output", a->output, "Folder for main.ply and environment.ply")->required();
+  CLI::Option* time = verb->add_option("--time", a->time, "Time at which the surfels are posed, 0 to 1")
+                          ->check(CLI::Range(0.0, 1.0))
+                          ->capture_default_str();
+  verb->add_flag("--undeformed", a->undeformed, "The surfels as they are stored, without the residual fields")
+      ->excludes(time);
+  verb->callback([a] { run_export(*a); });
+}
+
+}  // namespace traceflow::cli

@@ -1,0 +1,147 @@
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <chrono>
+#include <memory>
+
+#include "cli/arguments/device_arguments.h"
+#include "cli/arguments/option_arguments.h"
+#include "cli/runs/render_shots.h"
+#include "cli/terminal/error_boundary.h"
+#include "cli/terminal/frame_progress.h"
+#include "cli/terminal/stop_request.h"
+#include "cli/verbs/verbs.h"
+#include "files/png.h"
+#include "show/layer_files.h"
+#include "show/side_by_side.h"
+#include "show/video.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+struct RenderArguments {
+  std::string scene, output, environment, layers = "rgb", format = "png", video;
+  ShotArguments shots;
+
+  void check() const {
+    if (output.empty() && video.empty())
+      throw InputError("option", "output", "nothing", "-o DIR, --video FILE.mp4 or both");
+    shots.check();
+    if (!video.empty()) show::Video::prepare(video);
+  }
+};
+
+// Where the pictures go: files, a film, or both.
+class Output {
+ public:
+  Output(const RenderArguments& a, const ChosenShots& chosen, double scale)
+      : a_(a),
+        chosen_(chosen),
+        layers_(show::parse_layers(a.layers)),
+        scale_(scale),
+        files_(a.output, layers_, a.format == "npy" ? show::ImageFormat::npy : show::ImageFormat::png, scale),
+        video_(a.video, chosen.frames_per_second) {}
+
+  void add(size_t i, const Frame& frame) {
+    const std::string& name = chosen_.shots[i].name;
+    if (!a_.output.empty()) files_.write(name, frame);
+    if (a_.video.empty() && !a_.shots.compare) return;
+    Tensor<uint8_t> picture =
+        show::in_colour(painter_.paint(layers_[0], show::layer_values(frame, layers_[0], scale_)));
+    if (a_.shots.compare) {
+      const std::shared_ptr<const ViewImages> images = load_images(*chosen_.capture, chosen_.photographs[i]);
+      picture = show::side_by_side(to_8bit(images->colour), picture);
+      if (!a_.output.empty()) write_compared(name, picture);
+    }
+    if (!a_.video.empty()) video_.add(picture);
+  }
+  void finish() { video_.finish(); }
+
+ private:
+  void write_compared(const std::string& name, const Tensor<uint8_t>& picture) const {
+    const std::filesystem::path path = std::filesystem::path(a_.output) / "compare" / (name + ".png");
+    std::filesystem::create_directories(path.parent_path());
+    write_png(path, picture);
+  }
+
+  const RenderArguments& a_;
+  const ChosenShots& chosen_;
+  std::vector<show::Layer> layers_;
+  double scale_;
+  show::LayerFiles files_;
+  show::Video video_;
+  show::Painter painter_;
+};
+
+// Renders until the end or Ctrl-C; how many shots it came to.
+size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, Output& output) {
+  const std::atomic<bool>& stop = stop_on_signals();
+  const auto start = std::chrono::steady_clock::now();
+  FrameProgress progress = FrameProgress::for_stderr(static_cast<int64_t>(shots.size()));
+  Renderer renderer(subject.render);
+  size_t done = 0;
+  while (done < shots.size() && !stop) {
+    FrameRequest request = subject.request;
+    request.camera = shots[done].camera;
+    request.time = *shots[done].time;
+    output.add(done, renderer.forward(subject.scene, request));
+    ++done;
+    progress.show(static_cast<int64_t>(done),
+                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  output.finish();
+  progress.finish();
+  return done;
+}
+
+void run_render(const RenderArguments& a, const OptionArguments& options, const DeviceArguments& devices) {
+  a.check();
+  show::parse_layers(a.layers);
+  LoadedScene scene = load_scene(a.scene, a.environment);
+  show::Subject& subject = scene.subject;
+  options.apply(option_fields(subject.render));
+  subject.render.validate();
+  const ChosenShots chosen = choose_shots(a.shots, scene);
+  if (!(subject.scene.extent > 0))
+    subject.scene.extent = show::extent_seen_from(subject.scene.main, chosen.shots);
+  if (!subject.warning.empty()) fmt::print(stderr, "{}\n", subject.warning);
+  subject.scene.move_to(devices.choose());
+
+  Output output(a, chosen, subject.scene.normalisation.scale);
+  const size_t done = take(chosen.shots, subject, output);
+  std::string where = a.output;
+  if (!a.video.empty()) where += (where.empty() ? "" : " and ") + a.video;
+  if (done < chosen.shots.size()) {
+    fmt::print(stderr, "stopped after {} of {} frames: {}\n", done, chosen.shots.size(),
+               done > 0 ? where : "nothing was written");
+    throw Exit{exit_interrupted};
+  }
+  fmt::print("{} views of {} surfels: {}\n", done, subject.scene.main.count(), where);
+}
+
+}  // namespace
+
+void add_render(CLI::App& program) {
+  CLI::App* verb = program.add_subcommand("render", "Render a run or a 2DGS .ply");
+  const auto a = std::make_shared<RenderArguments>();
+  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder that export wrote")
+      ->required();
+  verb->add_option("-o,--output", a->output, "Folder for LAYER/NAME.png or .npy");
+  verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
+  add_shot_arguments(*verb, a->shots);
+  verb->add_option("--layers", a->layers,
+                   "Of rgb, diffuse, specular, tint, alpha, normal, depth, median-depth, distortion, "
+                   "surfels, with commas between; or all")
+      ->capture_default_str();
+  verb->add_option("--format", a->format, "png for the eye or npy (float32)")
+      ->check(CLI::IsMember({"png", "npy"}))
+      ->capture_default_str();
+  verb->add_option("--video", a->video, "Film of the first layer, by ffmpeg: FILE.mp4");
+  const auto defaults = std::make_shared<RenderOptions>();
+  const OptionArguments options(*verb, option_fields(*defaults));
+  const DeviceArguments devices(*verb);
+  verb->callback([a, defaults, options, devices] { run_render(*a, options, devices); });
+}
+
+}  // namespace traceflow::cli

@@ -1,0 +1,160 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+
+#include "cli/arguments/device_arguments.h"
+#include "cli/arguments/option_arguments.h"
+#include "cli/arguments/server_arguments.h"
+#include "cli/runs/trained_run.h"
+#include "cli/terminal/error_boundary.h"
+#include "cli/terminal/progress.h"
+#include "cli/terminal/stop_request.h"
+#include "cli/verbs/verbs.h"
+#include "files/options_json.h"
+#include "serve/live_view.h"
+#include "train/event_log.h"
+#include "train/log_history.h"
+#include "train/trainer.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+struct TrainArguments {
+  std::string data;
+  std::string output;
+  std::string preset_name = "paper";
+  bool resume = false;
+  bool quiet = false;
+  bool view = false;
+  serve::ViewOptions view_options;
+};
+
+// The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
+// either.
+TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given,
+                      const Safetensors* checkpoint) {
+  TrainOptions options = preset(arguments.preset_name);
+  if (checkpoint) options_from_json(checkpoint->metadata.at("options"), option_fields(options), "checkpoint");
+  given.apply(option_fields(options));
+  options.validate();
+  return options;
+}
+
+std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& arguments) {
+  const RunFolder run{arguments.output};
+  if (arguments.resume) {
+    std::string note;
+    return std::make_unique<Safetensors>(read_checkpoint(run, note));
+  }
+  if (std::filesystem::exists(run.checkpoint()) || std::filesystem::exists(run.previous_checkpoint())) {
+    throw InputError("--output", "", arguments.output + ", which holds a run", "a new folder",
+                     "add --resume to continue it, or choose another");
+  }
+  return nullptr;
+}
+
+// A quiet run still says why it ended early.
+[[noreturn]] void end_with(int code, const TrainArguments& arguments, const events::Finished& end) {
+  if (arguments.quiet && code != exit_interrupted) {
+    fmt::print(stderr, "traceflow: ended at iteration {}: {}\n", end.iteration, end.reason);
+  }
+  throw Exit{code};
+}
+
+// A training and those who watch it in a browser.
+class Watched {
+ public:
+  Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where,
+          const std::atomic<bool>& stop)
+      : view_(arguments.view_options,
+              serve::make_setting("training", run_name(arguments.output), &trainer.capture(),
+                                  trainer.scene().normalisation),
+              {[&trainer] { return stage_of(trainer); }, [&trainer] { trainer.save(); },
+               [&trainer](const events::Event& event) { trainer.stream().emit(event); },
+               [&trainer] { trainer.stop_soon(); }, &stop}) {
+    view_.recall(read_log(RunFolder{arguments.output}.log()));
+    server_ = where.start(view_.room());
+    trainer.stream().listen([this](const events::Event& event) { view_(event); });
+  }
+
+  // After the training, for as long as somebody looks.
+  void stay(bool quiet) {
+    if (!view_.is_wanted()) return;
+    if (!quiet) fmt::print(stderr, "still shown to those who look; Ctrl-C ends it\n");
+    view_.stay();
+  }
+
+ private:
+  static serve::Stage stage_of(const Trainer& trainer) {
+    return {trainer.scene(), trainer.options().render,
+            picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
+  }
+
+  serve::LiveView view_;
+  std::unique_ptr<serve::Server> server_;
+};
+
+void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices,
+           const ServerArguments& where) {
+  arguments.view_options.validate();
+  const std::unique_ptr<Safetensors> checkpoint = checkpoint_to_resume(arguments);
+  const TrainOptions options = settings(arguments, given, checkpoint.get());
+  std::string data = arguments.data;
+  if (data.empty() && checkpoint) data = checkpoint->metadata.at("capture_folder");
+  if (data.empty()) throw InputError("--data", "", "nothing", "a capture's folder");
+
+  Capture capture = load_capture(data, options.capture);
+  const Device device = devices.choose(arguments.quiet);
+  Trainer trainer(options, std::move(capture), arguments.output, device);
+  std::filesystem::create_directories(arguments.output);
+  if (!arguments.quiet) trainer.stream().listen(Progress::for_stderr());
+  auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
+  trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
+  if (checkpoint) trainer.resume();
+  const std::atomic<bool>& stop = stop_on_signals();
+  std::optional<Watched> watched;
+  if (arguments.view) watched.emplace(trainer, arguments, where, stop);
+
+  const events::Finished end = trainer.run(stop);
+  if (watched) watched->stay(arguments.quiet);
+  if (end.ending == events::Ending::diverged) end_with(exit_diverged, arguments, end);
+  if (end.ending == events::Ending::out_of_memory) end_with(exit_memory, arguments, end);
+  if (end.ending == events::Ending::interrupted) end_with(exit_interrupted, arguments, end);
+}
+
+}  // namespace
+
+void add_train(CLI::App& program) {
+  CLI::App* verb = program.add_subcommand("train", "Reconstruct a scene from a capture.");
+  auto arguments = std::make_shared<TrainArguments>();
+  verb->add_option("-d,--data", arguments->data, "The capture's folder")->option_text("FOLDER");
+  verb->add_option("-o,--output", arguments->output, "The run's folder: checkpoints and log")
+      ->required()
+      ->option_text("RUN");
+  verb->add_option("--preset", arguments->preset_name,
+                   "paper (60,000 iterations), cpu (a quarter of an hour on two cores at "
+                   "240x135) or demo (minutes)")
+      ->option_text("NAME")
+      ->capture_default_str();
+  verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint");
+  verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
+  CLI::Option* view =
+      verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
+  verb->add_option("--view-share", arguments->view_options.share,
+                   "Share of the time that the page may take while somebody looks")
+      ->needs(view)
+      ->option_text("X")
+      ->capture_default_str();
+  const ServerArguments where(*verb, view);
+  // The presets differ in values alone, so any of them names the flags.
+  auto defaults = std::make_shared<TrainOptions>();
+  auto given =
+      std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
+  const DeviceArguments devices(*verb);
+  verb->callback([arguments, given, devices, where] { train(*arguments, *given, devices, where); });
+}
+
+}  // namespace traceflow::cli

@@ -1,0 +1,26 @@
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+// The program's verbs, one file each: NAME.cpp defines add_NAME and is thereby part of the program (the
+// build writes add_verbs from the files that are there). Every function adds its subcommand; the subcommand's
+// callback does the work. Errors travel as exceptions to the error boundary (error_boundary.h), which prints
+// one line and chooses the exit code.
+namespace traceflow::cli {
+
+void add_train(CLI::App& program);
+void add_eval(CLI::App& program);
+void add_render(CLI::App& program);
+void add_report(CLI::App& program);
+void add_trace(CLI::App& program);
+void add_export(CLI::App& program);
+void add_synth(CLI::App& program);
+void add_inspect(CLI::App& program);
+void add_view(CLI::App& program);
+
+// All verbs that are there, in alphabetical order.
+void add_verbs(CLI::App& program);
+
+}  // namespace traceflow::cli

@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <memory>
+
+#include "cli/arguments/device_arguments.h"
+#include "cli/arguments/server_arguments.h"
+#include "cli/runs/loaded_scene.h"
+#include "cli/terminal/stop_request.h"
+#include "cli/verbs/verbs.h"
+#include "serve/run_view.h"
+#include "show/cameras/orbit.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+struct ViewArguments {
+  std::string scene, environment, capture;
+  int downscale = 0;
+};
+
+// What a .ply that does not tell its scene's size is taken for.
+float extent_of(const Surfels& surfels, const serve::Setting& setting) {
+  std::vector<show::Shot> shots;
+  for (const serve::CapturedCamera& view : setting.train) shots.push_back({view.id, view.time, view.camera});
+  if (shots.empty()) shots = show::orbit_around_points(surfels.position, 16, 9, 8);
+  return show::extent_seen_from(surfels, shots);
+}
+
+serve::RunView::Shown shown_of(TrainedRun run) {
+  return {std::move(run.subject), run.iterations, run.options.iterations, std::move(run.note)};
+}
+
+// The capture, where there is one: a run can be looked at without its photographs.
+std::optional<Capture> capture_beside(const ViewArguments& a, const LoadedScene& scene) {
+  if (!a.capture.empty()) return capture_of(scene, a.capture, a.downscale);
+  if (!scene.run) return std::nullopt;
+  const std::filesystem::path& folder = scene.run->capture_folder;
+  if (std::filesystem::exists(folder)) return capture_of(scene, folder, a.downscale);
+  fmt::print(stderr, "{} is not there: no photographs to compare with; say where they are with -d CAPTURE\n",
+             folder.string());
+  return std::nullopt;
+}
+
+void view(const ViewArguments& a, const DeviceArguments& devices, const ServerArguments& where) {
+  serve::RunWatch watch(RunFolder{a.scene});
+  LoadedScene loaded = load_scene(a.scene, a.environment);
+  Scene& scene = loaded.subject.scene;
+  if (!loaded.subject.warning.empty()) fmt::print(stderr, "{}\n", loaded.subject.warning);
+  const std::optional<Capture> capture = capture_beside(a, loaded);
+  serve::Setting setting = serve::make_setting(loaded.run ? "run" : "ply", run_name(a.scene),
+                                               capture ? &*capture : nullptr, scene.normalisation);
+  if (!(scene.extent > 0)) scene.extent = extent_of(scene.main, setting);
+
+  serve::RunView::Shown shown{std::move(loaded.subject)};
+  if (loaded.run) {
+    shown.iteration = loaded.run->iterations;
+    shown.iterations = loaded.run->options.iterations;
+    shown.note = loaded.run->note;
+  }
+  serve::RunView view(std::move(setting), std::move(shown), devices.choose());
+  if (loaded.run) view.follow(std::move(watch), [&a] { return shown_of(read_run(a.scene)); });
+  const auto server = where.start(view.room());
+  view.run(stop_on_signals());
+}
+
+}  // namespace
+
+void add_view(CLI::App& program) {
+  CLI::App* verb = program.add_subcommand("view", "Look at a run or a .ply in a browser");
+  const auto a = std::make_shared<ViewArguments>();
+  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder that export wrote")
+      ->required();
+  verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
+  verb->add_option("-d,--data", a->capture, "The capture's folder, where it is not where the run found it");
+  verb->add_option("--downscale", a->downscale, "Another size of the capture than the run was trained at")
+      ->check(CLI::Range(1, 64));
+  const ServerArguments where(*verb);
+  const DeviceArguments devices(*verb);
+  verb->callback([a, devices, where] { view(*a, devices, where); });
+}
+
+}  // namespace traceflow::cli

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "math/types.h"
+
+namespace traceflow {
+
+// A place in a JSON document that knows its name, so that what is wrong there can be said: every reader
+// throws InputError with the document, the field, what was found and what was expected.
+class JsonField {
+ public:
+  // Whether there is such a member; null counts as none.
+  bool has(const std::string& key) const;
+  // A member that must be there.
+  JsonField operator[](const std::string& key) const;
+  // As it stands in the document.
+  const nlohmann::json& json() const { return *value_; }
+
+  // Finite.
+  double number() const;
+  double number(double low, double high) const;
+  double positive() const;
+  int64_t whole(int64_t low, int64_t high) const;
+  bool yes() const;
+  // A string of at most `longest` bytes.
+  std::string text(size_t longest = 4096) const;
+  // `count` finite numbers.
+  std::vector<double> numbers(size_t count) const;
+  // Three numbers that single precision still holds after some arithmetic: within ±1e15.
+  Vec3<double> vector() const;
+  // The nearest rotation to the three rows that stand here; files carry few digits.
+  Mat3<double> rotation() const;
+  // Strings; whole numbers are taken for their digits.
+  std::vector<std::string> strings() const;
+  // The elements of an array, in the second case of `count`.
+  std::vector<JsonField> elements() const;
+  std::vector<JsonField> elements(size_t count) const;
+
+  [[noreturn]] void fail(const std::string& found, const std::string& expected,
+                         const std::string& remedy = "") const;
+  // The same with the beginning of what stands here as what was found.
+  [[noreturn]] void expect(const std::string& expected) const;
+
+ protected:
+  JsonField(std::string document, std::string name, const nlohmann::json* value)
+      : document_(std::move(document)), name_(std::move(name)), value_(value) {}
+  void point_to(const nlohmann::json* value) { value_ = value; }
+
+ private:
+  JsonField element(size_t i) const;
+
+  std::string document_;
+  std::string name_;
+  const nlohmann::json* value_;
+};
+
+// A whole document; fields taken from it live as long as it does. Throws InputError for text that is not
+// JSON, and for arrays and objects in one another deeper than 64: what walks them does so by recursion.
+class JsonDocument : public JsonField {
+ public:
+  // name: of the document in errors.
+  JsonDocument(std::string name, std::string_view text);
+  JsonDocument(const JsonDocument&) = delete;
+  JsonDocument& operator=(const JsonDocument&) = delete;
+
+ private:
+  nlohmann::json root_;
+};
+
+// The text of a file of at most 64 MiB, which parsed takes up to 1 GiB.
+std::string read_text(const std::filesystem::path& path);
+
+class JsonFile : public JsonDocument {
+ public:
+  explicit JsonFile(const std::filesystem::path& path);
+};
+
+}  // namespace traceflow
