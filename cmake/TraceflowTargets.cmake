@@ -21,6 +21,7 @@ add_library(traceflow_settings INTERFACE)
 target_compile_options(traceflow_settings INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion -Wno-sign-conversion -ffp-contract=off -fno-math-errno)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(traceflow_settings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wduplicated-cond -Wlogical-op -Wsuggest-override>)
   # GCC 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
   target_compile_options(traceflow_settings INTERFACE -Wno-restrict)
   # GCC 13 sees copies beyond the end in fmt 9's buffers, references that dangle wherever a function that returns one is

@@ -9,6 +9,7 @@ namespace {
 std::vector<CapturedCamera> cameras_of(const std::vector<View>& views, const SceneNormalisation& capture,
                                        const SceneNormalisation& scene) {
   std::vector<CapturedCamera> cameras;
+  cameras.reserve(views.size());
   for (const View& view : views)
     cameras.push_back({view.id, view.time, carried(view.camera, capture, scene)});
   return cameras;

@@ -83,7 +83,7 @@ std::optional<Reply> Client::reply(bool body) {
 
 bool Client::ends() {
   while (more()) unread_.clear();
-  return errno != EAGAIN && errno != EWOULDBLOCK;
+  return errno != EAGAIN;  // the same as EWOULDBLOCK here
 }
 
 SocketClient::SocketClient(int port, const std::string& lines) : client_(port) {

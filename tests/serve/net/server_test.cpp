@@ -206,6 +206,7 @@ TEST(Server, StrangersDoNotKeepOutWhoHasTheToken) {
   SocketClient guest = house.guest();
   house.room.wait_entered(1);
   std::vector<Client> strangers;
+  strangers.reserve(20);
   for (int i = 0; i < 20; ++i) strangers.emplace_back(house.server.port());
   EXPECT_EQ(house.status("GET /", house.host_line() + house.cookie_line()), 200);
   EXPECT_TRUE(strangers.front().ends());
