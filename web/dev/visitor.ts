@@ -9,6 +9,7 @@ export class Visitor {
   hello: Hello | undefined;
   state: State | undefined;
   last: FrameHeader | undefined;
+  trained = 0; // seconds that went into the training, of its last step
   private readonly asked = new Map<number, number>();
   private readonly socket: WebSocket;
   private look_id = 0;
@@ -66,6 +67,9 @@ export class Visitor {
       const reply = JSON.parse(String(data)) as Reply;
       if (reply.type === 'hello') this.hello = reply;
       if (reply.type === 'state') this.state = reply;
+      if (reply.type === 'events') {
+        for (const event of reply.events) if (event.event === 'step') this.trained = event.seconds;
+      }
       return;
     }
     const header = JSON.parse(data.toString('utf8', 4, 4 + data.readUInt32LE(0))) as PictureHeader;
