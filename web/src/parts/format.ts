@@ -42,10 +42,12 @@ export function bytes(n: number): string {
 
 export const signed = (x: number, digits: number): string => `${x < 0 ? '−' : '+'}${Math.abs(x).toFixed(digits)}`;
 
-// median_depth → Median depth
+// median_depth → Median depth; rgb, ssim and lpips have names of their own.
 export function title(name: string): string {
+  if (name === 'rgb') return 'Colour';
+  if (name === 'ssim' || name === 'lpips') return name.toUpperCase();
   const words = name.replace(/[-_]/g, ' ');
-  return words === 'rgb' ? 'Colour' : words.charAt(0).toUpperCase() + words.slice(1);
+  return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
 // What a file may be called on any system.

@@ -56,6 +56,7 @@ test('numbers are written for people', () => {
   assert.deepEqual([999, 1500, 1.9e9, 24e9].map(bytes), ['999 B', '1.50 kB', '1.90 GB', '24.0 GB']);
   assert.equal(signed(-0.5, 1), '−0.5');
   assert.equal(title('median-depth'), 'Median depth');
+  assert.equal(title('ssim'), 'SSIM');
   assert.equal(file_name('../a b/ü.ply'), 'a-b-.ply');
   assert.equal(file_name('///'), 'traceflow');
 });
