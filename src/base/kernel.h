@@ -48,7 +48,7 @@ void launch(const char* name, Grid grid, void (*kernel)(Parameters...), const Ar
 template <class... Parameters, class... Arguments>
 void launch(const char* name, Grid grid, void (*kernel)(Parameters...), const Arguments&... arguments) {
   const profile::Scope scope(name);
-  (emulation::require_no_host_tensors(name, &arguments, sizeof(arguments)), ...);
+  (emulation::require_no_host_tensors(name, arguments), ...);
   emulation::launch(name, static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads),
                     [&] { kernel(static_cast<Parameters>(arguments)...); });
 }

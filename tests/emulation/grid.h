@@ -32,9 +32,19 @@ void run_grid(const char* kernel, Size3 grid, Size3 block, const std::function<v
 // The same on a line of blocks, with the device's memory open to it.
 void launch(const char* kernel, unsigned blocks, unsigned threads, const std::function<void()>& thread);
 
-// Ends the program where one of a kernel's arguments holds the address of a tensor on the host
-// (emulation/host_tensors.cpp): an emulated kernel could read it, one on a device could not.
 void require_no_host_tensors(const char* kernel, const void* argument, size_t bytes);
+// Ends the program where a kernel's argument holds the address of a tensor on the host
+// (emulation/host_tensors.cpp): an emulated kernel could read it, one on a device could not.
+template <class T>
+void require_no_host_tensors(const char* kernel, T argument) {
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_clear_padding)
+  // Between its members lies what was there before: now and then an address.
+  __builtin_clear_padding(&argument);
+#endif
+#endif
+  require_no_host_tensors(kernel, &argument, sizeof(argument));
+}
 
 void block_barrier();
 bool block_any(bool predicate);

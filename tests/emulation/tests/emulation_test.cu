@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <set>
 #include <vector>
 
@@ -13,6 +14,12 @@ namespace traceflow {
 namespace {
 
 constexpr int block = 64;
+
+struct Padded {
+  bool flag = false;
+  int32_t* to = nullptr;
+};
+__global__ void write_flag(Padded argument) { argument.to[threadIdx.x] = argument.flag ? 1 : 0; }
 
 __global__ void reverse_block(const int32_t* from, int32_t* to) {
   __shared__ int32_t kept[block];
@@ -136,6 +143,18 @@ TEST(EmulationDeathTest, AKernelIsNotGivenATensorOnTheHost) {
   Tensor<int32_t> to({block}, Device::cuda);
   EXPECT_DEATH(cuda::launch("reverse", {1, block}, reverse_block, from.data(), to.data()),
                "reverse: the kernel is given a tensor on the host");
+}
+
+TEST(Emulation, WhatLiesBetweenTheMembersOfAnArgumentIsNoTensor) {
+  const Tensor<int32_t> on_host({block});
+  Tensor<int32_t> to({block}, Device::cuda);
+  Padded argument;
+  const void* const stale = on_host.data();
+  std::memcpy(static_cast<void*>(&argument), &stale, sizeof(stale));
+  argument.flag = true;
+  argument.to = to.data();
+  cuda::launch("padded", {1, block}, write_flag, argument);
+  EXPECT_EQ(to.on(Device::cpu)[3], 1);
 }
 
 TEST(EmulationDeathTest, AMaskThatLeavesItsLaneOutEndsTheProgram) {
