@@ -281,7 +281,7 @@ class Prepare {
   double near_plane_;
   float alpha_min_;
   double log_alpha_min_;
-  bool by_centre_, low_pass_;
+  int32_t by_centre_, low_pass_;  // yes or no, as whole words: no padding that holds an old address
   Splat* splats_;
   Bounds* bounds_;
   Side sides_[4];
