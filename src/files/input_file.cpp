@@ -46,16 +46,35 @@ InputFile InputFile::scratch(const std::filesystem::path& origin) {
   return {origin, descriptor, 0};
 }
 
+InputFile InputFile::part(int64_t offset, int64_t size, std::filesystem::path name) const {
+  require(offset >= 0 && size >= 0 && offset <= size_ && size <= size_ - offset, "a part lies in its file",
+          path_.string());
+  const int descriptor = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
+  if (descriptor < 0) throw InputError(name.string(), "", reason(), "a readable file");
+  InputFile result(std::move(name), descriptor, size);
+  result.begin_ = begin_ + offset;
+  return result;
+}
+
+InputFile InputFile::renamed(std::filesystem::path name) && {
+  path_ = std::move(name);
+  return std::move(*this);
+}
+
 InputFile::~InputFile() { close(); }
 
 InputFile::InputFile(InputFile&& other) noexcept
-    : path_(std::move(other.path_)), descriptor_(std::exchange(other.descriptor_, -1)), size_(other.size_) {}
+    : path_(std::move(other.path_)),
+      descriptor_(std::exchange(other.descriptor_, -1)),
+      begin_(other.begin_),
+      size_(other.size_) {}
 
 InputFile& InputFile::operator=(InputFile&& other) noexcept {
   if (this == &other) return *this;
   close();
   path_ = std::move(other.path_);
   descriptor_ = std::exchange(other.descriptor_, -1);
+  begin_ = other.begin_;
   size_ = other.size_;
   return *this;
 }
@@ -66,16 +85,19 @@ void InputFile::close() noexcept {
 }
 
 void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
+  const auto wanted = static_cast<int64_t>(bytes.size());
+  const auto cut_short = [&] {
+    throw InputError(path_.string(), "", std::to_string(size_) + " bytes",
+                     std::to_string(offset + wanted) + " bytes at least",
+                     "the file is cut short; copy it again");
+  };
+  if (offset < 0 || offset > size_ || wanted > size_ - offset) cut_short();
   for (size_t done = 0; done < bytes.size();) {
     const ssize_t n = ::pread(descriptor_, bytes.data() + done, bytes.size() - done,
-                              static_cast<off_t>(offset) + static_cast<off_t>(done));
+                              static_cast<off_t>(begin_ + offset) + static_cast<off_t>(done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) throw InputError(path_.string(), "read", reason(), "a readable file");
-    if (n == 0) {
-      throw InputError(path_.string(), "", std::to_string(size_) + " bytes",
-                       std::to_string(offset + static_cast<int64_t>(bytes.size())) + " bytes at least",
-                       "the file is cut short; copy it again");
-    }
+    if (n == 0) cut_short();
     done += static_cast<size_t>(n);
   }
 }

@@ -14,6 +14,10 @@ class InputFile {
   explicit InputFile(const std::filesystem::path& path);
   // A nameless file in the machine's temporary folder, gone when closed; errors name `origin`.
   static InputFile scratch(const std::filesystem::path& origin);
+  // `size` bytes of this file from `offset`, which it must have, as a file of their own called `name`.
+  InputFile part(int64_t offset, int64_t size, std::filesystem::path name) const;
+  // The same file under another name in errors.
+  InputFile renamed(std::filesystem::path name) &&;
   ~InputFile();
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&& other) noexcept;
@@ -33,6 +37,7 @@ class InputFile {
 
   std::filesystem::path path_;
   int descriptor_ = -1;
+  int64_t begin_ = 0;  // in what the descriptor opens
   int64_t size_ = 0;
 };
 

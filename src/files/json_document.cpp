@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "files/input_file.h"
 
 namespace traceflow {
 
@@ -47,10 +46,9 @@ nlohmann::json parse(const std::string& name, std::string_view text) {
 
 }  // namespace
 
-std::string read_text(const std::filesystem::path& path) {
-  const InputFile file(path);
+std::string read_text(const InputFile& file) {
   if (file.size() > max_bytes) {
-    throw InputError(path.string(), "", fmt::format("{} bytes", file.size()),
+    throw InputError(file.path().string(), "", fmt::format("{} bytes", file.size()),
                      "a JSON file of at most 64 MiB");
   }
   std::string text(static_cast<size_t>(file.size()), '\0');
@@ -58,12 +56,14 @@ std::string read_text(const std::filesystem::path& path) {
   return text;
 }
 
+std::string read_text(const std::filesystem::path& path) { return read_text(InputFile(path)); }
+
 JsonDocument::JsonDocument(std::string name, std::string_view text)
     : JsonField(name, "", nullptr), root_(parse(name, text)) {
   point_to(&root_);
 }
 
-JsonFile::JsonFile(const std::filesystem::path& path) : JsonDocument(path.string(), read_text(path)) {}
+JsonFile::JsonFile(const InputFile& file) : JsonDocument(file.path().string(), read_text(file)) {}
 
 bool JsonField::has(const std::string& key) const {
   return value_->is_object() && value_->contains(key) && !value_->at(key).is_null();

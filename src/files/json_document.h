@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "files/input_file.h"
 #include "math/types.h"
 
 namespace traceflow {
@@ -75,11 +76,13 @@ class JsonDocument : public JsonField {
 };
 
 // The text of a file of at most 64 MiB, which parsed takes up to 1 GiB.
+std::string read_text(const InputFile& file);
 std::string read_text(const std::filesystem::path& path);
 
 class JsonFile : public JsonDocument {
  public:
-  explicit JsonFile(const std::filesystem::path& path);
+  explicit JsonFile(const InputFile& file);
+  explicit JsonFile(const std::filesystem::path& path) : JsonFile(InputFile(path)) {}
 };
 
 }  // namespace traceflow

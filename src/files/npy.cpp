@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstring>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/atomic_file.h"
@@ -151,9 +152,9 @@ ZipMember find_member(const InputFile& file, const std::string& name) {
 
 }  // namespace
 
-NpyFile::NpyFile(const std::filesystem::path& path, const std::string& name) : file_(path) {
+NpyFile::NpyFile(InputFile file, const std::string& name) : file_(std::move(file)) {
   ZipMember member{.size = file_.size()};
-  if (path.extension() == ".npz") member = find_member(file_, name);
+  if (path().extension() == ".npz") member = find_member(file_, name);
   if (member.deflated) {
     file_ = inflate_to_scratch(file_, member);
     member = {.size = file_.size()};
@@ -235,6 +236,7 @@ Tensor<float> NpyFile::slice(int64_t i) const {
   return read_elements(i * shape.elements(), shape);
 }
 
+Tensor<float> read_npy(InputFile file) { return NpyFile(std::move(file)).read(); }
 Tensor<float> read_npy(const std::filesystem::path& path) { return NpyFile(path).read(); }
 
 Tensor<float> read_npz(const std::filesystem::path& path, const std::string& name) {

@@ -12,6 +12,7 @@ namespace traceflow {
 // to 64 bits and bool, C order (Fortran order is transposed). Throws InputError for object arrays, other
 // types, and sizes that the file does not hold (checked before memory is taken). A scalar is read as an array
 // of one element.
+Tensor<float> read_npy(InputFile file);
 Tensor<float> read_npy(const std::filesystem::path& path);
 // The array `name` of a .npz (zip, stored or deflated); an empty name takes the only one.
 Tensor<float> read_npz(const std::filesystem::path& path, const std::string& name = "");
@@ -24,7 +25,9 @@ class NpyFile {
  public:
   // A .npy, or by the extension .npz the array `name` of one (empty: the only one). A deflated array is
   // unpacked once into a nameless temporary file.
-  explicit NpyFile(const std::filesystem::path& path, const std::string& name = "");
+  explicit NpyFile(InputFile file, const std::string& name = "");
+  explicit NpyFile(const std::filesystem::path& path, const std::string& name = "")
+      : NpyFile(InputFile(path), name) {}
 
   const std::filesystem::path& path() const { return file_.path(); }
   const Shape& shape() const { return shape_; }
