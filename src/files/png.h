@@ -1,22 +1,27 @@
 #pragma once
 
 #include <filesystem>
-#include <span>
 #include <string>
 
 #include "base/tensor.h"
 #include "files/eight_bit.h"
+#include "files/input_file.h"
 
 namespace traceflow {
 
-// An 8-bit image as stored, H×W×C with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA). 16-bit files keep
-// their high byte; palettes are expanded. Throws InputError for what is not a PNG or is larger than 32,768
-// pixels a side.
+// An image as stored, H×W×C with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA); palettes are expanded,
+// 16 bits rounded to 8. Throws InputError for what is not a PNG or is larger than 32,768 pixels a side or 2²⁸
+// in all.
+Tensor<uint8_t> read_png(const InputFile& file);
 Tensor<uint8_t> read_png(const std::filesystem::path& path);
-// Width and height from the header alone.
+// The same in 16 bits, 65,535 being full.
+Tensor<uint16_t> read_png16(const InputFile& file);
+// What the header alone says.
 struct PngSize {
   int width, height, channels;
+  int bits = 8;  // of a stored number, before anything is expanded: 1 to 16
 };
+PngSize read_png_size(const InputFile& file);
 PngSize read_png_size(const std::filesystem::path& path);
 // pixels: H×W (grey) or H×W×C. Written atomically.
 void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels);

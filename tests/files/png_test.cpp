@@ -89,14 +89,41 @@ TEST(Png, grey_of_rank_two_reads_as_one_channel) {
   EXPECT_TRUE(std::equal(read.data(), read.data() + read.size(), pixels.data()));
 }
 
-TEST(Png, sixteen_bits_keep_the_high_byte) {
+TEST(Png, sixteen_bits_are_kept_where_asked_and_else_rounded) {
   const TempFolder folder;
-  write_raw(folder / "deep.png", 2, 1, 16, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
-            {{0x12, 0xff, 0xab, 0x01}});
-  const Tensor<uint8_t> read = read_png(folder / "deep.png");
-  ASSERT_EQ(read.shape(), (Shape{1, 2, 1}));
-  EXPECT_EQ(read[0], 0x12);
-  EXPECT_EQ(read[1], 0xab);
+  std::vector<uint8_t> row;
+  for (int v = 0; v < 65536; ++v) {
+    row.push_back(static_cast<uint8_t>(v >> 8));
+    row.push_back(static_cast<uint8_t>(v & 255));
+  }
+  write_raw(folder / "deep.png", 16384, 1, 16, PNG_COLOR_TYPE_RGB_ALPHA, PNG_INTERLACE_NONE, {row});
+  const InputFile file(folder / "deep.png");
+  const Tensor<uint8_t> rounded = read_png(file);
+  const Tensor<uint16_t> kept = read_png16(file);
+  ASSERT_EQ(rounded.shape(), (Shape{1, 16384, 4}));
+  ASSERT_EQ(kept.shape(), (Shape{1, 16384, 4}));
+  for (int v = 0; v < 65536; ++v) {
+    ASSERT_EQ(kept[v], v);
+    ASSERT_EQ(rounded[v], std::lround(v / 257.0)) << v;
+  }
+  EXPECT_EQ(read_png_size(file).bits, 16);
+}
+
+TEST(Png, fewer_bits_fill_sixteen) {
+  const TempFolder folder;
+  write_raw(folder / "palette.png", 2, 1, 8, PNG_COLOR_TYPE_PALETTE, PNG_INTERLACE_NONE, {{1, 0}},
+            {{1, 2, 3}, {4, 5, 255}}, {255, 7});
+  const Tensor<uint16_t> palette = read_png16(InputFile(folder / "palette.png"));
+  ASSERT_EQ(palette.shape(), (Shape{1, 2, 4}));
+  const int expected[] = {4, 5, 255, 7, 1, 2, 3, 255};
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(palette[i], 257 * expected[i]) << i;
+
+  write_raw(folder / "bits.png", 8, 1, 1, PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_ADAM7, {{0b10100001}});
+  const Tensor<uint16_t> bits = read_png16(InputFile(folder / "bits.png"));
+  ASSERT_EQ(bits.shape(), (Shape{1, 8, 1}));
+  EXPECT_EQ(bits[0], 65535);
+  EXPECT_EQ(bits[1], 0);
+  EXPECT_EQ(read_png_size(folder / "bits.png").bits, 1);
 }
 
 TEST(Png, palettes_small_depths_and_interlacing_expand) {
@@ -168,9 +195,11 @@ std::string header_only(uint32_t width, uint32_t height) {
 
 TEST(PngHostile, huge_headers_are_refused_before_memory_is_taken) {
   const TempFolder folder;
-  write_bytes(folder / "huge.png", header_only(32768, 32768));
+  write_bytes(folder / "huge.png", header_only(32768, 8192));
   EXPECT_EQ(read_png_size(folder / "huge.png").width, 32768);
   EXPECT_THROW(read_png(folder / "huge.png"), InputError);
+  write_bytes(folder / "more.png", header_only(32768, 8193));
+  EXPECT_THROW(read_png_size(folder / "more.png"), InputError);
   write_bytes(folder / "wide.png", header_only(32769, 1));
   EXPECT_THROW(read_png_size(folder / "wide.png"), InputError);
   write_bytes(folder / "none.png", header_only(0, 1));

@@ -1,0 +1,149 @@
+#include <png.h>
+
+#include <bit>
+#include <csetjmp>
+#include <new>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/error.h"
+#include "files/png.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr int64_t max_side = 32768;
+constexpr int64_t max_pixels = int64_t{1} << 28;
+// Deflate cannot grow data by more than this; a header that promises more than the file can hold is refused
+// before its memory is taken.
+constexpr int64_t max_inflation = 1032;
+
+// libpng leaves by longjmp, which skips destructors: everything that owns memory lives here, outside the
+// jump.
+struct PngSource {
+  const InputFile& file;
+  int64_t offset = 0;
+  std::string error = {};
+};
+
+void on_error(png_structp png, png_const_charp text) {
+  static_cast<PngSource*>(png_get_error_ptr(png))->error = text;
+  png_longjmp(png, 1);
+}
+void on_warning(png_structp, png_const_charp) {}
+
+void read_bytes(png_structp png, png_bytep bytes, size_t count) {
+  auto* source = static_cast<PngSource*>(png_get_io_ptr(png));
+  if (source->offset + static_cast<int64_t>(count) > source->file.size())
+    png_error(png, "the file is cut short");
+  bool ok = true;
+  try {
+    source->file.read_at(source->offset, std::as_writable_bytes(std::span(bytes, count)));
+  } catch (const std::exception&) {
+    ok = false;
+  }
+  if (!ok) png_error(png, "the file cannot be read");
+  source->offset += static_cast<int64_t>(count);
+}
+
+class PngReader {
+ public:
+  // bits: of a number in what is read, 8 or 16.
+  PngReader(const InputFile& file, int bits) : source_{file}, bits_(bits) {
+    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source_, on_error, on_warning);
+    if (png_ != nullptr) info_ = png_create_info_struct(png_);
+    if (info_ == nullptr) {
+      png_destroy_read_struct(&png_, &info_, nullptr);
+      throw std::bad_alloc();
+    }
+  }
+  ~PngReader() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngReader(const PngReader&) = delete;
+  PngReader& operator=(const PngReader&) = delete;
+
+  PngSize read_header() {
+    if (!try_header()) fail();
+    const PngSize size{static_cast<int>(png_get_image_width(png_, info_)),
+                       static_cast<int>(png_get_image_height(png_, info_)),
+                       static_cast<int>(png_get_channels(png_, info_)), stored_bits_};
+    if (int64_t{size.width} * size.height > max_pixels) fail(size_text(size));
+    return size;
+  }
+  template <class T>
+  Tensor<T> read_pixels(const PngSize& size) {
+    if (stored_row_bytes_ * size.height / max_inflation > source_.file.size())
+      fail("a file too short for an image of " + size_text(size));
+    Tensor<T> pixels;
+    pixels.resize({size.height, size.width, size.channels});
+    std::vector<png_bytep> rows(static_cast<size_t>(size.height));
+    for (size_t y = 0; y < rows.size(); ++y) {
+      rows[y] = reinterpret_cast<png_bytep>(pixels.row(static_cast<int64_t>(y)));
+    }
+    if (!try_pixels(rows.data())) fail();
+    return pixels;
+  }
+
+ private:
+  static std::string size_text(const PngSize& size) {
+    return std::to_string(size.width) + "×" + std::to_string(size.height);
+  }
+  bool try_header() {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;
+    png_set_read_fn(png_, &source_, read_bytes);
+    png_set_user_limits(png_, max_side, max_side);
+    png_set_chunk_cache_max(png_, 128);
+    png_set_chunk_malloc_max(png_, 8U << 20);
+    png_read_info(png_, info_);
+    stored_row_bytes_ = static_cast<int64_t>(png_get_rowbytes(png_, info_));
+    stored_bits_ = png_get_bit_depth(png_, info_);
+    png_set_expand(png_);
+    if (bits_ == 8) {
+      png_set_scale_16(png_);
+    } else {
+      png_set_expand_16(png_);
+      if (std::endian::native == std::endian::little) png_set_swap(png_);
+    }
+    png_set_interlace_handling(png_);
+    png_read_update_info(png_, info_);
+    return true;
+  }
+  bool try_pixels(png_bytepp rows) {
+    if (setjmp(png_jmpbuf(png_)) != 0) return false;
+    png_read_image(png_, rows);
+    png_read_end(png_, nullptr);
+    return true;
+  }
+  [[noreturn]] void fail() const { fail(source_.error); }
+  [[noreturn]] void fail(const std::string& found) const {
+    throw InputError(source_.file.path().string(), "", found,
+                     "a PNG image of at most 32,768 pixels a side and 2²⁸ in all",
+                     "write or copy the file again");
+  }
+
+  PngSource source_;
+  const int bits_;
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+  int64_t stored_row_bytes_ = 0;  // before palettes and small depths are expanded
+  int stored_bits_ = 8;
+};
+
+}  // namespace
+
+PngSize read_png_size(const InputFile& file) { return PngReader(file, 8).read_header(); }
+PngSize read_png_size(const std::filesystem::path& path) { return read_png_size(InputFile(path)); }
+
+Tensor<uint8_t> read_png(const InputFile& file) {
+  PngReader reader(file, 8);
+  return reader.read_pixels<uint8_t>(reader.read_header());
+}
+Tensor<uint8_t> read_png(const std::filesystem::path& path) { return read_png(InputFile(path)); }
+
+Tensor<uint16_t> read_png16(const InputFile& file) {
+  PngReader reader(file, 16);
+  return reader.read_pixels<uint16_t>(reader.read_header());
+}
+
+}  // namespace traceflow
