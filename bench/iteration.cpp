@@ -1,7 +1,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "on_device.h"
 #include "render/frame_kernels.h"
 #include "render/renderer.h"

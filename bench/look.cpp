@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "render/renderer.h"
 #include "scene/rows.h"
 #include "show/ellipses.h"

@@ -1,7 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include "base/parallel.h"
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "render/renderer.h"
 #include "train/initialise.h"
 #include "train/objective.h"

@@ -1,15 +1,13 @@
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "base/options.h"
 #include "base/tensor.h"
+#include "capture/formats/capture_options.h"
 #include "math/camera.h"
 #include "scene/scene.h"
 
@@ -37,36 +35,12 @@ struct ViewTruth {
   Tensor<float> depth;   // H×W, camera z in scene units, 0 where there is none
 };
 
-// Axes of the normal priors' camera space, as signs against OpenCV's (x right, y down, z forward): opengl + −
-// −, opencv + + +, stable_normal − − −. `automatic` is opengl, unless the geometry clearly speaks for another
-// (docs/captures.md).
-enum class PriorAxes { automatic, opengl, opencv, stable_normal };
-constexpr std::array<std::string_view, 4> enum_names(PriorAxes) {
-  return {"automatic", "opengl", "opencv", "stable-normal"};
-}
-
-struct CaptureOptions {
-  int downscale = 1;
-  PriorAxes prior_axes = PriorAxes::automatic;
-  int64_t cache_mebibytes = 1024;
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.field("downscale", downscale, "", "Uses rgb/Kx where it exists, else box-filters rgb/1x.");
-    v.field("prior_axes", prior_axes, "",
-            "Axes of the normal priors: automatic, opengl (x right, y up, z to the viewer), "
-            "opencv, or stable-normal (opencv negated).");
-    v.field("cache_mebibytes", cache_mebibytes, "MiB", "Memory that decoded images may take.");
-  }
-  void validate() const;
-};
-
 class ImageCache;
 
 struct Capture {
   std::string name;
-  std::string format;  // "nerf-ds", "nerfies", "hypernerf-interp", "hypernerf-vrig"
-  std::filesystem::path folder;
+  std::string format;            // docs/captures.md has the names
+  std::filesystem::path folder;  // or archive
   std::vector<View> train;
   std::vector<View> test;
   Tensor<float> points;  // P×3, normalised scene; may be empty
@@ -82,8 +56,9 @@ struct Capture {
   std::shared_ptr<ImageCache> images;
 };
 
-// Reads the folder's metadata; images are decoded when asked for. Throws InputError.
-Capture load_capture(const std::filesystem::path& folder, const CaptureOptions& options);
+// Reads what a folder or a zip archive says about its views; images are decoded when asked for. Throws
+// InputError.
+Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options);
 
 // Decodes a view's pixels, or finds them in the cache, whose size is bounded. Safe to call from several
 // threads.

@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "capture/resample.h"
+#include "capture/lens/resample.h"
+#include "files/image.h"
 #include "files/png.h"
 
 namespace traceflow {
@@ -44,12 +45,12 @@ Tensor<float> normals_on_view_grid(const ViewSource& view, Tensor<float> normals
   return normals;
 }
 
-Tensor<float> read_normal_png(const std::filesystem::path& path) {
+Tensor<float> read_normal_image(const TreeFile& file) {
   // A unit vector never comes near such a length: black and white say "no value".
   constexpr float longest = 1.5F;
-  const Tensor<uint8_t> pixels = read_png(path);
+  const Tensor<uint8_t> pixels = read_image(file.open());
   if (pixels.dim(2) < 3) {
-    throw InputError(path.string(), "channels", std::to_string(pixels.dim(2)), "3 (normals as 2v - 1)");
+    throw InputError(file.name(), "channels", std::to_string(pixels.dim(2)), "3 (normals as 2v - 1)");
   }
   Tensor<float> normals({pixels.dim(0), pixels.dim(1), 3});
   for (int64_t i = 0; i < normals.size() / 3; ++i) {
@@ -59,11 +60,11 @@ Tensor<float> read_normal_png(const std::filesystem::path& path) {
   return normals;
 }
 
-Tensor<float> read_depth(const std::filesystem::path& path) {
-  Tensor<float> depth = read_npy(path);
+Tensor<float> read_depth(const TreeFile& file) {
+  Tensor<float> depth = read_npy(file.open());
   const int rank = depth.shape().rank();
   if (depth.empty() || !(rank == 2 || (rank == 3 && depth.dim(2) == 1))) {
-    throw InputError(path.string(), "shape", depth.shape().to_string(), "H×W");
+    throw InputError(file.name(), "shape", depth.shape().to_string(), "H×W");
   }
   constexpr float farthest = 1e6F;
   Tensor<float> result({depth.dim(0), depth.dim(1), 1});
@@ -91,10 +92,10 @@ Tensor<float> depth_on_view_grid(const ViewSource& view, Tensor<float> depth, fl
 }  // namespace
 
 Tensor<uint8_t> decode_colour(const ViewSource& view) {
-  const Tensor<uint8_t> pixels = read_png(view.image);
+  const Tensor<uint8_t> pixels = read_image(view.image.open());
   if (pixels.dim(1) != static_cast<int64_t>(view.lens.width) ||
       pixels.dim(0) != static_cast<int64_t>(view.lens.height)) {
-    throw InputError(view.image.string(), "size", pixels.shape().to_string(),
+    throw InputError(view.image.name(), "size", pixels.shape().to_string(),
                      "the size it had when the capture was opened");
   }
   const int64_t stored = pixels.dim(2), step = stored >= 3 ? 1 : 0;
@@ -108,7 +109,7 @@ Tensor<uint8_t> decode_colour(const ViewSource& view) {
 }
 
 Tensor<uint8_t> decode_mask(const ViewSource& view) {
-  const Tensor<uint8_t> pixels = read_png(view.mask);
+  const Tensor<uint8_t> pixels = read_image(view.mask.open());
   Tensor<float> mask({pixels.dim(0), pixels.dim(1), 1});
   for (int64_t i = 0; i < mask.size(); ++i) {
     const bool white = pixels[i * pixels.dim(2)] >= 128;
@@ -122,14 +123,13 @@ Tensor<uint8_t> decode_mask(const ViewSource& view) {
 
 Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture) {
   return normals_on_view_grid(view, view.prior_slice >= 0 ? capture.prior_array->slice(view.prior_slice)
-                                                          : read_normal_png(view.prior));
+                                                          : read_normal_image(view.prior));
 }
 
 ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture) {
   ViewTruth truth;
-  if (!view.truth_normal.empty())
-    truth.normal = normals_on_view_grid(view, read_normal_png(view.truth_normal));
-  if (!view.truth_depth.empty()) {
+  if (view.truth_normal) truth.normal = normals_on_view_grid(view, read_normal_image(view.truth_normal));
+  if (view.truth_depth) {
     truth.depth = depth_on_view_grid(view, read_depth(view.truth_depth), static_cast<float>(capture.scale));
   }
   return truth;

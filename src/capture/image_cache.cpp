@@ -37,7 +37,7 @@ int64_t ImageCache::bytes() const {
 
 int64_t ImageCache::bytes_of(const std::string& id) const {
   const ViewSource& view = source(id);
-  return view.width() * view.height() * (3 + (view.mask.empty() ? 0 : 1) + (view.has_prior() ? 6 : 0));
+  return view.width() * view.height() * (3 + (view.mask ? 1 : 0) + (view.has_prior() ? 6 : 0));
 }
 
 std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
@@ -59,7 +59,7 @@ ViewPixels ImageCache::decode(const std::string& id) const {
   const ViewSource& view = source(id);
   ViewPixels pixels;
   pixels.colour = decode_colour(view);
-  if (!view.mask.empty()) pixels.mask = decode_mask(view);
+  if (view.mask) pixels.mask = decode_mask(view);
   if (view.has_prior()) {
     Tensor<float> normals = decode_prior(view, capture_);
     turn_to_world(normals, view, capture_.prior_signs);

@@ -22,10 +22,10 @@ Inspection::Split inspect_split(const Capture& capture, const std::vector<View>&
   for (const View& view : views) {
     const ViewSource& source = capture.images->source(view.id);
     ++split.views;
-    split.masks += source.mask.empty() ? 0 : 1;
+    split.masks += source.mask ? 1 : 0;
     split.normal_priors += source.has_prior() ? 1 : 0;
-    split.truth_normals += source.truth_normal.empty() ? 0 : 1;
-    split.truth_depths += source.truth_depth.empty() ? 0 : 1;
+    split.truth_normals += source.truth_normal ? 1 : 0;
+    split.truth_depths += source.truth_depth ? 1 : 0;
     times.insert(view.time);
   }
   split.times = static_cast<int64_t>(times.size());
@@ -46,7 +46,7 @@ void inspect_cameras(const Capture& capture, Inspection& result) {
     }
   }
   const ViewSource& first = capture.images->source(capture.train.front().id);
-  result.image_folder = "rgb/" + first.image.parent_path().filename().string();
+  result.image_folder = std::filesystem::path(first.image.path).parent_path().string();
   result.box_factor = first.factor;
   const Camera<float>& camera = capture.train.front().camera;
   const double left = camera.centre_x / camera.focal_x;

@@ -1,78 +1,47 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <mutex>
 #include <set>
+#include <unordered_map>
 
+#include "base/error.h"
 #include "base/parallel.h"
-#include "capture/camera_file.h"
 #include "capture/capture.h"
 #include "capture/decode.h"
+#include "capture/formats/formats.h"
 #include "capture/image_cache.h"
-#include "capture/layout.h"
 #include "capture/prior_axes.h"
-#include "files/png.h"
+#include "files/image.h"
 
 namespace traceflow {
 
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr int largest_downscale = 64;
-
-// rgb/Mx and the factor that is left to filter: M·factor = downscale, M as large as the folder has.
-struct ImageFolder {
-  int stored = 1;
-  int factor = 1;
-};
-
-std::string scale_name(int scale) { return std::to_string(scale) + "x"; }
-
-ImageFolder choose_images(const fs::path& folder, int downscale) {
-  for (int stored = downscale; stored >= 1; --stored) {
-    if (downscale % stored == 0 && fs::is_directory(folder / "rgb" / scale_name(stored))) {
-      return {stored, downscale / stored};
-    }
-  }
-  std::string found;
-  for (int stored = 1; stored <= largest_downscale; ++stored) {
-    if (fs::is_directory(folder / "rgb" / scale_name(stored)))
-      found += (found.empty() ? "" : ", ") + scale_name(stored);
-  }
-  throw InputError((folder / "rgb").string(), "", found.empty() ? "no images" : found,
-                   "images at 1x or at a divisor of the downscale (" + std::to_string(downscale) + ")",
-                   found.empty() ? "" : "use a --downscale that the folder has");
+bool differs_in_proportions(const ImageSize& size, const Lens& lens) {
+  const double stretch = (size.width / lens.width) / (size.height / lens.height);
+  return std::abs(stretch - 1) > 0.02;
 }
 
-// The first of the candidates that exists, or an empty path.
-fs::path first_file(std::initializer_list<fs::path> candidates) {
-  for (const fs::path& path : candidates) {
-    if (fs::is_regular_file(path)) return path;
-  }
-  return {};
-}
-
-// Reads a capture step by step; each step leaves its results and warnings in `capture` and `sources`.
-class Loader {
+// Makes views of what a reader found, step by step; each step leaves its results and warnings in `capture_`
+// and `sources_`.
+class Assembly {
  public:
-  Loader(const fs::path& folder, const CaptureOptions& options) : options_(options) {
-    capture_.folder = folder;
-    const fs::path whole = fs::weakly_canonical(folder);
-    capture_.name = whole.filename().string();
-    layout_ = read_layout(whole, capture_.warnings);
-    capture_.format = layout_.format;
-    capture_.normalisation = layout_.normalisation;
-    capture_.near_plane = static_cast<float>(layout_.near_plane);
-    capture_.far_plane = static_cast<float>(layout_.far_plane);
-    shared_.scale = layout_.normalisation.scale;
-    images_ = choose_images(folder, options.downscale);
+  Assembly(const std::filesystem::path& path, const CaptureOptions& options)
+      : options_(options), tree_(FileTree::open(path)), found_(read_capture(tree_, options)) {
+    capture_.folder = path;
+    const std::filesystem::path whole = std::filesystem::weakly_canonical(path);
+    capture_.name = (std::filesystem::is_directory(path) ? whole.filename() : whole.stem()).string();
+    capture_.format = found_.format;
+    capture_.normalisation = found_.normalisation;
+    capture_.near_plane = static_cast<float>(found_.near_plane);
+    capture_.far_plane = static_cast<float>(found_.far_plane);
+    capture_.warnings = std::move(found_.warnings);
+    shared_.scale = found_.normalisation.scale;
   }
 
-  Capture load() {
-    read_views();
+  Capture finish() {
+    make_views();
     set_extent();
-    read_points();
+    take_points();
     find_masks();
     find_priors();
     find_truth();
@@ -85,46 +54,44 @@ class Loader {
  private:
   void warn(const std::string& text) { capture_.warnings.push_back(text); }
 
-  fs::path image_path(const std::string& id) const {
-    return capture_.folder / "rgb" / scale_name(images_.stored) / (id + ".png");
+  // The first of the candidates that exists, or none.
+  TreeFile first_file(std::initializer_list<std::string> candidates) const {
+    for (const std::string& path : candidates) {
+      if (tree_->has(path)) return {tree_, path};
+    }
+    return {};
   }
 
-  void read_views() {
-    double last = 0;
-    for (const auto& [id, time] : layout_.time_id) last = std::max(last, time);
-    last_time_ = last > 0 ? last : 1;
-    if (!(last > 0)) warn("metadata.json: all views have time 0: the scene cannot move");
-    capture_.train = read_split(layout_.train_ids, "training");
-    capture_.test = read_split(layout_.test_ids, "test");
-    if (capture_.train.empty()) {
+  void make_views() {
+    for (const auto* split : {&found_.train, &found_.test}) {
+      for (const FoundView& view : *split) last_time_ = std::max(last_time_, view.time);
+    }
+    if (found_.train.empty()) {
       throw InputError(capture_.folder.string(), "training views", "none that is whole",
                        "an image, a camera and a time each",
                        "see what is missing: " + (capture_.warnings.empty() ? "" : capture_.warnings.back()));
     }
+    if (!(last_time_ > 0)) {
+      warn("all views have time 0: the scene cannot move");
+      last_time_ = 1;
+    }
+    capture_.train = make_split(found_.train);
+    capture_.test = make_split(found_.test);
     warn_about_sizes();
   }
 
-  std::vector<View> read_split(const std::vector<std::string>& ids, const std::string& name) {
-    const auto camera_path = [&](const std::string& id) {
-      return capture_.folder / "camera" / (id + ".json");
-    };
-    const auto whole = keep(
-        keep(keep(ids, name, "image", [&](const auto& id) { return fs::is_regular_file(image_path(id)); }),
-             name, "camera", [&](const auto& id) { return fs::is_regular_file(camera_path(id)); }),
-        name, "entry in metadata.json", [&](const auto& id) { return layout_.time_id.contains(id); });
-    std::vector<View> views(whole.size());
-    std::vector<ViewSource> sources(whole.size());
-    std::vector<std::string> misfits(whole.size());
+  std::vector<View> make_split(const std::vector<FoundView>& found) {
+    std::vector<View> views(found.size());
+    std::vector<ViewSource> sources(found.size());
+    std::vector<std::string> misfits(found.size());
     parallel_for(
-        "capture: cameras", static_cast<int64_t>(whole.size()),
+        "capture: cameras", static_cast<int64_t>(found.size()),
         [&](int64_t n) {
           const auto i = static_cast<size_t>(n);
-          const CapturedCamera camera = read_camera(camera_path(whole[i]));
-          const PngSize size = read_png_size(image_path(whole[i]));
-          sources[i] = source_of(whole[i], camera, size);
-          views[i] = view_of(whole[i], camera, sources[i]);
-          const double stretch = (size.width / camera.lens.width) / (size.height / camera.lens.height);
-          if (std::abs(stretch - 1) > 0.02) misfits[i] = whole[i];
+          const ImageSize size = read_image_size(found[i].image.open());
+          sources[i] = source_of(found[i], size);
+          views[i] = view_of(found[i], sources[i]);
+          if (differs_in_proportions(size, found[i].lens)) misfits[i] = found[i].id;
         },
         1);
     std::erase(misfits, "");
@@ -132,40 +99,26 @@ class Loader {
       warn("image_size of " + ids_text(misfits) +
            " has other proportions than the image: the camera is stretched to it");
     }
-    for (size_t i = 0; i < whole.size(); ++i) sources_.emplace(whole[i], std::move(sources[i]));
+    for (size_t i = 0; i < found.size(); ++i) sources_.emplace(found[i].id, std::move(sources[i]));
     return views;
   }
 
-  template <class F>
-  std::vector<std::string> keep(const std::vector<std::string>& ids, const std::string& split,
-                                const std::string& what, F&& exists) {
-    std::vector<std::string> kept, missing;
-    for (const std::string& id : ids) (exists(id) ? kept : missing).push_back(id);
-    if (!missing.empty()) {
-      warn(std::to_string(missing.size()) + " of " + std::to_string(ids.size()) + " " + split +
-           " views have no " + what + " (" + ids_text(missing) + "): left out");
-    }
-    return kept;
-  }
-
-  ViewSource source_of(const std::string& id, const CapturedCamera& camera, const PngSize& size) const {
+  ViewSource source_of(const FoundView& found, const ImageSize& size) const {
     ViewSource source;
-    source.image = image_path(id);
-    source.lens = camera.lens.resized(size.width, size.height);
-    source.factor = images_.factor;
+    source.image = found.image;
+    source.lens = found.lens.resized(size.width, size.height);
+    source.factor = found_.images.factor;
     if (source.width() < 1 || source.height() < 1) {
       throw InputError(
-          source.image.string(), "size", std::to_string(size.width) + "×" + std::to_string(size.height),
-          "at least " + std::to_string(images_.factor) + " pixels a side", "use a smaller --downscale");
+          source.image.name(), "size", std::to_string(size.width) + "×" + std::to_string(size.height),
+          "at least " + std::to_string(source.factor) + " pixels a side", "use a smaller --downscale");
     }
-    if (!source.lens.is_pinhole()) {
-      source.zoom = pinhole_zoom(source.lens, (capture_.folder / "camera" / (id + ".json")).string());
-    }
-    source.camera_from_world = camera.camera_from_world;
+    if (!source.lens.is_pinhole()) source.zoom = pinhole_zoom(source.lens, found.camera_name);
+    source.camera_from_world = found.camera_from_world;
     return source;
   }
 
-  View view_of(const std::string& id, const CapturedCamera& captured, const ViewSource& source) const {
+  View view_of(const FoundView& found, const ViewSource& source) const {
     const Lens& lens = source.lens;
     Camera<double> camera;
     camera.width = static_cast<int>(source.width());
@@ -174,9 +127,9 @@ class Loader {
     camera.focal_y = source.zoom * lens.focal.y / source.factor;
     camera.centre_x = lens.centre.x / source.factor;
     camera.centre_y = lens.centre.y / source.factor;
-    camera.camera_from_world = captured.camera_from_world;
-    camera.position = layout_.normalisation.in_scene(captured.position);
-    return {id, static_cast<float>(layout_.time_id.at(id) / last_time_), convert<float>(camera)};
+    camera.camera_from_world = found.camera_from_world;
+    camera.position = found_.normalisation.in_scene(found.position);
+    return {found.id, static_cast<float>(found.time / last_time_), convert<float>(camera)};
   }
 
   void warn_about_sizes() {
@@ -209,29 +162,25 @@ class Loader {
     }
   }
 
-  void read_points() {
-    const fs::path path = capture_.folder / "points.npy";
-    if (!fs::exists(path)) return warn("points.npy is missing: surfels start at random");
-    const Tensor<float> raw = read_npy(path);
-    if (raw.shape().rank() != 2 || raw.dim(1) != 3) {
-      throw InputError(path.string(), "shape", raw.shape().to_string(), "P×3");
-    }
+  void take_points() {
+    if (found_.points_file.empty()) return warn("points.npy is missing: surfels start at random");
     std::vector<float> kept;
-    kept.reserve(static_cast<size_t>(raw.size()));
-    for (int64_t i = 0; i < raw.dim(0); ++i) {
-      const Vec3<float> x(layout_.normalisation.in_scene(load3<double>(raw.row(i))));
+    kept.reserve(3 * found_.points.size());
+    for (const Vec3<double>& point : found_.points) {
+      const Vec3<float> x(found_.normalisation.in_scene(point));
       if (!std::isfinite(x.x) || !std::isfinite(x.y) || !std::isfinite(x.z)) continue;
       kept.insert(kept.end(), {x.x, x.y, x.z});
     }
-    const auto count = static_cast<int64_t>(kept.size() / 3);
-    capture_.points = Tensor<float>({count, 3});
+    const size_t count = kept.size() / 3, all = found_.points.size();
+    capture_.points = Tensor<float>({static_cast<int64_t>(count), 3});
     std::copy(kept.begin(), kept.end(), capture_.points.data());
-    if (count < raw.dim(0)) {
-      warn("points.npy: " + std::to_string(raw.dim(0) - count) + " of " + std::to_string(raw.dim(0)) +
+    if (count < all) {
+      warn(found_.points_file + ": " + std::to_string(all - count) + " of " + std::to_string(all) +
            " points are not finite: left out");
     }
     if (count > 0 && share_seen() < 0.1) {
-      warn("points.npy: hardly any point falls into an image; is it in the capture's own coordinates?");
+      warn(found_.points_file +
+           ": hardly any point falls into an image; is it in the capture's own coordinates?");
     }
   }
 
@@ -271,21 +220,21 @@ class Loader {
   }
 
   void find_masks() {
-    const fs::path& folder = capture_.folder;
-    const std::string scale = scale_name(images_.stored);
+    const std::string scale = std::to_string(found_.images.stored) + "x";
+    const auto in = [&](const std::string& folder, const std::string& id) {
+      const std::string twice = "/" + id + ".png.png", once = "/" + id + ".png";
+      return first_file({folder + "/" + scale + twice, folder + "/" + scale + once, folder + "/1x" + twice,
+                         folder + "/1x" + once});
+    };
     for (auto& [id, source] : sources_) {
-      const std::string twice = id + ".png.png", once = id + ".png";
-      source.mask = first_file({folder / "mask" / scale / twice, folder / "mask" / scale / once,
-                                folder / "mask/1x" / twice, folder / "mask/1x" / once});
-      if (source.mask.empty()) {
-        source.mask =
-            first_file({folder / "resized_mask" / scale / twice, folder / "resized_mask" / scale / once,
-                        folder / "resized_mask/1x" / twice, folder / "resized_mask/1x" / once});
-        source.mask_is_inverted = !source.mask.empty();
+      source.mask = in("mask", id);
+      if (!source.mask) {
+        source.mask = in("resized_mask", id);
+        source.mask_is_inverted = static_cast<bool>(source.mask);
       }
-      capture_.has_masks |= !source.mask.empty();
+      capture_.has_masks |= static_cast<bool>(source.mask);
     }
-    const auto has = [](const ViewSource& source) { return !source.mask.empty(); };
+    const auto has = [](const ViewSource& source) { return static_cast<bool>(source.mask); };
     warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has),
                     "training views have no mask");
     warn_if_partial(capture_.test, ids_without(capture_.test, sources_, has), "test views have no mask");
@@ -293,15 +242,13 @@ class Loader {
   }
 
   void find_priors() {
-    const fs::path& folder = capture_.folder;
-    const std::string scale = scale_name(images_.stored);
+    const std::string scale = std::to_string(found_.images.stored) + "x";
     for (auto& [id, source] : sources_) {
-      source.prior =
-          first_file({folder / "normal" / scale / (id + ".png"), folder / "normal/1x" / (id + ".png")});
-      capture_.has_normal_priors |= !source.prior.empty();
+      source.prior = first_file({"normal/" + scale + "/" + id + ".png", "normal/1x/" + id + ".png"});
+      capture_.has_normal_priors |= static_cast<bool>(source.prior);
     }
-    const fs::path array = first_file({folder / "normal.npz", folder / "normal.npy"});
-    if (!capture_.has_normal_priors && !array.empty()) take_prior_array(array);
+    const TreeFile array = first_file({"normal.npz", "normal.npy"});
+    if (!capture_.has_normal_priors && array) take_prior_array(array);
     if (!capture_.has_normal_priors) return;
     const auto has = [](const ViewSource& source) { return source.has_prior(); };
     warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has),
@@ -309,19 +256,19 @@ class Loader {
     warn_about_proportions("normal prior", [](const ViewSource& source) { return source.prior; });
   }
 
-  // One element for each training id in the order of dataset.json, or one for each of all ids.
-  void take_prior_array(const fs::path& path) {
-    shared_.prior_array.emplace(path);
+  // One element for each training id in the order of the capture's list, or one for each of all ids.
+  void take_prior_array(const TreeFile& file) {
+    shared_.prior_array.emplace(file.open());
     const Shape& shape = shared_.prior_array->shape();
-    const bool fits_train = shape.rank() == 4 && shape[0] == static_cast<int64_t>(layout_.train_ids.size());
-    const bool fits_all = shape.rank() == 4 && shape[0] == static_cast<int64_t>(layout_.all_ids.size());
+    const bool fits_train = shape.rank() == 4 && shape[0] == static_cast<int64_t>(found_.train_ids.size());
+    const bool fits_all = shape.rank() == 4 && shape[0] == static_cast<int64_t>(found_.all_ids.size());
     if ((!fits_train && !fits_all) || shape[3] != 3 || shape.elements() == 0) {
-      throw InputError(path.string(), "shape", shape.to_string(),
-                       "T×H×W×3 with T the training views (" + std::to_string(layout_.train_ids.size()) +
-                           ") or all (" + std::to_string(layout_.all_ids.size()) + ")",
+      throw InputError(file.name(), "shape", shape.to_string(),
+                       "T×H×W×3 with T the training views (" + std::to_string(found_.train_ids.size()) +
+                           ") or all (" + std::to_string(found_.all_ids.size()) + ")",
                        "make the priors again or take the file away");
     }
-    const std::vector<std::string>& ids = fits_train ? layout_.train_ids : layout_.all_ids;
+    const std::vector<std::string>& ids = fits_train ? found_.train_ids : found_.all_ids;
     for (size_t i = 0; i < ids.size(); ++i) {
       const auto found = sources_.find(ids[i]);
       if (found != sources_.end()) found->second.prior_slice = static_cast<int64_t>(i);
@@ -329,18 +276,17 @@ class Loader {
     capture_.has_normal_priors = true;
   }
 
-  // Reads the header of every file that `path_of` names; a file that is no PNG ends the loading here, not in
-  // the middle of a run.
+  // Reads the header of every file that `file_of` names; a file that is no image ends the loading here, not
+  // in the middle of a run.
   template <class F>
-  void warn_about_proportions(const std::string& what, F&& path_of) {
+  void warn_about_proportions(const std::string& what, F&& file_of) {
     std::vector<std::string> misfits;
     for (const auto* split : {&capture_.train, &capture_.test}) {
       for (const View& view : *split) {
         const ViewSource& source = sources_.at(view.id);
-        if (path_of(source).empty()) continue;
-        const PngSize size = read_png_size(path_of(source));
-        const double stretch = (size.width / source.lens.width) / (size.height / source.lens.height);
-        if (std::abs(stretch - 1) > 0.02) misfits.push_back(view.id);
+        const TreeFile file = file_of(source);
+        if (file && differs_in_proportions(read_image_size(file.open()), source.lens))
+          misfits.push_back(view.id);
       }
     }
     if (!misfits.empty()) {
@@ -351,12 +297,12 @@ class Loader {
 
   void find_truth() {
     for (auto& [id, source] : sources_) {
-      source.truth_normal = first_file({capture_.folder / "truth/normal" / (id + ".png")});
-      source.truth_depth = first_file({capture_.folder / "truth/depth" / (id + ".npy")});
+      source.truth_normal = first_file({"truth/normal/" + id + ".png"});
+      source.truth_depth = first_file({"truth/depth/" + id + ".npy"});
     }
     for (const View& view : capture_.test) {
       const ViewSource& source = sources_.at(view.id);
-      capture_.has_truth |= !source.truth_normal.empty() || !source.truth_depth.empty();
+      capture_.has_truth |= source.truth_normal || source.truth_depth;
     }
   }
 
@@ -388,28 +334,19 @@ class Loader {
   }
 
   const CaptureOptions options_;
+  const std::shared_ptr<const FileTree> tree_;
+  FoundCapture found_;
   Capture capture_;
-  CaptureLayout layout_;
-  ImageFolder images_;
   CaptureSource shared_;
   std::unordered_map<std::string, ViewSource> sources_;
-  double last_time_ = 1;
+  double last_time_ = 0;
 };
 
 }  // namespace
 
-void CaptureOptions::validate() const {
-  check_option(downscale >= 1 && downscale <= largest_downscale, "downscale", downscale, "1 to 64");
-  check_option(cache_mebibytes >= 0 && cache_mebibytes <= (int64_t{1} << 30), "cache_mebibytes",
-               cache_mebibytes, "0 to 2^30");
-}
-
-Capture load_capture(const std::filesystem::path& folder, const CaptureOptions& options) {
+Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options) {
   options.validate();
-  if (!fs::is_directory(folder)) {
-    throw InputError(folder.string(), "", fs::exists(folder) ? "a file" : "nothing", "a capture's folder");
-  }
-  return Loader(folder, options).load();
+  return Assembly(path, options).finish();
 }
 
 }  // namespace traceflow

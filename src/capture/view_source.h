@@ -1,18 +1,18 @@
 #pragma once
 
-#include <filesystem>
 #include <optional>
 
-#include "capture/lens.h"
+#include "capture/lens/lens.h"
+#include "files/file_tree.h"
 #include "files/npy.h"
 #include "math/types.h"
 
 namespace traceflow {
 
-// Where a view's pixels come from and what has to be done to them. Paths are empty where the capture lacks
-// the file.
+// Where a view's pixels come from and what has to be done to them. Files are false where the capture lacks
+// them.
 struct ViewSource {
-  std::filesystem::path image, mask, prior, truth_normal, truth_depth;
+  TreeFile image, mask, prior, truth_normal, truth_depth;
   bool mask_is_inverted = false;  // NeRF-DS's resized_mask: black = object
   int64_t prior_slice = -1;       // element of the capture's prior array, where there is one instead of files
   Lens lens;                      // over the stored image
@@ -22,7 +22,7 @@ struct ViewSource {
 
   int64_t width() const { return static_cast<int64_t>(lens.width) / factor; }
   int64_t height() const { return static_cast<int64_t>(lens.height) / factor; }
-  bool has_prior() const { return !prior.empty() || prior_slice >= 0; }
+  bool has_prior() const { return prior || prior_slice >= 0; }
 };
 
 // What all views of a capture share.

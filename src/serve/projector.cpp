@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/machine.h"
-#include "capture/resample.h"
+#include "capture/lens/resample.h"
 #include "files/jpeg.h"
 #include "files/png.h"
 #include "serve/hello.h"

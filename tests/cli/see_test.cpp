@@ -8,7 +8,7 @@
 #include <set>
 #include <thread>
 
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "cli/program.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/frame_progress.h"

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "scene/scene_file.h"
 #include "train/trainer.h"
 

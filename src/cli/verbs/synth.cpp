@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "cli/arguments/option_arguments.h"
 #include "cli/verbs/verbs.h"
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "cli/program.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/npy.h"

@@ -5,9 +5,9 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "capture/synth.h"
-#include "capture/synth_sampler.h"
-#include "capture/synth_scene.h"
+#include "capture/synth/sampler.h"
+#include "capture/synth/scene.h"
+#include "capture/synth/synth.h"
 
 namespace traceflow {
 

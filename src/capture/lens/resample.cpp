@@ -1,4 +1,4 @@
-#include "capture/resample.h"
+#include "capture/lens/resample.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,10 @@
-#include "capture/layout.h"
+#include "capture/formats/nerfies_layout.h"
 
 #include <algorithm>
 #include <set>
 
 #include "base/error.h"
+#include "capture/formats/found_capture.h"
 #include "files/json_document.h"
 
 namespace traceflow {
@@ -36,7 +37,7 @@ std::vector<std::string> read_ids(const JsonFile& dataset, const std::string& ke
 }
 
 // HyperNeRF's interpolation split: of every four frames the first trains and the third tests.
-void split_for_interpolation(CaptureLayout& layout) {
+void split_for_interpolation(NerfiesLayout& layout) {
   const std::vector<std::string>& ids = layout.all_ids.empty() ? layout.train_ids : layout.all_ids;
   std::vector<std::string> train, test;
   for (size_t i = 0; i < ids.size(); ++i) {
@@ -48,9 +49,8 @@ void split_for_interpolation(CaptureLayout& layout) {
   layout.test_ids = std::move(test);
 }
 
-void read_split(const std::filesystem::path& folder, CaptureLayout& layout,
-                std::vector<std::string>& warnings) {
-  const JsonFile dataset(folder / "dataset.json");
+void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<std::string>& warnings) {
+  const JsonFile dataset(tree.open_file("dataset.json"));
   layout.all_ids = read_ids(dataset, "ids", warnings);
   layout.train_ids = read_ids(dataset, "train_ids", warnings);
   layout.test_ids = read_ids(dataset, "val_ids", warnings);
@@ -79,20 +79,20 @@ bool has_sides(const std::vector<std::string>& ids, const std::string& side) {
 }
 
 // The families differ in what they leave out; nothing but the name depends on this.
-std::string format_of(const std::filesystem::path& folder, const CaptureLayout& layout, bool has_time_ids) {
+std::string format_of(const FileTree& tree, const NerfiesLayout& layout, bool has_time_ids) {
   if (!layout.format.empty()) return layout.format;
-  const std::string parent = folder.parent_path().filename().string(), name = folder.filename().string();
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(tree.path());
+  const std::string parent = whole.parent_path().filename().string(), name = whole.filename().string();
   if (parent.starts_with("vrig") || name.starts_with("vrig")) return "hypernerf-vrig";
   if (has_sides(layout.train_ids, "_left") || has_sides(layout.test_ids, "_right") ||
-      std::filesystem::exists(folder / "resized_mask") || std::filesystem::exists(folder / "mask")) {
+      tree.has_folder("resized_mask") || tree.has_folder("mask")) {
     return "nerf-ds";
   }
   return has_time_ids ? "hypernerf-vrig" : "nerfies";
 }
 
-void read_times(const std::filesystem::path& folder, CaptureLayout& layout,
-                std::vector<std::string>& warnings) {
-  const JsonFile metadata(folder / "metadata.json");
+void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<std::string>& warnings) {
+  const JsonFile metadata(tree.open_file("metadata.json"));
   bool has_time_ids = false;
   std::set<std::string> ids(layout.train_ids.begin(), layout.train_ids.end());
   ids.insert(layout.test_ids.begin(), layout.test_ids.end());
@@ -110,11 +110,11 @@ void read_times(const std::filesystem::path& folder, CaptureLayout& layout,
   if (has_time_ids && !by_warp.empty()) {
     warnings.push_back("metadata.json: no time_id for " + ids_text(by_warp) + ": warp_id taken in its place");
   }
-  layout.format = format_of(folder, layout, has_time_ids);
+  layout.format = format_of(tree, layout, has_time_ids);
 }
 
-void read_scene(const std::filesystem::path& folder, CaptureLayout& layout) {
-  const JsonFile scene(folder / "scene.json");
+void read_scene(const FileTree& tree, NerfiesLayout& layout) {
+  const JsonFile scene(tree.open_file("scene.json"));
   layout.normalisation.centre = scene["center"].vector();
   layout.normalisation.scale = scene["scale"].positive();
   if (scene.has("near")) layout.near_plane = scene["near"].number();
@@ -127,25 +127,17 @@ void read_scene(const std::filesystem::path& folder, CaptureLayout& layout) {
 
 }  // namespace
 
-CaptureLayout read_layout(const std::filesystem::path& folder, std::vector<std::string>& warnings) {
+NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<std::string>& warnings) {
   for (const char* name : {"dataset.json", "metadata.json", "scene.json"}) {
-    if (std::filesystem::is_regular_file(folder / name)) continue;
-    throw InputError(folder.string(), name, "no such file",
+    if (tree.has(name)) continue;
+    throw InputError(tree.path().string(), name, "no such file",
                      "a capture in the NeRF-DS, Nerfies or HyperNeRF layout", "see docs/captures.md");
   }
-  CaptureLayout layout;
-  read_split(folder, layout, warnings);
-  read_times(folder, layout, warnings);
-  read_scene(folder, layout);
+  NerfiesLayout layout;
+  read_split(tree, layout, warnings);
+  read_times(tree, layout, warnings);
+  read_scene(tree, layout);
   return layout;
-}
-
-std::string ids_text(const std::vector<std::string>& ids) {
-  constexpr size_t named = 3;
-  std::string text;
-  for (size_t i = 0; i < std::min(named, ids.size()); ++i) text += (i == 0 ? "" : ", ") + ids[i];
-  if (ids.size() > named) text += " and " + std::to_string(ids.size() - named) + " more";
-  return text;
 }
 
 }  // namespace traceflow

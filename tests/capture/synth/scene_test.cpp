@@ -1,4 +1,4 @@
-#include "capture/synth_scene.h"
+#include "capture/synth/scene.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "base/random.h"
-#include "capture/synth_sampler.h"
-#include "capture/synth_scenes.h"
+#include "capture/synth/sampler.h"
+#include "capture/synth/scenes.h"
 
 namespace traceflow::synth {
 namespace {

@@ -6,9 +6,9 @@
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "capture/synth.h"
-#include "capture/synth_scenes.h"
-#include "capture/synth_trace.h"
+#include "capture/synth/scenes.h"
+#include "capture/synth/synth.h"
+#include "capture/synth/trace.h"
 
 namespace traceflow {
 

@@ -1,4 +1,4 @@
-#include "capture/synth_trace.h"
+#include "capture/synth/trace.h"
 
 #include <cmath>
 #include <limits>

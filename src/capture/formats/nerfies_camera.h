@@ -1,8 +1,7 @@
 #pragma once
 
-#include <filesystem>
-
-#include "capture/lens.h"
+#include "capture/lens/lens.h"
+#include "files/input_file.h"
 
 namespace traceflow {
 
@@ -14,6 +13,6 @@ struct CapturedCamera {
 };
 
 // Throws InputError for fields that are missing or make no camera.
-CapturedCamera read_camera(const std::filesystem::path& path);
+CapturedCamera read_nerfies_camera(const InputFile& file);
 
 }  // namespace traceflow

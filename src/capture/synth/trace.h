@@ -2,8 +2,8 @@
 
 #include <optional>
 
-#include "capture/synth_sampler.h"
-#include "capture/synth_scene.h"
+#include "capture/synth/sampler.h"
+#include "capture/synth/scene.h"
 
 // The light that a ray brings back from a stage: direct light of one disk with soft shadows, a constant
 // ambient term, and mirror reflections of up to `max_bounces`.

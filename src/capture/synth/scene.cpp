@@ -1,11 +1,11 @@
-#include "capture/synth_scene.h"
+#include "capture/synth/scene.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "capture/synth_sampler.h"
+#include "capture/synth/sampler.h"
 
 namespace traceflow::synth {
 

@@ -1,4 +1,4 @@
-#include "capture/camera_file.h"
+#include "capture/formats/nerfies_camera.h"
 
 #include <vector>
 
@@ -6,8 +6,8 @@
 
 namespace traceflow {
 
-CapturedCamera read_camera(const std::filesystem::path& path) {
-  const JsonFile file(path);
+CapturedCamera read_nerfies_camera(const InputFile& input) {
+  const JsonFile file(input);
   CapturedCamera camera;
   camera.camera_from_world = file["orientation"].rotation();
   camera.position = file["position"].vector();

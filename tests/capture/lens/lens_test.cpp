@@ -1,4 +1,4 @@
-#include "capture/lens.h"
+#include "capture/lens/lens.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
-#include "capture/resample.h"
+#include "capture/lens/resample.h"
 
 namespace traceflow {
 namespace {

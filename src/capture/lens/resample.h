@@ -1,7 +1,7 @@
 #pragma once
 
 #include "base/tensor.h"
-#include "capture/lens.h"
+#include "capture/lens/lens.h"
 
 // Images H×W×C onto other pixel grids.
 namespace traceflow {

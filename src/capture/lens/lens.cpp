@@ -1,4 +1,4 @@
-#include "capture/lens.h"
+#include "capture/lens/lens.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "capture/synth_scenes.h"
+#include "capture/synth/scenes.h"
 
 #include <cmath>
 #include <numbers>

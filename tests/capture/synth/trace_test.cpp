@@ -1,4 +1,4 @@
-#include "capture/synth_trace.h"
+#include "capture/synth/trace.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "base/random.h"
-#include "capture/synth_scenes.h"
+#include "capture/synth/scenes.h"
 
 namespace traceflow::synth {
 namespace {

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "capture/capture.h"
-#include "capture/synth.h"
+#include "capture/synth/synth.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "support/temp_folder.h"

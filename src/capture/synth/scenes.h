@@ -1,7 +1,7 @@
 #pragma once
 
-#include "capture/synth.h"
-#include "capture/synth_scene.h"
+#include "capture/synth/scene.h"
+#include "capture/synth/synth.h"
 
 namespace traceflow::synth {
 

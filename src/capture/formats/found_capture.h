@@ -1,0 +1,61 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "capture/formats/capture_options.h"
+#include "capture/lens/lens.h"
+#include "files/file_tree.h"
+#include "scene/normalisation.h"
+
+// What a reader finds in a capture, whatever its format: everything in the capture's own coordinates and
+// units. load_capture (capture/capture.h) makes views of it.
+namespace traceflow {
+
+struct FoundView {
+  std::string id;  // part of file names: without '/'
+  TreeFile image;
+  Lens lens;                // over lens.width × lens.height pixels; an image of another size scales it
+  std::string camera_name;  // of the file and field that say the lens, for errors
+  Mat3<double> camera_from_world{1};  // camera axes x right, y down, z forward
+  Vec3<double> position{0};
+  double time = 0;  // in any unit, at least 0
+};
+
+// Stored images at 1/stored of the full size, to be filtered by `factor`: stored · factor is the downscale.
+struct StoredImages {
+  std::string folder;
+  int stored = 1;
+  int factor = 1;
+};
+
+struct FoundCapture {
+  std::string format;
+  StoredImages images;
+  std::vector<FoundView> train, test;  // whole ones alone
+  // As the capture lists them, those left out included: what arrays with one element per view count.
+  std::vector<std::string> train_ids, all_ids;
+  SceneNormalisation normalisation;
+  double near_plane = 0, far_plane = 0;  // scene units; 0: not given
+  std::vector<Vec3<double>> points;
+  std::string points_file;  // where they come from; empty: there are none
+  std::vector<std::string> warnings;
+};
+
+// "a, b, c and 4 more": at most three are named.
+std::string ids_text(const std::vector<std::string>& ids);
+
+// The ids for which `exists` holds; the others become a warning: "3 of 80 training views have no image (a, b,
+// c): left out".
+std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const std::string& split,
+                                    const std::string& what,
+                                    const std::function<bool(const std::string& id)>& exists,
+                                    std::vector<std::string>& warnings);
+
+// The folder with the largest stored images that `downscale` is a multiple of. folder_of: the folder's name
+// by the scale that it is stored at. Throws InputError where there is none.
+StoredImages choose_images(const FileTree& tree, int downscale,
+                           const std::function<std::string(int stored)>& folder_of);
+
+}  // namespace traceflow

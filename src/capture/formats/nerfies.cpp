@@ -1,0 +1,96 @@
+#include "capture/formats/nerfies.h"
+
+#include "base/error.h"
+#include "base/parallel.h"
+#include "capture/formats/nerfies_camera.h"
+#include "capture/formats/nerfies_layout.h"
+#include "files/npy.h"
+
+namespace traceflow {
+
+namespace {
+
+std::string camera_path(const std::string& id) { return "camera/" + id + ".json"; }
+
+// Reads step by step into `found`.
+class Reader {
+ public:
+  Reader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
+      : tree_(std::move(tree)), layout_(read_nerfies_layout(*tree_, found_.warnings)) {
+    found_.format = layout_.format;
+    found_.normalisation = layout_.normalisation;
+    found_.near_plane = layout_.near_plane;
+    found_.far_plane = layout_.far_plane;
+    found_.train_ids = layout_.train_ids;
+    found_.all_ids = layout_.all_ids;
+    found_.images = choose_images(*tree_, options.downscale,
+                                  [](int stored) { return "rgb/" + std::to_string(stored) + "x"; });
+  }
+
+  FoundCapture read() {
+    found_.train = read_split(layout_.train_ids, "training");
+    found_.test = read_split(layout_.test_ids, "test");
+    read_points();
+    return std::move(found_);
+  }
+
+ private:
+  // PNG as the families have it, or the same in JPEG.
+  std::string image_path(const std::string& id) const {
+    const std::string stem = found_.images.folder + "/" + id;
+    for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG"}) {
+      if (tree_->has(stem + extension)) return stem + extension;
+    }
+    return "";
+  }
+
+  std::vector<FoundView> read_split(std::vector<std::string> ids, const std::string& split) {
+    const auto keep = [&](const std::string& what, auto&& exists) {
+      ids = keep_whole(ids, split, what, exists, found_.warnings);
+    };
+    keep("image", [&](const std::string& id) { return !image_path(id).empty(); });
+    keep("camera", [&](const std::string& id) { return tree_->has(camera_path(id)); });
+    keep("entry in metadata.json", [&](const std::string& id) { return layout_.time_id.contains(id); });
+    std::vector<FoundView> views(ids.size());
+    parallel_for(
+        "capture: cameras", static_cast<int64_t>(ids.size()),
+        [&](int64_t i) { views[static_cast<size_t>(i)] = read_view(ids[static_cast<size_t>(i)]); }, 1);
+    return views;
+  }
+
+  FoundView read_view(const std::string& id) const {
+    const CapturedCamera camera = read_nerfies_camera(tree_->open_file(camera_path(id)));
+    return {id,
+            {tree_, image_path(id)},
+            camera.lens,
+            tree_->name_of(camera_path(id)),
+            camera.camera_from_world,
+            camera.position,
+            layout_.time_id.at(id)};
+  }
+
+  void read_points() {
+    const std::string path = "points.npy";
+    if (!tree_->has(path)) return;
+    const Tensor<float> raw = read_npy(tree_->open_file(path));
+    if (raw.shape().rank() != 2 || raw.dim(1) != 3) {
+      throw InputError(tree_->name_of(path), "shape", raw.shape().to_string(), "P×3");
+    }
+    found_.points_file = path;
+    for (int64_t i = 0; i < raw.dim(0); ++i) found_.points.push_back(load3<double>(raw.row(i)));
+  }
+
+  std::shared_ptr<const FileTree> tree_;
+  FoundCapture found_;
+  NerfiesLayout layout_;
+};
+
+}  // namespace
+
+bool is_nerfies(const FileTree& tree) { return tree.has("dataset.json") || tree.has("metadata.json"); }
+
+FoundCapture read_nerfies(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
+  return Reader(tree, options).read();
+}
+
+}  // namespace traceflow
