@@ -4,6 +4,8 @@
 // Highway wants its own header after foreach_target.
 #include <hwy/highway.h>
 
+#include <algorithm>
+
 #include "ops/optimize/adam_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -11,38 +13,64 @@ namespace traceflow::optimize::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// One pass over [begin, end). `rates` holds a rate for each entry of the block. Returns how many gradients
-// are not finite.
+struct Constants {
+  hn::ScalableTag<float> d;
+  hn::Vec<hn::ScalableTag<float>> beta1, beta2, rest1, rest2, scale1, scale2, epsilon;
+
+  explicit HWY_INLINE Constants(const AdamBlock& b)
+      : beta1(hn::Set(d, b.beta1)),
+        beta2(hn::Set(d, b.beta2)),
+        rest1(hn::Set(d, 1 - b.beta1)),
+        rest2(hn::Set(d, 1 - b.beta2)),
+        scale1(hn::Set(d, b.inverse_correction1)),
+        scale2(hn::Set(d, b.inverse_correction2)),
+        epsilon(hn::Set(d, b.epsilon)) {}
+};
+
+// A whole vector's entries, at any address. Returns how many gradients are not finite.
+HWY_INLINE int64_t update_lanes(const Constants& c, const float* gradient, const float* rates,
+                                float* parameter, float* first, float* second) {
+  const auto g = hn::LoadU(c.d, gradient);
+  const auto squared = hn::Mul(g, g);
+  const auto finite = hn::IsFinite(squared);
+  const auto m0 = hn::LoadU(c.d, first);
+  const auto v0 = hn::LoadU(c.d, second);
+  const auto p0 = hn::LoadU(c.d, parameter);
+  const auto m = hn::MulAdd(c.beta1, m0, hn::Mul(c.rest1, g));
+  const auto v = hn::MulAdd(c.beta2, v0, hn::Mul(c.rest2, squared));
+  const auto root = hn::Add(hn::Sqrt(hn::Mul(v, c.scale2)), c.epsilon);
+  const auto p = hn::Sub(p0, hn::Div(hn::Mul(hn::LoadU(c.d, rates), hn::Mul(m, c.scale1)), root));
+  hn::StoreU(hn::IfThenElse(finite, m, m0), c.d, first);
+  hn::StoreU(hn::IfThenElse(finite, v, v0), c.d, second);
+  hn::StoreU(hn::IfThenElse(finite, p, p0), c.d, parameter);
+  return static_cast<int64_t>(hn::Lanes(c.d)) - static_cast<int64_t>(hn::CountTrue(c.d, finite));
+}
+
+// Fewer entries than a vector has, in memory of their own: before AVX no vector reads or writes a part.
+HWY_INLINE int64_t update_rest(const Constants& c, const AdamBlock& b, int64_t begin) {
+  constexpr size_t most = hn::MaxLanes(hn::ScalableTag<float>());
+  const auto count = static_cast<size_t>(b.count - begin);
+  float gradient[most] = {}, rates[most] = {}, parameter[most] = {}, first[most] = {}, second[most] = {};
+  std::copy_n(b.gradient + begin, count, gradient);
+  std::copy_n(b.rates + begin, count, rates);
+  std::copy_n(b.parameter + begin, count, parameter);
+  std::copy_n(b.first + begin, count, first);
+  std::copy_n(b.second + begin, count, second);
+  const int64_t not_finite = update_lanes(c, gradient, rates, parameter, first, second);
+  std::copy_n(parameter, count, b.parameter + begin);
+  std::copy_n(first, count, b.first + begin);
+  std::copy_n(second, count, b.second + begin);
+  return not_finite;
+}
+
 int64_t update_block(const AdamBlock& b) {
-  const hn::ScalableTag<float> d;
-  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
-  const auto beta1 = hn::Set(d, b.beta1);
-  const auto beta2 = hn::Set(d, b.beta2);
-  const auto rest1 = hn::Set(d, 1 - b.beta1);
-  const auto rest2 = hn::Set(d, 1 - b.beta2);
-  const auto scale1 = hn::Set(d, b.inverse_correction1);
-  const auto scale2 = hn::Set(d, b.inverse_correction2);
-  const auto epsilon = hn::Set(d, b.epsilon);
-  int64_t not_finite = 0;
-  for (int64_t i = 0; i < b.count; i += lanes) {
-    const auto inside = hn::FirstN(d, static_cast<size_t>(std::min(lanes, b.count - i)));
-    const auto g = hn::MaskedLoad(inside, d, b.gradient + i);
-    const auto squared = hn::Mul(g, g);
-    const auto finite = hn::And(inside, hn::IsFinite(squared));
-    const auto m0 = hn::MaskedLoad(inside, d, b.first + i);
-    const auto v0 = hn::MaskedLoad(inside, d, b.second + i);
-    const auto p0 = hn::MaskedLoad(inside, d, b.parameter + i);
-    const auto rate = hn::MaskedLoad(inside, d, b.rates + i);
-    const auto m = hn::MulAdd(beta1, m0, hn::Mul(rest1, g));
-    const auto v = hn::MulAdd(beta2, v0, hn::Mul(rest2, squared));
-    const auto root = hn::Add(hn::Sqrt(hn::Mul(v, scale2)), epsilon);
-    const auto p = hn::Sub(p0, hn::Div(hn::Mul(rate, hn::Mul(m, scale1)), root));
-    hn::BlendedStore(m, finite, d, b.first + i);
-    hn::BlendedStore(v, finite, d, b.second + i);
-    hn::BlendedStore(p, finite, d, b.parameter + i);
-    not_finite +=
-        static_cast<int64_t>(hn::CountTrue(d, inside)) - static_cast<int64_t>(hn::CountTrue(d, finite));
+  const Constants c(b);
+  const auto lanes = static_cast<int64_t>(hn::Lanes(c.d));
+  int64_t not_finite = 0, i = 0;
+  for (; i + lanes <= b.count; i += lanes) {
+    not_finite += update_lanes(c, b.gradient + i, b.rates + i, b.parameter + i, b.first + i, b.second + i);
   }
+  if (i < b.count) not_finite += update_rest(c, b, i);
   return not_finite;
 }
 
@@ -50,7 +78,6 @@ int64_t update_block(const AdamBlock& b) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-#include <algorithm>
 #include <cmath>
 #include <vector>
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -20,14 +22,15 @@ Tensor<float> noise(const Shape& shape, uint64_t seed) {
   return t;
 }
 
-TEST(Adam, AgreesWithTheReferenceOverManySteps) {
-  const Shape shape{331, 7};
+template <size_t columns>
+void expect_the_references_steps(int64_t rows, const std::array<float, columns>& rates) {
+  const Shape shape{rows, static_cast<int64_t>(columns)};
   Tensor<float> parameter = noise(shape, 1);
   AdamState state = zero_state(shape);
   Tensor<double> expected = convert<double>(parameter);
   BasicAdamState<double> expected_state{Tensor<double>(shape), Tensor<double>(shape), 0};
-  const std::array<float, 7> rates{0.1F, 0.01F, 0.02F, 0.3F, 0.05F, 0, 0.07F};
-  const std::array<double, 7> rates_double{0.1F, 0.01F, 0.02F, 0.3F, 0.05F, 0, 0.07F};
+  std::array<double, columns> rates_double{};
+  std::copy(rates.begin(), rates.end(), rates_double.begin());
   for (uint64_t step = 0; step < 20; ++step) {
     const Tensor<float> gradient = noise(shape, 100 + step);
     EXPECT_EQ(adam_step(parameter, gradient, state, rates, {}), 0);
@@ -38,6 +41,13 @@ TEST(Adam, AgreesWithTheReferenceOverManySteps) {
   }
   EXPECT_EQ(state.step, 20);
 }
+
+TEST(Adam, AgreesWithTheReferenceOverManySteps) {
+  expect_the_references_steps<7>(331, {0.1F, 0.01F, 0.02F, 0.3F, 0.05F, 0, 0.07F});
+}
+
+// Blocks of whole rows of three begin at addresses that no vector is aligned to.
+TEST(Adam, BlocksMayBeginAnywhere) { expect_the_references_steps<3>(12001, {0.1F, 0.01F, 0.02F}); }
 
 TEST(Adam, FirstStepMovesEveryParameterByTheRateAgainstItsGradient) {
   // m̂/√v̂ = ±1 on the first step whatever the gradient's size.
