@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <iostream>
+#include <string>
+#include <vector>
 
 #include "base/option_fields.h"
 #include "base/parallel.h"
@@ -12,6 +15,7 @@
 #include "cli/arguments/option_page.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/verbs/verbs.h"
+#include "primitives/instructions.h"
 
 namespace traceflow::cli {
 
@@ -20,6 +24,7 @@ namespace {
 // What holds for every verb.
 struct GlobalArguments {
   int threads = 0;
+  std::string instructions = "automatic";
   bool profile = false;
   bool help_options = false;
 };
@@ -33,7 +38,20 @@ void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
                   "Threads to use; 0 for all cores. The results do not depend on it")
       ->check(CLI::Range(0, 4096))
       ->option_text("N");
+  constexpr auto names = enum_names(Instructions{});
+  program
+      .add_option("--instructions", arguments.instructions,
+                  "The most of the processor's vector instructions to use: automatic (all), sse4, avx2 or "
+                  "avx512. Unlike "
+                  "processors give the same bytes under the same limit")
+      ->check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())))
+      ->option_text("NAME");
   program.add_flag("--profile", arguments.profile, "Print where the time went");
+}
+
+Instructions instructions_of(const std::string& name) {
+  constexpr auto names = enum_names(Instructions{});
+  return static_cast<Instructions>(std::find(names.begin(), names.end(), name) - names.begin());
 }
 
 void print_profile() {
@@ -61,6 +79,7 @@ int run_program(int argc, const char* const* argv) {
   add_global_arguments(program, arguments);
   program.parse_complete_callback([&arguments] {
     set_threads(arguments.threads);
+    limit_instructions(instructions_of(arguments.instructions));
     profile::enable(arguments.profile);
   });
   add_verbs(program);

@@ -1,0 +1,43 @@
+#include "primitives/instructions.h"
+
+#include <hwy/targets.h>
+#include <dnnl.hpp>
+#include <string>
+
+#include "base/error.h"
+
+namespace traceflow {
+
+namespace {
+
+struct Level {
+  int64_t target;  // Highway's; the better a target, the lower its bit
+  dnnl::cpu_isa isa;
+};
+
+Level level_of(Instructions instructions) {
+  switch (instructions) {
+    case Instructions::sse4:
+      return {HWY_SSE4, dnnl::cpu_isa::sse41};
+    case Instructions::avx2:
+      return {HWY_AVX2, dnnl::cpu_isa::avx2};
+    default:
+      return {HWY_AVX3, dnnl::cpu_isa::avx512_core};
+  }
+}
+
+}  // namespace
+
+void limit_instructions(Instructions most) {
+  if (most == Instructions::automatic) return;
+  const Level level = level_of(most);
+  const std::string name(enum_names(most)[static_cast<size_t>(most)]);
+  if ((hwy::SupportedTargets() & level.target) == 0) {
+    throw InputError("--instructions", "", name, "instructions that this processor has", "use automatic");
+  }
+  hwy::DisableTargets(level.target - 1);
+  require(dnnl::set_max_cpu_isa(level.isa) == dnnl::status::success,
+          "instructions are limited before oneDNN is used", name);
+}
+
+}  // namespace traceflow
