@@ -85,7 +85,9 @@ TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
       NerfDsCapture fake(1);
       fake.cameras["000000_left"][field] = value;
       fake.save();
-      const std::string named = field == "tangential_distortion" ? "tangential" : field;
+      const std::string named = field == "tangential_distortion" ? "tangential"
+                                : field == "radial_distortion"   ? "distortion"
+                                                                 : field;
       expect_refused(fake.path(), "camera/000000_left.json", named);
     }
   }

@@ -39,6 +39,75 @@ TEST(Lens, projects_as_the_capture_format_defines) {
   EXPECT_NEAR(pixel.y, 2691.17 * 1.00106 * y + 1652.5, 1e-9);
 }
 
+// Every term of the formula at once, over any projection.
+Lens random_wide_lens(Random& random) {
+  Lens lens = random_lens(random, 0.3);
+  lens.radial_4 = random.uniform(-0.01, 0.01);
+  lens.radial_below = 0.1 * Vec3<double>(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+  lens.prism = 0.01 * Vec4<double>(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1),
+                                   random.uniform(-1, 1));
+  lens.projection = static_cast<Projection>(random.below(3));
+  lens.omega = random.uniform(0.01, 2.5);
+  return lens;
+}
+
+RC_GTEST_PROP(Lens, jacobian_agrees_with_differences, (uint64_t seed)) {
+  Random random(seed);
+  const Lens lens = random_wide_lens(random);
+  // The centre, and small radii where series take over, included.
+  const double size = std::pow(10, random.uniform(-6, 0)) * static_cast<double>(random.below(8) > 0);
+  const Vec2<double> at = size * Vec2<double>(random.uniform(-1, 1), random.uniform(-1, 1));
+  const glm::dmat2 jacobian = lens.distort_jacobian(at);
+  constexpr double h = 1e-6;
+  for (int axis = 0; axis < 2; ++axis) {
+    Vec2<double> step(0);
+    step[axis] = h;
+    const Vec2<double> slope = (lens.distort(at + step) - lens.distort(at - step)) / (2 * h);
+    RC_ASSERT(length(slope - jacobian[axis]) < 1e-7);
+  }
+}
+
+RC_GTEST_PROP(Lens, every_kind_undistorts_to_where_it_came_from, (uint64_t seed)) {
+  Random random(seed);
+  const Lens lens = random_wide_lens(random);
+  const Vec2<double> ideal(random.uniform(-0.6, 0.6), random.uniform(-0.5, 0.5));
+  RC_ASSERT(length(lens.ideal_from_pixel(lens.pixel_from_ideal(ideal)) - ideal) < 1e-9);
+}
+
+TEST(Lens, a_fisheye_places_angles_and_sees_nothing_in_front_beyond_90_degrees) {
+  Lens lens{200, 200, {60, 60}, {100, 100}};
+  lens.projection = Projection::equidistant;
+  for (const double angle : {0.1, 0.7, 1.5}) {
+    EXPECT_NEAR(lens.pixel_from_ideal({std::tan(angle), 0}).x, 100 + 60 * angle, 1e-9);
+    EXPECT_NEAR(lens.ideal_from_pixel({100, 100 - 60 * angle}).y, -std::tan(angle), 1e-6);
+  }
+  EXPECT_TRUE(std::isnan(lens.ideal_from_pixel({100 + 60 * 1.6, 100}).x));
+  EXPECT_EQ(lens.ideal_from_pixel({100, 100}), Vec2<double>(0));
+  lens.projection = Projection::fov;
+  lens.omega = 1;
+  EXPECT_TRUE(std::isnan(lens.ideal_from_pixel({100 + 60 * 1.6, 100}).x));
+}
+
+TEST(Lens, any_term_but_zero_ends_being_a_pinhole) {
+  const Lens pinhole{64, 48, {60, 50}, {32, 24}};
+  EXPECT_TRUE(pinhole.is_pinhole());
+  const auto with = [&](auto&& change) {
+    Lens lens = pinhole;
+    change(lens);
+    return lens.is_pinhole();
+  };
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_FALSE(with([&](Lens& lens) { lens.radial[i] = 1e-9; }));
+    EXPECT_FALSE(with([&](Lens& lens) { lens.radial_below[i] = 1e-9; }));
+    EXPECT_FALSE(with([&](Lens& lens) { lens.prism[i] = 1e-9; }));
+  }
+  EXPECT_FALSE(with([](Lens& lens) { lens.prism[3] = 1e-9; }));
+  EXPECT_FALSE(with([](Lens& lens) { lens.radial_4 = 1e-9; }));
+  EXPECT_FALSE(with([](Lens& lens) { lens.tangential[1] = 1e-9; }));
+  EXPECT_FALSE(with([](Lens& lens) { lens.skew = 1e-9; }));
+  EXPECT_FALSE(with([](Lens& lens) { lens.projection = Projection::equidistant; }));
+}
+
 RC_GTEST_PROP(Lens, undistort_is_the_inverse_of_distort, (uint64_t seed)) {
   Random random(seed);
   const Lens lens = random_lens(random, 1);
@@ -83,6 +152,21 @@ TEST(Zoom, is_one_for_a_barrel_and_no_more_than_needed_for_a_pincushion) {
   EXPECT_NEAR(std::min(corner.x, corner.y), 0, 1e-6);
 }
 
+TEST(Zoom, a_fisheye_has_a_pinhole_unless_it_is_absurdly_wide) {
+  // An image circle of 220° inside the frame, as action cameras have it.
+  Lens lens{200, 150, {100 / 1.92, 100 / 1.92}, {100, 75}};
+  lens.projection = Projection::equidistant;
+  EXPECT_EQ(pinhole_zoom(lens, "test"), 1);
+  lens.focal = {15, 15};
+  try {
+    pinhole_zoom(lens, "camera 7");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("camera 7"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("80°"), std::string::npos) << error.what();
+  }
+}
+
 TEST(Zoom, hostile_lenses_are_refused) {
   const double infinity = std::numeric_limits<double>::infinity();
   for (const Vec3<double>& radial :
@@ -91,6 +175,9 @@ TEST(Zoom, hostile_lenses_are_refused) {
     const Lens lens{64, 48, {30, 30}, {32, 24}, 0, radial, {0, 0}};
     EXPECT_THROW(pinhole_zoom(lens, "test"), InputError) << radial.x << " " << radial.y << " " << radial.z;
   }
+  Lens pole{64, 48, {60, 60}, {32, 24}};
+  pole.radial_below = {-10, 0, 0};
+  EXPECT_THROW(pinhole_zoom(pole, "test"), InputError);
   const Lens outside{64, 48, {60, 60}, {-100, 24}, 0, {0.3, 0, 0}, {0, 0}};
   EXPECT_THROW(pinhole_zoom(outside, "test"), InputError);
 }
@@ -103,7 +190,11 @@ float painted(const Vec2<double>& ideal, int channel) {
 
 RC_GTEST_PROP(Straighten, gives_what_a_pinhole_would_have_seen, (uint64_t seed)) {
   Random random(seed);
-  const Lens lens = random_lens(random, 1);
+  Lens lens = random_lens(random, 1);
+  if (random.below(2) == 1) {
+    lens.projection = Projection::equidistant;
+    lens.radial_4 = random.uniform(-0.02, 0.02);
+  }
   const double zoom = pinhole_zoom(lens, "test");
   Tensor<float> photograph({48, 64, 2});
   for (int64_t y = 0; y < 48; ++y) {

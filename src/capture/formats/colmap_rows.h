@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "files/input_file.h"
+#include "math/types.h"
+
+// The rows of a COLMAP model's files as they stand there, in the files' order: nothing but their form is
+// checked. Every reader throws InputError for files that are cut short or hold something else, before taking
+// memory for more rows than the file can hold.
+namespace traceflow {
+
+struct ColmapCameraRow {
+  int64_t id = 0;
+  std::string model;  // its name, or its number where that is not known
+  double width = 0, height = 0;
+  std::vector<double> parameters;
+};
+
+struct ColmapImageRow {
+  int64_t id = 0;
+  std::array<double, 4> quaternion{};  // w, x, y, z
+  Vec3<double> translation{0};
+  int64_t camera_id = 0;
+  std::string name;
+  int64_t points_seen = 0;
+};
+
+struct ColmapPointRow {
+  int64_t id = 0;
+  Vec3<double> position{0};
+  Vec3<uint8_t> colour{0};
+  double error = 0;
+  int64_t track_length = 0;
+};
+
+std::vector<ColmapCameraRow> read_colmap_cameras_binary(const InputFile& file);
+std::vector<ColmapImageRow> read_colmap_images_binary(const InputFile& file);
+std::vector<ColmapPointRow> read_colmap_points_binary(const InputFile& file);
+
+std::vector<ColmapCameraRow> read_colmap_cameras_text(const InputFile& file);
+std::vector<ColmapImageRow> read_colmap_images_text(const InputFile& file);
+std::vector<ColmapPointRow> read_colmap_points_text(const InputFile& file);
+
+}  // namespace traceflow
