@@ -45,19 +45,26 @@ Tensor<float> normals_on_view_grid(const ViewSource& view, Tensor<float> normals
   return normals;
 }
 
-Tensor<float> read_normal_image(const TreeFile& file) {
+// From numbers v, `full` being 1, as 2v - 1.
+template <class T>
+Tensor<float> normals_of(const Tensor<T>& pixels, float full) {
   // A unit vector never comes near such a length: black and white say "no value".
   constexpr float longest = 1.5F;
-  const Tensor<uint8_t> pixels = read_image(file.open());
-  if (pixels.dim(2) < 3) {
-    throw InputError(file.name(), "channels", std::to_string(pixels.dim(2)), "3 (normals as 2v - 1)");
-  }
   Tensor<float> normals({pixels.dim(0), pixels.dim(1), 3});
   for (int64_t i = 0; i < normals.size() / 3; ++i) {
-    const Vec3<float> n = 2.0F * load3<float>(&pixels[i * pixels.dim(2)]) / 255.0F - 1.0F;
+    const Vec3<float> n = 2.0F * load3<float>(&pixels[i * pixels.dim(2)]) / full - 1.0F;
     store3(&normals[3 * i], glm::length(n) < longest ? n : Vec3<float>(0));
   }
   return normals;
+}
+
+Tensor<float> read_normal_image(const TreeFile& tree_file) {
+  const InputFile file = tree_file.open();
+  const ImageSize size = read_image_size(file);
+  if (size.channels < 3) {
+    throw InputError(tree_file.name(), "channels", std::to_string(size.channels), "3 (normals as 2v - 1)");
+  }
+  return size.bits > 8 ? normals_of(read_image16(file), 65535) : normals_of(read_image(file), 255);
 }
 
 Tensor<float> read_depth(const TreeFile& file) {
@@ -89,6 +96,23 @@ Tensor<float> depth_on_view_grid(const ViewSource& view, Tensor<float> depth, fl
   return result;
 }
 
+// RGB of an image of one to four channels, before a background of one grey level where it is transparent.
+Tensor<uint8_t> over(uint8_t background, const Tensor<uint8_t>& pixels) {
+  const int64_t stored = pixels.dim(2), step = stored >= 3 ? 1 : 0;
+  const bool has_alpha = stored == 2 || stored == 4;
+  Tensor<uint8_t> rgb;
+  rgb.resize({pixels.dim(0), pixels.dim(1), 3});
+  for (int64_t i = 0; i < rgb.size() / 3; ++i) {
+    const uint8_t* pixel = &pixels[stored * i];
+    const int alpha = has_alpha ? pixel[stored - 1] : 255;
+    for (int64_t c = 0; c < 3; ++c) {
+      rgb[3 * i + c] =
+          static_cast<uint8_t>((pixel[c * step] * alpha + background * (255 - alpha) + 127) / 255);
+    }
+  }
+  return rgb;
+}
+
 }  // namespace
 
 Tensor<uint8_t> decode_colour(const ViewSource& view) {
@@ -98,12 +122,7 @@ Tensor<uint8_t> decode_colour(const ViewSource& view) {
     throw InputError(view.image.name(), "size", pixels.shape().to_string(),
                      "the size it had when the capture was opened");
   }
-  const int64_t stored = pixels.dim(2), step = stored >= 3 ? 1 : 0;
-  Tensor<uint8_t> rgb;
-  rgb.resize({pixels.dim(0), pixels.dim(1), 3});
-  for (int64_t i = 0; i < rgb.size() / 3; ++i) {
-    for (int64_t c = 0; c < 3; ++c) rgb[3 * i + c] = pixels[stored * i + c * step];
-  }
+  Tensor<uint8_t> rgb = over(view.background, pixels);
   if (view.lens.is_pinhole() && view.factor == 1) return rgb;
   return to_8bit(to_view_grid(view, from_8bit(rgb)));
 }

@@ -21,6 +21,10 @@ bool differs_in_proportions(const ImageSize& size, const Lens& lens) {
   return std::abs(stretch - 1) > 0.02;
 }
 
+uint8_t grey_level(Background background) {
+  return background == Background::white ? 255 : background == Background::grey ? 128 : 0;
+}
+
 // Makes views of what a reader found, step by step; each step leaves its results and warnings in `capture_`
 // and `sources_`.
 class Assembly {
@@ -36,6 +40,8 @@ class Assembly {
     capture_.far_plane = static_cast<float>(found_.far_plane);
     capture_.warnings = std::move(found_.warnings);
     shared_.scale = found_.normalisation.scale;
+    background_ =
+        grey_level(options.background == Background::automatic ? found_.background : options.background);
   }
 
   Capture finish() {
@@ -83,7 +89,7 @@ class Assembly {
   std::vector<View> make_split(const std::vector<FoundView>& found) {
     std::vector<View> views(found.size());
     std::vector<ViewSource> sources(found.size());
-    std::vector<std::string> misfits(found.size());
+    std::vector<std::string> misfits(found.size()), turned(found.size());
     parallel_for(
         "capture: cameras", static_cast<int64_t>(found.size()),
         [&](int64_t n) {
@@ -92,12 +98,18 @@ class Assembly {
           sources[i] = source_of(found[i], size);
           views[i] = view_of(found[i], sources[i]);
           if (differs_in_proportions(size, found[i].lens)) misfits[i] = found[i].id;
+          if (size.orientation != 1) turned[i] = found[i].id;
         },
         1);
     std::erase(misfits, "");
     if (!misfits.empty()) {
       warn("image_size of " + ids_text(misfits) +
            " has other proportions than the image: the camera is stretched to it");
+    }
+    std::erase(turned, "");
+    if (!turned.empty()) {
+      warn("viewers turn the images of " + ids_text(turned) +
+           " (EXIF orientation): taken as stored, to which cameras refer");
     }
     for (size_t i = 0; i < found.size(); ++i) sources_.emplace(found[i].id, std::move(sources[i]));
     return views;
@@ -115,6 +127,7 @@ class Assembly {
     }
     if (!source.lens.is_pinhole()) source.zoom = pinhole_zoom(source.lens, found.camera_name);
     source.camera_from_world = found.camera_from_world;
+    source.background = background_;
     return source;
   }
 
@@ -340,6 +353,7 @@ class Assembly {
   CaptureSource shared_;
   std::unordered_map<std::string, ViewSource> sources_;
   double last_time_ = 0;
+  uint8_t background_ = 0;
 };
 
 }  // namespace

@@ -16,9 +16,10 @@ struct ViewSource {
   bool mask_is_inverted = false;  // NeRF-DS's resized_mask: black = object
   int64_t prior_slice = -1;       // element of the capture's prior array, where there is one instead of files
   Lens lens;                      // over the stored image
-  double zoom = 1;                // of the straightened image (capture/lens.h)
+  double zoom = 1;                // of the straightened image (capture/lens/lens.h)
   int factor = 1;                 // pixels of the stored image a side that make one of the view's
   Mat3<double> camera_from_world{1};
+  uint8_t background = 0;  // grey level behind transparent pixels
 
   int64_t width() const { return static_cast<int64_t>(lens.width) / factor; }
   int64_t height() const { return static_cast<int64_t>(lens.height) / factor; }

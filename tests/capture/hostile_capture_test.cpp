@@ -27,7 +27,7 @@ void expect_refused(const std::filesystem::path& folder, const std::string& file
 TEST(HostileCapture, missing_folders_and_files) {
   const TempFolder empty;
   expect_refused(empty / "nowhere", "nowhere", "");
-  expect_refused(empty.path(), "dataset.json", "no such file");
+  expect_refused(empty.path(), "dataset.json", "no capture");
   for (const char* name : {"dataset.json", "metadata.json", "scene.json"}) {
     NerfDsCapture fake(1);
     fake.save();

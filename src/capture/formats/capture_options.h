@@ -16,14 +16,46 @@ constexpr std::array<std::string_view, 4> enum_names(PriorAxes) {
   return {"automatic", "opengl", "opencv", "stable-normal"};
 }
 
+// How a capture is laid out (docs/captures.md); `automatic` looks.
+enum class CaptureFormat { automatic, nerfies, dycheck, colmap, transforms };
+constexpr std::array<std::string_view, 5> enum_names(CaptureFormat) {
+  return {"automatic", "nerfies", "dycheck", "colmap", "transforms"};
+}
+
+// What lies behind the transparent parts of an image; `automatic` is the format's custom.
+enum class Background { automatic, black, white, grey };
+constexpr std::array<std::string_view, 4> enum_names(Background) {
+  return {"automatic", "black", "white", "grey"};
+}
+
+// Where a capture's times come from: `automatic` is what the format says; `names` the order of the file
+// names; `none` makes all of them 0, for a scene that stands still.
+enum class CaptureTimes { automatic, names, none };
+constexpr std::array<std::string_view, 3> enum_names(CaptureTimes) { return {"automatic", "names", "none"}; }
+
 struct CaptureOptions {
+  CaptureFormat format = CaptureFormat::automatic;
   int downscale = 1;
+  CaptureTimes times = CaptureTimes::automatic;
+  int test_every = 8;
+  Background background = Background::automatic;
   PriorAxes prior_axes = PriorAxes::automatic;
   int64_t cache_mebibytes = 1024;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("downscale", downscale, "", "Uses rgb/Kx where it exists, else box-filters rgb/1x.");
+    v.field("format", format, "",
+            "Layout of the capture: automatic (looks), nerfies (and HyperNeRF, NeRF-DS), dycheck, colmap, "
+            "transforms (NeRF-synthetic, instant-ngp, nerfstudio, D-NeRF).");
+    v.field("downscale", downscale, "",
+            "Trains on images of 1/K the size: rgb/Kx or images_K where it exists, else box-filtered.");
+    v.field("times", times, "",
+            "When views were taken: automatic (as the format says), names (in the order of their names), "
+            "none (the scene stands still).");
+    v.field("test_every", test_every, "views",
+            "Every so many-th view tests where the format does not say which; 0: none.");
+    v.field("background", background, "",
+            "Colour behind transparent pixels: automatic (the format's custom), black, white, grey.");
     v.field("prior_axes", prior_axes, "",
             "Axes of the normal priors: automatic, opengl (x right, y up, z to the viewer), "
             "opencv, or stable-normal (opencv negated).");

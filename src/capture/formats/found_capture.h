@@ -39,7 +39,8 @@ struct FoundCapture {
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;  // scene units; 0: not given
   std::vector<Vec3<double>> points;
-  std::string points_file;  // where they come from; empty: there are none
+  std::string points_file;                    // where they come from; empty: there are none
+  Background background = Background::black;  // the format's custom, never `automatic`
   std::vector<std::string> warnings;
 };
 

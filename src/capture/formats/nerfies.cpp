@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "capture/formats/dycheck.h"
 #include "capture/formats/nerfies_camera.h"
 #include "capture/formats/nerfies_layout.h"
 #include "files/npy.h"
@@ -10,13 +11,19 @@ namespace traceflow {
 
 namespace {
 
+bool is_wanted_as_dycheck(const FileTree& tree, CaptureFormat format) {
+  return format == CaptureFormat::dycheck || (format == CaptureFormat::automatic && is_dycheck(tree));
+}
+
 std::string camera_path(const std::string& id) { return "camera/" + id + ".json"; }
 
 // Reads step by step into `found`.
 class Reader {
  public:
   Reader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
-      : tree_(std::move(tree)), layout_(read_nerfies_layout(*tree_, found_.warnings)) {
+      : tree_(std::move(tree)),
+        layout_(is_wanted_as_dycheck(*tree_, options.format) ? read_dycheck_layout(*tree_, found_.warnings)
+                                                             : read_nerfies_layout(*tree_, found_.warnings)) {
     found_.format = layout_.format;
     found_.normalisation = layout_.normalisation;
     found_.near_plane = layout_.near_plane;

@@ -7,7 +7,7 @@
 namespace traceflow {
 
 // The layout of Nerfies, HyperNeRF and NeRF-DS: dataset.json, metadata.json, scene.json, camera/ID.json and
-// rgb/Kx/ID.png.
+// rgb/Kx/ID.png; or DyCheck's, which differs in its splits.
 bool is_nerfies(const FileTree& tree);
 // Throws InputError.
 FoundCapture read_nerfies(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);

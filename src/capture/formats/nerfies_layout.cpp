@@ -11,14 +11,6 @@ namespace traceflow {
 
 namespace {
 
-// An id becomes part of file names, and must not lead out of the folder.
-void check_id(const JsonField& field, const std::string& id) {
-  if (id.empty() || id.find('/') != std::string::npos || id.find('\0') != std::string::npos || id == "." ||
-      id == "..") {
-    field.fail("the id \"" + id + "\"", "ids that can name a file");
-  }
-}
-
 std::vector<std::string> read_ids(const JsonFile& dataset, const std::string& key,
                                   std::vector<std::string>& warnings) {
   if (!dataset.has(key)) return {};
@@ -26,7 +18,7 @@ std::vector<std::string> read_ids(const JsonFile& dataset, const std::string& ke
   std::vector<std::string> kept, repeated;
   std::set<std::string> seen;
   for (const std::string& id : field.strings()) {
-    check_id(field, id);
+    check_capture_id(field, id);
     (seen.insert(id).second ? kept : repeated).push_back(id);
   }
   if (!repeated.empty()) {
@@ -113,7 +105,16 @@ void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<std::st
   layout.format = format_of(tree, layout, has_time_ids);
 }
 
-void read_scene(const FileTree& tree, NerfiesLayout& layout) {
+}  // namespace
+
+void check_capture_id(const JsonField& field, const std::string& id) {
+  if (id.empty() || id.find('/') != std::string::npos || id.find('\0') != std::string::npos || id == "." ||
+      id == "..") {
+    field.fail("the id \"" + id + "\"", "ids that can name a file");
+  }
+}
+
+void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout) {
   const JsonFile scene(tree.open_file("scene.json"));
   layout.normalisation.centre = scene["center"].vector();
   layout.normalisation.scale = scene["scale"].positive();
@@ -125,8 +126,6 @@ void read_scene(const FileTree& tree, NerfiesLayout& layout) {
   }
 }
 
-}  // namespace
-
 NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<std::string>& warnings) {
   for (const char* name : {"dataset.json", "metadata.json", "scene.json"}) {
     if (tree.has(name)) continue;
@@ -136,7 +135,7 @@ NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<std::string>
   NerfiesLayout layout;
   read_split(tree, layout, warnings);
   read_times(tree, layout, warnings);
-  read_scene(tree, layout);
+  read_nerfies_scene(tree, layout);
   return layout;
 }
 

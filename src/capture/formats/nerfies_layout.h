@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "files/file_tree.h"
+#include "files/json_document.h"
 #include "scene/normalisation.h"
 
 namespace traceflow {
@@ -18,6 +19,11 @@ struct NerfiesLayout {
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;
 };
+
+// An id becomes part of file names, and must not lead out of the folder: throws InputError.
+void check_capture_id(const JsonField& field, const std::string& id);
+// Takes normalisation and planes from scene.json. Throws InputError.
+void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout);
 
 // Reads dataset.json, metadata.json and scene.json; adds what looks wrong to `warnings`. Throws InputError.
 NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<std::string>& warnings);

@@ -1,0 +1,176 @@
+#include "capture/formats/colmap.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <set>
+
+#include "base/error.h"
+#include "capture/formats/colmap_model.h"
+#include "capture/formats/image_names.h"
+#include "capture/formats/normalise.h"
+#include "files/image.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr std::array<const char*, 3> model_folders = {"sparse/0", "sparse", ""};
+constexpr std::array<const char*, 4> image_folders = {"images", "input", "rgb", ""};
+
+std::string model_folder(const FileTree& tree) {
+  const auto found = std::find_if(model_folders.begin(), model_folders.end(),
+                                  [&](const char* folder) { return has_colmap_model(tree, folder); });
+  if (found != model_folders.end()) return *found;
+  throw InputError(tree.path().string(), "", "no COLMAP model",
+                   "cameras and images (.bin or .txt) in sparse/0, sparse or the folder itself");
+}
+
+std::string in_folder(const std::string& folder, const std::string& name) {
+  return folder.empty() ? name : folder + "/" + name;
+}
+
+// Reads step by step into `found_`.
+class Reader {
+ public:
+  Reader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
+      : tree_(std::move(tree)), options_(options), folder_(model_folder(*tree_)) {
+    model_ = read_colmap_model(*tree_, folder_);
+    for (ColmapImage& image : model_.images) image.name = tidy_path(image.name);
+    std::sort(model_.images.begin(), model_.images.end(),
+              [](const ColmapImage& a, const ColmapImage& b) { return natural_less(a.name, b.name); });
+    for (const ColmapImage& image : model_.images) names_.push_back(image.name);
+  }
+
+  FoundCapture read() {
+    found_.format = "colmap";
+    warn_about_models();
+    choose_images();
+    warn_about_unregistered();
+    split();
+    for (const ColmapPoint& point : model_.points) found_.points.push_back(point.position);
+    if (!found_.points.empty()) found_.points_file = model_.points_file;
+    std::vector<FoundView> all = found_.train;
+    all.insert(all.end(), found_.test.begin(), found_.test.end());
+    found_.normalisation = normalise(all, found_.points);
+    return std::move(found_);
+  }
+
+ private:
+  void warn_about_models() {
+    std::vector<std::string> others;
+    for (const std::string& name : tree_->folders_in("sparse")) {
+      const std::string folder = "sparse/" + name;
+      if (folder != folder_ && has_colmap_model(*tree_, folder)) others.push_back(folder);
+    }
+    if (!others.empty()) {
+      found_.warnings.push_back("COLMAP made several models that it could not join: " + folder_ +
+                                " is read, " + ids_text(others) + " not");
+    }
+  }
+
+  // The folder where some image of the model lies.
+  void choose_images() {
+    const auto has_some = [&](const std::string& folder) {
+      return std::any_of(names_.begin(), names_.end(), [&](const std::string& name) {
+        return !find_image(*tree_, in_folder(folder, name)).empty();
+      });
+    };
+    const auto root = std::find_if(image_folders.begin(), image_folders.end(), has_some);
+    if (root == image_folders.end()) {
+      throw InputError(tree_->path().string(), "images",
+                       "none of the " + std::to_string(names_.size()) + " photographs that " +
+                           model_.images_file + " names",
+                       "them in images/", names_.empty() ? "" : "the first is " + names_.front());
+    }
+    root_ = *root;
+    const auto first = std::find_if(names_.begin(), names_.end(), [&](const std::string& name) {
+      return !find_image(*tree_, in_folder(root_, name)).empty();
+    });
+    found_.images = choose_stored_images(*tree_, options_.downscale,
+                                         [&](int stored) { return in_folder(folder_at(stored), *first); });
+    found_.images.folder = folder_at(found_.images.stored);
+  }
+
+  std::string folder_at(int stored) const {
+    return stored == 1 || root_.empty() ? root_ : root_ + "_" + std::to_string(stored);
+  }
+  std::string path_of(const std::string& name) const {
+    return find_image(*tree_, in_folder(found_.images.folder, name));
+  }
+
+  // Photographs beside those of the model that the model does not know.
+  void warn_about_unregistered() {
+    std::set<std::string> known, folders;
+    for (const std::string& name : names_) {
+      known.insert(path_of(name));
+      folders.insert(
+          std::filesystem::path(in_folder(found_.images.folder, name)).parent_path().generic_string());
+    }
+    std::vector<std::string> strangers;
+    for (const std::string& folder : folders) {
+      for (const std::string& name : tree_->files_in(folder)) {
+        const std::string path = in_folder(folder, name);
+        if (has_image_name(name) && !known.contains(path)) strangers.push_back(path);
+      }
+    }
+    if (strangers.empty()) return;
+    std::sort(strangers.begin(), strangers.end(), natural_less);
+    found_.warnings.push_back(std::to_string(strangers.size()) + " photographs are not in the model (" +
+                              ids_text(strangers) + "): COLMAP found no pose for them");
+  }
+
+  void split() {
+    const std::vector<std::string> ids = image_ids(names_, tree_->name_of(model_.images_file));
+    const std::vector<double> times = times_by_names(names_);
+    std::map<std::string, size_t> place;
+    std::vector<std::string> test_ids;
+    for (size_t i = 0; i < ids.size(); ++i) {
+      place.emplace(ids[i], i);
+      found_.all_ids.push_back(ids[i]);
+      (tests(i, options_.test_every) ? test_ids : found_.train_ids).push_back(ids[i]);
+    }
+    const auto views_of = [&](const std::vector<std::string>& wanted, const std::string& name) {
+      std::vector<FoundView> views;
+      const auto exists = [&](const std::string& id) { return !path_of(names_[place.at(id)]).empty(); };
+      for (const std::string& id : keep_whole(wanted, name, "image", exists, found_.warnings)) {
+        const size_t i = place.at(id);
+        views.push_back(view_of(model_.images[i], id, options_.times == CaptureTimes::none ? 0 : times[i]));
+      }
+      return views;
+    };
+    found_.train = views_of(found_.train_ids, "training");
+    found_.test = views_of(test_ids, "test");
+  }
+
+  FoundView view_of(const ColmapImage& image, const std::string& id, double time) const {
+    return {id,
+            {tree_, path_of(image.name)},
+            model_.camera(image.camera_id)->lens,
+            tree_->name_of(model_.cameras_file) + ": camera " + std::to_string(image.camera_id),
+            image.camera_from_world,
+            image.position,
+            time};
+  }
+
+  const std::shared_ptr<const FileTree> tree_;
+  const CaptureOptions options_;
+  const std::string folder_;
+  ColmapModel model_;
+  std::vector<std::string> names_;
+  std::string root_;  // of the photographs at full size
+  FoundCapture found_;
+};
+
+}  // namespace
+
+bool is_colmap(const FileTree& tree) {
+  return std::any_of(model_folders.begin(), model_folders.end(),
+                     [&](const char* folder) { return has_colmap_model(tree, folder); });
+}
+
+FoundCapture read_colmap(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
+  return Reader(tree, options).read();
+}
+
+}  // namespace traceflow

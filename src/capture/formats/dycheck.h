@@ -1,0 +1,12 @@
+#pragma once
+
+#include "capture/formats/nerfies_layout.h"
+
+namespace traceflow {
+
+// DyCheck's captures: the layout of Nerfies, with the splits in splits/train.json and splits/val.json.
+bool is_dycheck(const FileTree& tree);
+// Reads the splits, their times and scene.json. Throws InputError.
+NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<std::string>& warnings);
+
+}  // namespace traceflow

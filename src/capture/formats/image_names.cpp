@@ -1,0 +1,117 @@
+#include "capture/formats/image_names.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <set>
+
+#include "base/error.h"
+
+namespace traceflow {
+
+namespace {
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+// The digits at `at` without zeros before them; moves `at` behind them.
+std::string_view take_number(const std::string& text, size_t& at) {
+  size_t begin = at;
+  while (at < text.size() && is_digit(text[at])) ++at;
+  while (begin + 1 < at && text[begin] == '0') ++begin;
+  return std::string_view(text).substr(begin, at - begin);
+}
+
+std::string without_extension(const std::string& path) {
+  return std::filesystem::path(path).replace_extension().generic_string();
+}
+
+// Of all paths, up to and with its last "/".
+size_t shared_folder(const std::vector<std::string>& paths) {
+  if (paths.empty()) return 0;
+  size_t shared = paths[0].size();
+  for (const std::string& path : paths) {
+    const auto differ = std::mismatch(
+        paths[0].begin(), paths[0].begin() + static_cast<std::ptrdiff_t>(std::min(shared, path.size())),
+        path.begin());
+    shared = static_cast<size_t>(differ.first - paths[0].begin());
+  }
+  const size_t slash = paths[0].substr(0, shared).rfind('/');
+  return slash == std::string::npos ? 0 : slash + 1;
+}
+
+}  // namespace
+
+bool natural_less(const std::string& a, const std::string& b) {
+  size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (is_digit(a[i]) && is_digit(b[j])) {
+      const std::string_view x = take_number(a, i), y = take_number(b, j);
+      if (x.size() != y.size()) return x.size() < y.size();
+      if (x != y) return x < y;
+      continue;
+    }
+    if (a[i] != b[j]) return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
+    ++i, ++j;
+  }
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;
+}
+
+std::string tidy_path(std::string path) {
+  std::replace(path.begin(), path.end(), '\\', '/');
+  return std::filesystem::path(path).lexically_normal().generic_string();
+}
+
+std::string find_image(const FileTree& tree, const std::string& path) {
+  if (tree.has(path)) return path;
+  for (const std::string& stem : {without_extension(path), path}) {
+    for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"}) {
+      if (tree.has(stem + extension)) return stem + extension;
+    }
+  }
+  return "";
+}
+
+StoredImages choose_stored_images(const FileTree& tree, int downscale,
+                                  const std::function<std::string(int stored)>& path_at) {
+  int stored = downscale;
+  while (stored > 1 && (downscale % stored != 0 || find_image(tree, path_at(stored)).empty())) --stored;
+  const std::string folder = std::filesystem::path(path_at(stored)).parent_path().generic_string();
+  return {folder, stored, downscale / stored};
+}
+
+std::vector<std::string> image_ids(const std::vector<std::string>& paths, const std::string& where) {
+  const size_t shared = shared_folder(paths);
+  std::vector<std::string> ids;
+  std::map<std::string, std::string> path_of;
+  for (const std::string& path : paths) {
+    std::string id = without_extension(path).substr(shared);
+    std::replace(id.begin(), id.end(), '/', '_');
+    if (id.empty() || id == "." || id == ".." || id.find('\0') != std::string::npos) {
+      throw InputError(where, "image names", "\"" + path + "\"", "names that can name a file");
+    }
+    const auto [other, is_new] = path_of.emplace(id, path);
+    if (!is_new) {
+      throw InputError(where, "image names", other->second + " and " + path,
+                       "names that differ by more than their extensions");
+    }
+    ids.push_back(std::move(id));
+  }
+  return ids;
+}
+
+std::vector<double> times_by_names(const std::vector<std::string>& paths) {
+  std::set<std::string, decltype(&natural_less)> names(&natural_less);
+  for (const std::string& path : paths) names.insert(std::filesystem::path(path).filename().string());
+  std::map<std::string, double> place;
+  for (const std::string& name : names) place.emplace(name, static_cast<double>(place.size()));
+  std::vector<double> times;
+  for (const std::string& path : paths)
+    times.push_back(place.at(std::filesystem::path(path).filename().string()));
+  return times;
+}
+
+bool tests(size_t i, int test_every) { return test_every > 0 && i % static_cast<size_t>(test_every) == 0; }
+
+}  // namespace traceflow

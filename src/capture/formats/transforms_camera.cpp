@@ -1,0 +1,119 @@
+#include "capture/formats/transforms_camera.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace traceflow {
+
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+constexpr double largest = 1e9;
+
+void take_number(const JsonField& field, const char* key, double& value) {
+  if (field.has(key)) value = field[key].number(-largest, largest);
+}
+
+void take_positive(const JsonField& field, const char* key, std::optional<double>& value) {
+  if (!field.has(key)) return;
+  value = field[key].positive();
+  if (!(*value < largest)) field[key].expect("less than 1e9");
+}
+
+// The names of nerfstudio, and those of COLMAP that mean the same with its k1 to k4, p1 and p2.
+bool is_fisheye_model(const JsonField& field) {
+  constexpr std::array<std::string_view, 5> perspective = {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE",
+                                                           "SIMPLE_RADIAL", "RADIAL"};
+  constexpr std::array<std::string_view, 3> fisheye = {"OPENCV_FISHEYE", "RADIAL_FISHEYE",
+                                                       "SIMPLE_RADIAL_FISHEYE"};
+  const std::string model = field.text();
+  if (std::find(fisheye.begin(), fisheye.end(), model) != fisheye.end()) return true;
+  if (std::find(perspective.begin(), perspective.end(), model) != perspective.end()) return false;
+  field.fail(model, "OPENCV, OPENCV_FISHEYE, PINHOLE or their simpler kin",
+             "undistort the images with the program that made them");
+}
+
+}  // namespace
+
+void TransformsLens::take(const JsonField& field) {
+  take_positive(field, "w", width);
+  take_positive(field, "h", height);
+  take_positive(field, "fl_x", focal_x);
+  take_positive(field, "fl_y", focal_y);
+  for (const auto& [key, angle] : {std::pair{"camera_angle_x", &angle_x}, {"camera_angle_y", &angle_y}}) {
+    take_positive(field, key, *angle);
+    if (field.has(key) && !(**angle < pi)) field[key].expect("an angle below π");
+  }
+  for (const auto& [key, centre] : {std::pair{"cx", &centre_x}, {"cy", &centre_y}}) {
+    if (field.has(key)) *centre = field[key].number(-largest, largest);
+  }
+  take_number(field, "k1", k1);
+  take_number(field, "k2", k2);
+  take_number(field, "k3", k3);
+  take_number(field, "k4", k4);
+  take_number(field, "p1", p1);
+  take_number(field, "p2", p2);
+  if (field.has("K")) {
+    const std::vector<JsonField> rows = field["K"].elements(3);
+    const std::vector<double> x = rows[0].numbers(3), y = rows[1].numbers(3);
+    if (!(x[0] > 0 && x[0] < largest && y[1] > 0 && y[1] < largest && std::abs(x[1]) < largest))
+      field["K"].expect("focal lengths above zero");
+    focal_x = x[0];
+    focal_y = y[1];
+    centre_x = x[2];
+    centre_y = y[2];
+    skew = x[1];
+  }
+  if (field.has("is_fisheye")) is_fisheye = field["is_fisheye"].yes();
+  if (field.has("camera_model")) is_fisheye = is_fisheye_model(field["camera_model"]);
+}
+
+Lens TransformsLens::lens(double image_width, double image_height, const JsonField& field) const {
+  Lens lens;
+  lens.width = width.value_or(image_width);
+  lens.height = height.value_or(image_height);
+  const auto focal_of = [](const std::optional<double>& angle, double side) {
+    return angle ? std::optional<double>(0.5 * side / std::tan(0.5 * *angle)) : std::nullopt;
+  };
+  const std::optional<double> x = focal_x ? focal_x : focal_of(angle_x, lens.width);
+  const std::optional<double> y = focal_y ? focal_y : x ? x : focal_of(angle_y, lens.height);
+  if (!y) field.fail("no focal length", "fl_x, camera_angle_x or K");
+  lens.focal = {x.value_or(*y), *y};
+  lens.centre = {centre_x.value_or(lens.width / 2), centre_y.value_or(lens.height / 2)};
+  lens.skew = skew;
+  lens.radial = {k1, k2, k3};
+  lens.radial_4 = k4;
+  if (is_fisheye) {
+    lens.projection = Projection::equidistant;
+  } else {
+    lens.tangential = {p1, p2};
+  }
+  return lens;
+}
+
+TransformsPose read_transform_matrix(const JsonField& field) {
+  constexpr double tolerance = 1e-2;
+  std::vector<JsonField> rows = field.elements();
+  if (rows.size() != 3 && rows.size() != 4) field.expect("three or four rows of four numbers");
+  Mat3<double> axes(0);
+  Vec3<double> position(0);
+  for (int r = 0; r < 3; ++r) {
+    const std::vector<JsonField> row = rows[static_cast<size_t>(r)].elements(4);
+    for (int c = 0; c < 3; ++c) axes[c][r] = row[static_cast<size_t>(c)].number(-1e6, 1e6);
+    position[r] = row[3].number(-1e15, 1e15);
+  }
+  const double volume = determinant(axes);
+  if (!(volume > 1e-18)) field.fail(volume < 0 ? "a mirrored frame" : "axes in one plane", "a rotation");
+  axes /= std::cbrt(volume);
+  const Mat3<double> error = transpose(axes) * axes - Mat3<double>(1);
+  for (int i = 0; i < 9; ++i) {
+    if (!(std::abs(error[i / 3][i % 3]) <= tolerance))
+      field.fail("axes that are not orthonormal", "a rotation");
+  }
+  for (int step = 0; step < 4; ++step) axes = 0.5 * (axes + inverse(transpose(axes)));
+  const Mat3<double> world_from_camera(axes[0], -axes[1], -axes[2]);
+  return {transpose(world_from_camera), position};
+}
+
+}  // namespace traceflow

@@ -1,0 +1,402 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "base/error.h"
+#include "capture/capture.h"
+#include "fake_formats.h"
+
+namespace traceflow {
+namespace {
+
+using Json = nlohmann::json;
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+std::vector<std::string> ids(const std::vector<View>& views) {
+  std::vector<std::string> result;
+  for (const View& view : views) result.push_back(view.id);
+  return result;
+}
+
+std::string refusal(const std::filesystem::path& path, const CaptureOptions& options = {}) {
+  try {
+    load_capture(path, options);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void expect_pixels(const Capture& capture, const View& view, const Tensor<uint8_t>& expected,
+                   double tolerance) {
+  const auto images = load_images(capture, view);
+  ASSERT_EQ(images->colour.shape(), (Shape{expected.dim(0), expected.dim(1), 3}));
+  for (int64_t i = 0; i < images->colour.size(); ++i)
+    ASSERT_NEAR(255 * images->colour[i], expected[i], tolerance) << i;
+}
+
+// Everything that a reader found, as one text: two ways of giving a capture must agree in it.
+std::string summary(const Capture& c) {
+  std::string text = c.format;
+  for (const auto* split : {&c.train, &c.test}) {
+    for (const View& view : *split) {
+      const auto& k = view.camera;
+      text += "\n" + view.id + " " + std::to_string(view.time) + " " + std::to_string(k.focal_x) + " " +
+              std::to_string(k.centre_y) + " " + std::to_string(k.position.x) + " " +
+              std::to_string(k.position.y);
+    }
+  }
+  return text + "\n" + std::to_string(c.points.size()) + " " + std::to_string(c.normalisation.scale);
+}
+
+TEST(ColmapCapture, cameras_times_split_and_points) {
+  for (const char* extension : {".png", ".jpg"}) {
+    ColmapCapture fake(10, extension);
+    fake.save();
+    const Capture capture = load_capture(fake.path(), {});
+    EXPECT_EQ(capture.format, "colmap");
+    EXPECT_THAT(ids(capture.test), ElementsAre("frame_0", "frame_8"));
+    EXPECT_THAT(ids(capture.train), ElementsAre("frame_1", "frame_2", "frame_3", "frame_4", "frame_5",
+                                                "frame_6", "frame_7", "frame_9"));
+    EXPECT_THAT(capture.warnings, IsEmpty());
+    EXPECT_EQ(capture.points.shape(), (Shape{50, 3}));
+    const View& view = capture.train[2];
+    EXPECT_FLOAT_EQ(view.time, 3.0F / 9);
+    EXPECT_FLOAT_EQ(view.camera.focal_y, 11);
+    const Vec3<double> place = capture.normalisation.in_capture(Vec3<double>(view.camera.position));
+    EXPECT_LT(length(place - Vec3<double>(0.3, 0, 0)), 1e-6);
+    // JPEG is not exact, and these pixels are noise to it.
+    expect_pixels(capture, view, fake.image(3), extension == std::string(".png") ? 0.01 : 40);
+  }
+}
+
+TEST(ColmapCapture, text_a_plain_sparse_folder_the_top_and_archives_say_the_same) {
+  ColmapCapture fake(10);
+  fake.save();
+  const std::string expected = summary(load_capture(fake.path(), {}));
+  EXPECT_EQ(summary(load_capture(zipped(fake.path(), fake.path() / "../a.zip"), {})), expected);
+  std::filesystem::remove(fake.path() / "../a.zip");
+  for (const char* folder : {"sparse", "."}) {
+    std::filesystem::remove_all(fake.path() / "sparse");
+    fake.model.save_text(fake.path() / folder);
+    EXPECT_EQ(summary(load_capture(fake.path(), {})), expected) << folder;
+  }
+}
+
+TEST(ColmapCapture, smaller_images_are_taken_where_they_are) {
+  ColmapCapture fake(4);
+  fake.save();
+  const Tensor<uint8_t> small({4, 6, 3});
+  for (int i = 0; i < 4; ++i) fake.write_image("images_2/frame_" + std::to_string(i) + ".png", small);
+  CaptureOptions options;
+  options.downscale = 2;
+  const Capture capture = load_capture(fake.path(), options);
+  EXPECT_FLOAT_EQ(capture.train[0].camera.focal_x, 5);
+  expect_pixels(capture, capture.train[0], small, 0.01);
+  std::filesystem::remove_all(fake.path() / "images_2");
+  const Capture filtered = load_capture(fake.path(), options);
+  EXPECT_EQ(filtered.train[0].camera.width, 6);
+  EXPECT_FLOAT_EQ(filtered.train[0].camera.focal_x, 5);
+}
+
+TEST(ColmapCapture, two_cameras_side_by_side_share_their_times) {
+  ColmapCapture fake(0);
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = (i < 3 ? "left/" : "right/") + std::to_string(i % 3) + ".png";
+    fake.model.images.push_back({static_cast<uint32_t>(i), {1, 0, 0, 0}, {0.1 * i, 0, 0}, 1, name, {}});
+    fake.write_photograph("images/" + name, i);
+  }
+  fake.save();
+  CaptureOptions options;
+  options.test_every = 0;
+  const Capture capture = load_capture(fake.path(), options);
+  EXPECT_THAT(ids(capture.train), ElementsAre("left_0", "left_1", "left_2", "right_0", "right_1", "right_2"));
+  EXPECT_FLOAT_EQ(capture.train[1].time, 0.5F);
+  EXPECT_FLOAT_EQ(capture.train[4].time, 0.5F);
+  options.times = CaptureTimes::none;
+  const Capture still = load_capture(fake.path(), options);
+  EXPECT_EQ(still.train[4].time, 0);
+  EXPECT_THAT(still.warnings, Contains(HasSubstr("all views have time 0")));
+}
+
+TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
+  ColmapCapture fake(10);
+  fake.save();
+  std::filesystem::remove(fake.path() / "images/frame_3.png");
+  fake.write_photograph("images/blurred.png", 1);
+  fake.write_text("images/Thumbs.db", "x");
+  fake.write_text("transforms.json", "{}");
+  fake.model.save_text(fake.path() / "sparse/1");
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.train.size(), 7U);
+  EXPECT_THAT(capture.warnings,
+              Contains(HasSubstr("1 of 8 training views have no image (frame_3): left out")));
+  EXPECT_THAT(capture.warnings,
+              Contains(HasSubstr("1 photographs are not in the model (images/blurred.png)")));
+  EXPECT_THAT(capture.warnings, Contains(HasSubstr("sparse/0 is read, sparse/1 not")));
+  EXPECT_THAT(capture.warnings, Contains(HasSubstr("--format transforms")));
+}
+
+TEST(ColmapCapture, no_photographs_at_all_is_refused) {
+  ColmapCapture fake(3);
+  fake.save();
+  std::filesystem::remove_all(fake.path() / "images");
+  EXPECT_THAT(refusal(fake.path()), HasSubstr("none of the 3 photographs that sparse/0/images.bin names"));
+}
+
+TEST(SyntheticCapture, splits_poses_and_white_behind) {
+  SyntheticCapture fake;
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.format, "nerf-synthetic");
+  EXPECT_THAT(ids(capture.train),
+              ElementsAre("train_r_0", "train_r_1", "train_r_2", "train_r_3", "train_r_4", "train_r_5"));
+  EXPECT_THAT(ids(capture.test), ElementsAre("test_r_0", "test_r_1", "test_r_2"));
+  EXPECT_LT(length(capture.normalisation.centre), 1e-9);
+  for (const View& view : capture.train) {
+    EXPECT_NEAR(std::atan(6 / view.camera.focal_x), 0.5, 1e-6);
+    // The origin lies on the axis, before the camera.
+    const Vec3<float> origin = view.camera.point_in_camera(Vec3<float>(0));
+    EXPECT_GT(origin.z, 0);
+    EXPECT_NEAR(origin.x, 0, 1e-6);
+    // The world's up is the picture's.
+    EXPECT_LT(view.camera.point_in_camera(Vec3<float>(0, 0, 0.1F)).y, 0);
+  }
+}
+
+TEST(SyntheticCapture, transparent_pixels_show_the_background) {
+  SyntheticCapture fake;
+  fake.save();
+  for (const auto& [background, level] : {std::pair{Background::automatic, 255},
+                                          {Background::white, 255},
+                                          {Background::black, 0},
+                                          {Background::grey, 128}}) {
+    CaptureOptions options;
+    options.background = background;
+    const Capture capture = load_capture(fake.path(), options);
+    Tensor<uint8_t> expected = fake.image(2);
+    for (int64_t i = 0; i < expected.size(); ++i) {
+      const int64_t pixel = i / 3;
+      const double alpha = pixel % 3 == 0 ? 0 : pixel % 3 == 1 ? 1 : 100 / 255.0;
+      expected[i] = static_cast<uint8_t>(std::lround(expected[i] * alpha + level * (1 - alpha)));
+    }
+    expect_pixels(capture, capture.train[2], expected, 0.51);
+  }
+}
+
+TEST(SyntheticCapture, times_make_it_a_moving_one) {
+  SyntheticCapture fake(true);
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.format, "d-nerf");
+  EXPECT_FLOAT_EQ(capture.train[3].time, 0.6F);
+  EXPECT_FLOAT_EQ(capture.test[1].time, 0.2F);
+  EXPECT_THAT(capture.warnings, Not(Contains(HasSubstr("time 0"))));
+  CaptureOptions options;
+  options.times = CaptureTimes::none;
+  EXPECT_EQ(load_capture(fake.path(), options).train[3].time, 0);
+  fake.files["transforms_test.json"]["frames"][1].erase("time");
+  for (Json& frame : fake.files["transforms_train.json"]["frames"])
+    frame["time"] = frame["time"].get<double>() - 3;
+  fake.save();
+  const Capture shifted = load_capture(fake.path(), {});
+  EXPECT_THAT(shifted.warnings, Contains(HasSubstr("without a time (test/r_1)")));
+  EXPECT_EQ(shifted.train[0].time, 0);
+}
+
+TEST(NgpCapture, natural_order_split_and_intrinsics) {
+  NgpCapture fake(12);
+  fake.json()["k1"] = 0.01;
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.format, "instant-ngp");
+  EXPECT_THAT(ids(capture.test), ElementsAre("0", "8"));
+  EXPECT_EQ(capture.train.front().id, "1");
+  EXPECT_EQ(capture.train.back().id, "11");
+  EXPECT_FLOAT_EQ(capture.train[0].camera.centre_x, 6.5F);
+  CaptureOptions options;
+  options.times = CaptureTimes::names;
+  EXPECT_FLOAT_EQ(load_capture(fake.path(), options).train.back().time, 1);
+  EXPECT_EQ(summary(load_capture(zipped(fake.path(), fake.path() / "../b.zip"), {})), summary(capture));
+  std::filesystem::remove(fake.path() / "../b.zip");
+}
+
+TEST(NgpCapture, nerfstudio_splits_points_and_frames_with_their_own_lens) {
+  NgpCapture fake(6);
+  Json& json = fake.json();
+  json["camera_model"] = "OPENCV";
+  json["ply_file_path"] = "sparse_pc.ply";
+  json["train_filenames"] = {"images/1.jpg", "images/3.jpg", "images/5.jpg"};
+  json["val_filenames"] = {"images/2.jpg"};
+  json["test_filenames"] = {"./images/4.jpg"};
+  for (Json& frame : json["frames"]) {
+    if (frame["file_path"] == "images/3.jpg") frame["fl_x"] = 20;
+    frame["mask_path"] = "masks/a.png";
+    frame["depth_file_path"] = "depth/a.png";
+  }
+  fake.save();
+  fake.write_text(
+      "sparse_pc.ply",
+      "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty uint8 red\nend_header\n0 0 0 1\n0.1 0.2 0.3 4\n");
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.format, "nerfstudio");
+  EXPECT_THAT(ids(capture.train), ElementsAre("1", "3", "5"));
+  EXPECT_THAT(ids(capture.test), ElementsAre("4"));
+  EXPECT_EQ(capture.points.dim(0), 2);
+  EXPECT_FLOAT_EQ(capture.train[0].camera.focal_x, 10);
+  EXPECT_FLOAT_EQ(capture.train[1].camera.focal_x, 20);
+  EXPECT_THAT(capture.warnings, Contains(HasSubstr("2 frames are in neither train_filenames nor")));
+  EXPECT_THAT(capture.warnings, Contains(HasSubstr("mask_path: not used")));
+  EXPECT_THAT(capture.warnings, Contains(HasSubstr("depth images: not used")));
+  fake.write_text("sparse_pc.ply", "broken");
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(HasSubstr("points not used: ")));
+}
+
+TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
+  NgpCapture fake(6);
+  for (Json& frame : fake.json()["frames"])
+    frame["file_path"] = "/home/someone/data/" + frame["file_path"].get<std::string>();
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.train.size(), 5U);
+  EXPECT_THAT(capture.warnings, Contains(HasSubstr("lead out of the capture")));
+  for (Json& frame : fake.json()["frames"]) frame["file_path"] = "../../etc/passwd";
+  fake.save();
+  EXPECT_THAT(refusal(fake.path()), HasSubstr("none of 1 images"));
+}
+
+TEST(NgpCapture, smaller_images_are_taken_where_they_are) {
+  NgpCapture fake(3);
+  fake.json().erase("w");
+  fake.save();
+  const Tensor<uint8_t> small({4, 6, 3});
+  for (int i = 0; i < 3; ++i) fake.write_image("images_2/" + std::to_string(i) + ".png", small);
+  CaptureOptions options;
+  options.downscale = 2;
+  const Capture capture = load_capture(fake.path(), options);
+  EXPECT_EQ(capture.train[0].camera.width, 6);
+  EXPECT_FLOAT_EQ(capture.train[0].camera.focal_x, 5);
+  expect_pixels(capture, capture.train[0], small, 0.01);
+}
+
+TEST(NgpCaptureHostile, each_is_refused_by_name) {
+  const std::pair<std::function<void(Json&)>, const char*> cases[] = {
+      {[](Json& j) { j.erase("frames"); }, "transforms.json: frames: found nothing"},
+      {[](Json& j) { j["frames"] = 3; }, "transforms.json: frames: found 3, expected a list"},
+      {[](Json& j) { j["frames"] = Json::array(); }, "transforms.json: frames: found none of 0 images"},
+      {[](Json& j) { j["frames"][1].erase("file_path"); }, "frames[1].file_path: found nothing"},
+      {[](Json& j) { j["frames"][1]["file_path"] = 7; }, "frames[1].file_path: found 7, expected a string"},
+      {[](Json& j) { j["frames"][1].erase("transform_matrix"); },
+       "frames[1].transform_matrix: found nothing"},
+      {[](Json& j) { j["frames"][1]["transform_matrix"][2][2] = nullptr; },
+       "frames[1].transform_matrix[2][2]"},
+      {[](Json& j) { j["frames"][1]["time"] = "noon"; }, "frames[1].time: found \"noon\""},
+      {[](Json& j) { j["frames"][1]["camera_model"] = "VR180_L"; }, "frames[1].camera_model: found VR180_L"},
+      {[](Json& j) { j.erase("fl_x"), j.erase("fl_y"); }, "no focal length"},
+      {[](Json& j) { j["k1"] = -60; }, "transforms.json: images/"},
+      {[](Json& j) { j["train_filenames"] = {3.5}; }, "train_filenames"},
+      {[](Json& j) { j["w"] = 0; }, "transforms.json: w: found 0"}};
+  for (const auto& [change, expected] : cases) {
+    NgpCapture fake(4);
+    change(fake.json());
+    fake.save();
+    EXPECT_THAT(refusal(fake.path()), HasSubstr(expected));
+  }
+}
+
+TEST(DyCheckCapture, splits_give_views_and_times) {
+  FakeCapture fake;
+  fake.scene = {{"scale", 0.5}, {"center", {0.0, 0.0, 1.0}}, {"near", 0.1}, {"far", 2.0}};
+  std::map<std::string, Json> splits = {
+      {"train", {{"frame_names", Json::array()}, {"time_ids", Json::array()}}},
+      {"val", {{"frame_names", Json::array()}, {"time_ids", Json::array()}}}};
+  for (int t = 0; t < 4; ++t) {
+    for (const int camera : {0, 1}) {
+      const std::string id = std::to_string(camera) + "_0000" + std::to_string(t);
+      fake.add_view(id, 2 * t + camera, 99 - t, false);
+      Json& split = splits[camera == 0 ? "train" : "val"];
+      split["frame_names"].push_back(id);
+      split["time_ids"].push_back(t);
+    }
+  }
+  fake.dataset = {{"ids", {"not looked at"}}};
+  fake.save();
+  fake.write_text("extra.json", R"({"factor": 2})");
+  fake.write_text("depth/1x/0_00000.npy", "x");
+  const auto save = [&] {
+    for (const auto& [name, split] : splits) fake.write_text("splits/" + name + ".json", split.dump());
+  };
+  save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.format, "dycheck");
+  EXPECT_THAT(ids(capture.train), ElementsAre("0_00000", "0_00001", "0_00002", "0_00003"));
+  EXPECT_THAT(ids(capture.test), ElementsAre("1_00000", "1_00001", "1_00002", "1_00003"));
+  EXPECT_FLOAT_EQ(capture.test[2].time, 2.0F / 3);
+  EXPECT_EQ(capture.normalisation.scale, 0.5);
+  EXPECT_THAT(capture.warnings, Contains("depth/ is not used"));
+
+  const std::pair<std::function<void()>, const char*> cases[] = {
+      {[&] { splits["val"]["time_ids"].erase(0); },
+       "splits/val.json: time_ids: found [1,2,3], expected a list of 4"},
+      {[&] { splits["train"]["time_ids"][1] = -1; }, "splits/train.json: time_ids[1]: found -1"},
+      {[&] { splits["train"]["frame_names"][1] = "../x"; },
+       "splits/train.json: frame_names[1]: found the id \"../x\""},
+      {[&] { splits["train"]["frame_names"][1] = "0_00000"; },
+       "frame_names[1]: found 0_00000 a second time"}};
+  for (const auto& [change, expected] : cases) {
+    const auto whole = splits;
+    change();
+    save();
+    EXPECT_THAT(refusal(fake.path()), HasSubstr(expected));
+    splits = whole;
+  }
+}
+
+TEST(Formats, are_chosen_by_looking_or_by_name) {
+  ColmapCapture both(4);
+  both.save();
+  NgpCapture transforms(4);
+  transforms.save();
+  std::filesystem::copy(transforms.path() / "transforms.json", both.path() / "transforms.json");
+  std::filesystem::copy(transforms.path() / "images", both.path() / "images",
+                        std::filesystem::copy_options::recursive);
+  EXPECT_EQ(load_capture(both.path(), {}).format, "colmap");
+  CaptureOptions options;
+  options.format = CaptureFormat::transforms;
+  EXPECT_EQ(load_capture(both.path(), options).format, "instant-ngp");
+  const std::pair<CaptureFormat, const char*> missing[] = {
+      {CaptureFormat::nerfies, "dataset.json: found no such file"},
+      {CaptureFormat::dycheck, "splits/train.json: found no such file"},
+      {CaptureFormat::colmap, "found no COLMAP model"}};
+  for (const auto& [format, expected] : missing) {
+    options.format = format;
+    EXPECT_THAT(refusal(transforms.path(), options), HasSubstr(expected));
+  }
+  const TempFolder empty;
+  for (const char* looked_for : {"dataset.json", "splits/train.json", "sparse/0", "transforms.json"})
+    EXPECT_THAT(refusal(empty.path()), HasSubstr(looked_for));
+  options.test_every = 1;
+  EXPECT_THAT(refusal(transforms.path(), options), HasSubstr("test_every"));
+}
+
+// A photograph that a viewer would turn: told, and taken as it is stored.
+TEST(Formats, orientation_is_told) {
+  ColmapCapture fake(2, ".jpg");
+  fake.save();
+  std::string jpeg = jpeg_bytes(fake.image(1), 95);
+  const std::string exif =
+      std::string("Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0", 32);
+  jpeg.insert(2, "\xff\xe1" + std::string(1, '\0') + static_cast<char>(exif.size() + 2) + exif);
+  fake.write_text("images/frame_1.jpg", jpeg);
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(HasSubstr("viewers turn the images of frame_1")));
+}
+
+}  // namespace
+}  // namespace traceflow
