@@ -77,7 +77,7 @@ void inspect_points(const Capture& capture, Inspection& result) {
 }
 
 void list_missing(const Capture& capture, Inspection& result) {
-  if (capture.points.empty()) result.missing.emplace_back("points.npy (surfels start at random)");
+  if (capture.points.empty()) result.missing.emplace_back("points (surfels start at random)");
   if (!capture.has_masks) result.missing.emplace_back("masks (no figures inside the moving object)");
   if (!capture.has_normal_priors) result.missing.emplace_back("normal priors (the loss on them is left out)");
   if (capture.test.empty()) result.missing.emplace_back("test views (nothing to evaluate on)");

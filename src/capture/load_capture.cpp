@@ -176,7 +176,7 @@ class Assembly {
   }
 
   void take_points() {
-    if (found_.points_file.empty()) return warn("points.npy is missing: surfels start at random");
+    if (found_.points_file.empty()) return warn("there are no points: surfels start at random");
     std::vector<float> kept;
     kept.reserve(3 * found_.points.size());
     for (const Vec3<double>& point : found_.points) {

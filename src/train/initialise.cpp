@@ -10,6 +10,7 @@
 #include "math/symmetric_eigen.h"
 #include "scene/neighbours.h"
 #include "scene/rows.h"
+#include "train/common_view.h"
 #include "train/sightings.h"
 
 namespace traceflow {
@@ -211,12 +212,16 @@ float cloud_radius(const Tensor<float>& points) {
 }
 
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
-  const Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
-  if (points.dim(0) == 0) {
-    throw InputError((capture.folder / "points.npy").string(), "", "no finite points", "points to start from",
-                     "add points.npy (P×3, capture units), e.g. from structure from motion");
-  }
   const int64_t limit = std::min(options.initial.max_points, options.density.max_surfels);
+  Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
+  if (points.dim(0) == 0) {
+    constexpr int64_t random_points = 100000;
+    points = points_in_common_view(capture.train, capture.extent, std::min(limit, random_points), random);
+  }
+  if (points.dim(0) == 0) {
+    throw InputError(capture.folder.string(), "points", "none, and no place that several views see",
+                     "points to start from", "add points.npy (P×3, capture units)");
+  }
   Scene scene;
   scene.specular = options.specular;
   scene.normalisation = capture.normalisation;

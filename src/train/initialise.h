@@ -7,9 +7,9 @@
 
 namespace traceflow {
 
-// The scene that training starts from (method §7.8): main surfels at the capture's points, environment
-// surfels (or a map) around them, fields at zero. Throws InputError when the capture has no points to start
-// from.
+// The scene that training starts from (method §7.8): main surfels at the capture's points, or, where it has
+// none, at random ones in the views' common sight; environment surfels (or a map) around them, fields at
+// zero. Throws InputError when there is no such place either.
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
 // Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
