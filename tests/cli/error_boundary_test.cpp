@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <new>
 #include <sstream>
 #include <system_error>
@@ -71,12 +72,12 @@ TEST(ErrorBoundary, MemoryIsCode4AndOneLine) {
   EXPECT_EQ(std::count(o.line.begin(), o.line.end(), '\n'), 1);
 }
 
-void throw_where_nothing_may_be() noexcept { throw std::bad_alloc(); }
+void run_where_nothing_may_be_thrown(const std::function<void()>& work) noexcept { work(); }
 
 TEST(ErrorBoundary, WhatIsThrownWhereNothingMayBeStillEndsInItsLineAndCode) {
   const auto end = [] {
     guard_termination();
-    throw_where_nothing_may_be();
+    run_where_nothing_may_be_thrown([] { throw std::bad_alloc(); });
   };
   EXPECT_EXIT(end(), testing::ExitedWithCode(exit_memory), "^traceflow: out of memory; try [^\n]*\n$");
 }
