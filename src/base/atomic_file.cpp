@@ -36,31 +36,40 @@ struct TemporaryFile {
   }
 };
 
-void sync_folder(const std::filesystem::path& folder) {
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
-}  // namespace
-
-void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  TemporaryFile file(path);
+void write_all(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& path) {
   for (size_t written = 0; written < bytes.size();) {
-    const ssize_t n = ::write(file.descriptor, bytes.data() + written, bytes.size() - written);
+    const ssize_t n = ::write(descriptor, bytes.data() + written, bytes.size() - written);
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) fail(path, "write");
     written += static_cast<size_t>(n);
   }
+}
+
+}  // namespace
+
+void write_atomically(const std::filesystem::path& path,
+                      const std::vector<std::span<const std::byte>>& parts) {
+  TemporaryFile file(path);
+  for (const std::span<const std::byte> part : parts) write_all(file.descriptor, part, path);
   if (::fsync(file.descriptor) != 0) fail(path, "sync");
   if (::rename(file.name.c_str(), path.c_str()) != 0) fail(path, "rename");
   file.renamed = true;
   sync_folder(path.parent_path());
 }
 
+void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  write_atomically(path, std::vector{bytes});
+}
+
 void write_atomically(const std::filesystem::path& path, std::string_view text) {
   write_atomically(path, std::as_bytes(std::span(text.data(), text.size())));
+}
+
+void sync_folder(const std::filesystem::path& folder) {
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
 }
 
 }  // namespace traceflow

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string_view>
+#include <vector>
 
 namespace traceflow {
 
@@ -12,5 +13,11 @@ namespace traceflow {
 // refuses.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_atomically(const std::filesystem::path& path, std::string_view text);
+// The same of bytes that lie in several places, in order.
+void write_atomically(const std::filesystem::path& path,
+                      const std::vector<std::span<const std::byte>>& parts);
+
+// Waits until what was renamed in a folder is on the disk.
+void sync_folder(const std::filesystem::path& folder);
 
 }  // namespace traceflow

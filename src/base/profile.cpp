@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstring>
 #include <mutex>
+#include <new>
 
 #include "base/parallel.h"
 
@@ -28,7 +29,11 @@ Scope::~Scope() {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   const std::lock_guard lock(mutex);
   auto entry = std::find_if(table.begin(), table.end(), [&](const Entry& e) { return e.name == name_; });
-  if (entry == table.end()) entry = table.insert(table.end(), Entry{name_, 0, 0});
+  try {
+    if (entry == table.end()) entry = table.insert(table.end(), Entry{name_, 0, 0});
+  } catch (const std::bad_alloc&) {
+    return;  // a step that was not counted; the scope may end because of this very want of memory
+  }
   entry->calls += 1;
   entry->seconds += seconds;
 }

@@ -14,6 +14,7 @@
 #include "base/version.h"
 #include "cli/arguments/option_page.h"
 #include "cli/terminal/error_boundary.h"
+#include "cli/terminal/standard_streams.h"
 #include "cli/verbs/verbs.h"
 #include "primitives/instructions.h"
 
@@ -55,10 +56,10 @@ Instructions instructions_of(const std::string& name) {
 }
 
 void print_profile() {
-  fmt::print(stderr, "{:<40} {:>10} {:>12} {:>12}\n", "step", "calls", "seconds", "ms/call");
+  std::cerr << fmt::format("{:<40} {:>10} {:>12} {:>12}\n", "step", "calls", "seconds", "ms/call");
   for (const profile::Entry& e : profile::entries()) {
-    fmt::print(stderr, "{:<40} {:>10} {:>12.3f} {:>12.3f}\n", e.name, e.calls, e.seconds,
-               1e3 * e.seconds / static_cast<double>(std::max<int64_t>(1, e.calls)));
+    std::cerr << fmt::format("{:<40} {:>10} {:>12.3f} {:>12.3f}\n", e.name, e.calls, e.seconds,
+                             1e3 * e.seconds / static_cast<double>(std::max<int64_t>(1, e.calls)));
   }
 }
 
@@ -106,7 +107,8 @@ int run_program(int argc, const char* const* argv) {
 }  // namespace
 
 int run(int argc, const char* const* argv) {
-  return guarded([&] { return run_program(argc, argv); }, std::cerr);
+  const int code = guarded([&] { return run_program(argc, argv); }, std::cerr);
+  return flush_output(std::cerr) || code != exit_done ? code : exit_input;
 }
 
 }  // namespace traceflow::cli

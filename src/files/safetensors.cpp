@@ -1,7 +1,11 @@
 #include "files/safetensors.h"
 
+#include <fmt/format.h>
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstring>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -24,6 +28,7 @@ constexpr uint64_t max_header_bytes = 100'000'000;  // the format's own limit
 constexpr size_t max_rank = 4;
 constexpr int max_nesting = 8;
 constexpr const char* metadata_key = "__metadata__";
+constexpr const char* checksums_key = "traceflow.crc32";
 
 struct Type {
   std::string_view name;
@@ -226,6 +231,74 @@ void check_tiling(const std::vector<Described>& tensors, const std::string& orig
   }
 }
 
+Json shape_list(const Shape& shape) {
+  Json dims = Json::array();
+  for (int i = 0; i < shape.rank(); ++i) dims.push_back(shape[i]);
+  return shape.rank() == 0 ? Json::array({0}) : dims;
+}
+
+std::string checksum(std::string_view head, std::span<const std::byte> bytes) {
+  uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(head.data()), head.size());
+  // An address that is null asks zlib for a first value.
+  if (!bytes.empty()) crc = crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
+  return fmt::format("{:08x}", crc);
+}
+
+std::string checksum(std::string_view type, const Shape& shape, std::span<const std::byte> bytes) {
+  return checksum(std::string(type) + shape_list(shape).dump(), bytes);
+}
+
+// Of the text that is written, in which bytes that are not UTF-8 have been replaced.
+std::string checksum(const std::map<std::string, std::string>& metadata) {
+  return checksum(Json(metadata).dump(-1, ' ', false, Json::error_handler_t::replace), {});
+}
+
+// What a file says of its sections: {"metadata": "89abcdef", "tensors": {NAME: "01234567", …}}.
+class Checksums {
+ public:
+  // Takes them out of the metadata, which must agree with its own.
+  Checksums(std::map<std::string, std::string>& metadata, std::string origin) : origin_(std::move(origin)) {
+    const auto found = metadata.find(checksums_key);
+    if (found == metadata.end()) return;
+    Json json = Json::parse(found->second, nullptr, false);
+    metadata.erase(found);
+    if (!json.is_object() || !json.contains("metadata") || !json.contains("tensors") ||
+        !json["tensors"].is_object()) {
+      throw InputError(origin_, "metadata", "checksums that cannot be read", "those of metadata and tensors",
+                       remedy);
+    }
+    compare("metadata", checksum(metadata), json["metadata"]);
+    tensors_ = std::move(json["tensors"]);
+  }
+  bool exist() const { return tensors_.is_object(); }
+
+  void check_names(const std::vector<Described>& tensors) const {
+    std::set<std::string_view> names;
+    for (const Described& t : tensors) names.insert(t.name);
+    for (const auto& [name, value] : tensors_.items()) {
+      if (names.count(name) == 0)
+        throw InputError(origin_, "tensor " + shown(name), "nothing", "this tensor", remedy);
+    }
+  }
+  void check(const Described& tensor, std::span<const std::byte> bytes) const {
+    const auto expected = tensors_.find(tensor.name);
+    compare("tensor " + shown(tensor.name), checksum(tensor.type.name, tensor.shape, bytes),
+            expected == tensors_.end() ? Json() : *expected);
+  }
+
+ private:
+  static constexpr const char* remedy = "the file is damaged";
+
+  void compare(const std::string& section, const std::string& found, const Json& expected) const {
+    if (expected == found) return;
+    throw InputError(origin_, section, "bytes with the checksum " + found,
+                     expected.is_string() ? shown(expected.get<std::string>()) : "a checksum", remedy);
+  }
+
+  std::string origin_;
+  Json tensors_;
+};
+
 template <class Widen>
 std::vector<std::byte> widened(const std::vector<std::byte>& narrow, Widen widen) {
   std::vector<std::byte> wide(narrow.size() * 2);
@@ -243,12 +316,6 @@ std::vector<std::byte> bytes_of(const Tensor<T>& tensor) {
   std::vector<std::byte> bytes(static_cast<size_t>(tensor.size()) * sizeof(T));
   memory::copy(Device::cpu, bytes.data(), tensor.device(), tensor.data(), bytes.size());
   return bytes;
-}
-
-Json shape_list(const Shape& shape) {
-  Json dims = Json::array();
-  for (int i = 0; i < shape.rank(); ++i) dims.push_back(shape[i]);
-  return shape.rank() == 0 ? Json::array({0}) : dims;
 }
 
 }  // namespace
@@ -273,11 +340,15 @@ Safetensors Safetensors::read(const std::filesystem::path& path) {
     return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
   });
   check_tiling(tensors, result.origin_, file_size - data_start);
+  const Checksums checksums(result.metadata, result.origin_);
+  result.has_checksums_ = checksums.exist();
+  if (checksums.exist()) checksums.check_names(tensors);
 
   for (const Described& t : tensors) {
     std::vector<std::byte> bytes(t.end - t.begin);
     read_bytes(file, result.origin_, "tensor " + shown(t.name),
                {reinterpret_cast<char*>(bytes.data()), bytes.size()});
+    if (checksums.exist()) checksums.check(t, bytes);
     std::string type(t.type.name);
     if (type == "F16" || type == "BF16") {
       bytes = widened(bytes, type == "F16" ? widen_half : widen_bfloat16);
@@ -306,37 +377,35 @@ void Safetensors::add(const std::string& name, const Tensor<uint8_t>& tensor) {
 
 void Safetensors::write(const std::filesystem::path& path) const {
   require(!has(metadata_key), "no tensor takes the metadata's name");
+  require(metadata.count(checksums_key) == 0, "no metadata take the checksums' name");
   // Wide types first, so that every tensor starts at a multiple of its element's size.
   std::vector<std::pair<const std::string*, const Entry*>> order;
-  uint64_t data_bytes = 0;
-  for (const auto& [name, entry] : entries_) {
-    order.emplace_back(&name, &entry);
-    data_bytes += entry.bytes.size();
-  }
+  for (const auto& [name, entry] : entries_) order.emplace_back(&name, &entry);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
     return find_type(a.second->type)->bytes > find_type(b.second->type)->bytes;
   });
 
   Json header = Json::object();
-  if (!metadata.empty()) header[metadata_key] = metadata;
+  Json checksums{{"metadata", checksum(metadata)}, {"tensors", Json::object()}};
   uint64_t offset = 0;
   for (const auto& [name, entry] : order) {
+    checksums["tensors"][*name] = checksum(entry->type, entry->shape, entry->bytes);
     header[*name] = {{"dtype", entry->type},
                      {"shape", shape_list(entry->shape)},
                      {"data_offsets", {offset, offset + entry->bytes.size()}}};
     offset += entry->bytes.size();
   }
+  header[metadata_key] = metadata;
+  header[metadata_key][checksums_key] = checksums.dump(-1, ' ', false, Json::error_handler_t::replace);
   std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
   text.resize((text.size() + 7) / 8 * 8, ' ');
 
-  std::string file;
-  file.reserve(length_bytes + text.size() + data_bytes);
-  for (size_t i = 0; i < length_bytes; ++i) file += static_cast<char>(text.size() >> (8 * i) & 0xFFU);
-  file += text;
-  for (const auto& [name, entry] : order) {
-    file.append(reinterpret_cast<const char*>(entry->bytes.data()), entry->bytes.size());
-  }
-  write_atomically(path, file);
+  std::string head;
+  for (size_t i = 0; i < length_bytes; ++i) head += static_cast<char>(text.size() >> (8 * i) & 0xFFU);
+  head += text;
+  std::vector<std::span<const std::byte>> parts{std::as_bytes(std::span(head))};
+  for (const auto& [name, entry] : order) parts.emplace_back(entry->bytes);
+  write_atomically(path, parts);
 }
 
 bool Safetensors::has(const std::string& name) const { return entries_.count(name) != 0; }
@@ -345,6 +414,24 @@ std::vector<std::string> Safetensors::names() const {
   std::vector<std::string> result;
   for (const auto& [name, entry] : entries_) result.push_back(name);
   return result;
+}
+
+const std::string& Safetensors::text(const std::string& key) const {
+  const auto found = metadata.find(key);
+  if (found == metadata.end()) {
+    throw InputError(origin_, key, "nothing", "the metadata that `traceflow train` writes");
+  }
+  return found->second;
+}
+
+double Safetensors::number(const std::string& key) const {
+  const std::string& text = this->text(key);
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0 && value <= 1e15)) {
+    throw InputError(origin_, key, shown(text), "a number");
+  }
+  return value;
 }
 
 template <class T>

@@ -12,9 +12,13 @@ namespace traceflow {
 
 // The safetensors format: a JSON header with names, types, shapes and offsets, then the bytes. Types: F32,
 // F64, I32, I64, U8, and for reading also F16 and BF16 (widened to float). Metadata is a map of strings.
+//
+// What is written carries a checksum (CRC-32) for each tensor, of its type, shape and bytes, and one for the
+// metadata, in one more metadata entry that other readers pass over.
 class Safetensors {
  public:
-  // Throws InputError for a file that is not one or whose header points outside it.
+  // Throws InputError for a file that is not one, whose header points outside it, or of which a section does
+  // not agree with its checksum: then the error names the tensor, or "metadata".
   static Safetensors read(const std::filesystem::path& path);
 
   // Takes a copy of the tensor, wherever it is.
@@ -33,7 +37,14 @@ class Safetensors {
   template <class T>
   Tensor<T> tensor(const std::string& name) const;
 
+  // Whether this was read from a file that carried checksums.
+  bool has_checksums() const { return has_checksums_; }
+
   std::map<std::string, std::string> metadata;
+  // An entry of it, in the second case a number from 0 to 1e15. Throws InputError naming the file and the key
+  // when it is missing or no such number.
+  const std::string& text(const std::string& key) const;
+  double number(const std::string& key) const;
 
  private:
   struct Entry {
@@ -43,6 +54,7 @@ class Safetensors {
   };
   std::string origin_ = "safetensors";
   std::map<std::string, Entry> entries_;
+  bool has_checksums_ = false;
 };
 
 }  // namespace traceflow

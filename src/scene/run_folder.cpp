@@ -2,35 +2,88 @@
 
 #include <system_error>
 
+#include "base/atomic_file.h"
 #include "base/error.h"
 
 namespace traceflow {
 
-Safetensors read_checkpoint(const RunFolder& run, std::string& note) {
-  namespace fs = std::filesystem;
-  if (!fs::exists(run.checkpoint()) && !fs::exists(run.previous_checkpoint())) {
-    throw InputError(run.folder.string(), "checkpoint.safetensors", "no such file",
-                     "a folder that traceflow train wrote");
+namespace {
+
+namespace fs = std::filesystem;
+
+// One whose every section is as it was written.
+Safetensors read_sound(const fs::path& path) {
+  Safetensors file = Safetensors::read(path);
+  if (file.number("version") > 1 && !file.has_checksums()) {
+    throw InputError(path.string(), "metadata", "no checksums", "one for each section",
+                     "the file is damaged");
+  }
+  return file;
+}
+
+void check_version(const Safetensors& file, const RunFolder& run) {
+  if (file.number("version") <= checkpoint_version) return;
+  throw InputError(run.folder.string(), "checkpoint version", file.text("version"),
+                   "at most " + std::to_string(checkpoint_version),
+                   "a newer traceflow wrote it: use that one");
+}
+
+std::string iteration_of(const Safetensors& file) {
+  const auto found = file.metadata.find("iteration");
+  return found == file.metadata.end() ? "" : ", of iteration " + found->second;
+}
+
+// The current checkpoint, or the one before it and why.
+Safetensors newest_sound(const RunFolder& run, std::string& note) {
+  std::string trouble;
+  try {
+    return read_sound(run.checkpoint());
+  } catch (const InputError& error) {
+    trouble = error.what();
+  }
+  if (!fs::exists(run.previous_checkpoint())) {
+    throw InputError(trouble, "", "", "", "there is no checkpoint before it to go back to");
   }
   try {
-    return Safetensors::read(run.checkpoint());
+    Safetensors before = read_sound(run.previous_checkpoint());
+    note = trouble + "; using the checkpoint before it" + iteration_of(before);
+    return before;
   } catch (const InputError& error) {
-    if (!fs::exists(run.previous_checkpoint())) throw;
-    note = std::string(error.what()) + "; using the checkpoint before it";
-    return Safetensors::read(run.previous_checkpoint());
+    throw InputError(trouble, "", "", "", std::string("nor can the one before it be used: ") + error.what());
   }
 }
 
-void write_checkpoint(const RunFolder& run, const Safetensors& file) {
+}  // namespace
+
+bool RunFolder::holds_a_run() const { return fs::exists(checkpoint()) || fs::exists(previous_checkpoint()); }
+
+Safetensors read_checkpoint(const RunFolder& run, std::string& note) {
+  if (!run.holds_a_run()) {
+    throw InputError(run.folder.string(), "checkpoint.safetensors", "no such file",
+                     "a folder that traceflow train wrote");
+  }
+  Safetensors file = newest_sound(run, note);
+  check_version(file, run);
+  return file;
+}
+
+void write_checkpoint(const RunFolder& run, Safetensors file) {
+  file.metadata["version"] = std::to_string(checkpoint_version);
+  std::error_code error;
+  fs::create_directories(run.folder, error);
   // Write the new one beside the old before either changes its name, so that at every moment a whole one
   // stands.
-  const std::filesystem::path fresh = run.folder / "checkpoint.new.safetensors";
+  const fs::path fresh = run.folder / "checkpoint.new.safetensors";
   file.write(fresh);
+  if (fs::exists(run.checkpoint())) fs::rename(run.checkpoint(), run.previous_checkpoint(), error);
+  if (!error) fs::rename(fresh, run.checkpoint(), error);
+  if (error) throw InputError(run.checkpoint().string(), "rename", error.message(), "a writable folder");
+  sync_folder(run.folder);
+}
+
+void set_damaged_aside(const RunFolder& run) {
   std::error_code error;
-  if (std::filesystem::exists(run.checkpoint())) {
-    std::filesystem::rename(run.checkpoint(), run.previous_checkpoint(), error);
-  }
-  if (!error) std::filesystem::rename(fresh, run.checkpoint(), error);
+  if (fs::exists(run.checkpoint())) fs::rename(run.checkpoint(), run.damaged_checkpoint(), error);
   if (error) throw InputError(run.checkpoint().string(), "rename", error.message(), "a writable folder");
 }
 

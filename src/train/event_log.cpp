@@ -1,6 +1,13 @@
 #include "train/event_log.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "base/error.h"
 
@@ -110,6 +117,8 @@ const char* name(events::Ending ending) {
       return "diverged";
     case events::Ending::out_of_memory:
       return "out_of_memory";
+    case events::Ending::no_input:
+      return "no_input";
   }
   return "unknown";
 }
@@ -120,6 +129,26 @@ Json to_json(const events::Finished& e) {
           {"reason", e.reason}};
 }
 
+// Where that fails half a line stays, which readers leave out.
+void cut_to(int descriptor, int64_t size) {
+  [[maybe_unused]] const int refused = ::ftruncate(descriptor, size);
+}
+
+// Where the last whole line ends.
+int64_t end_of_lines(int descriptor, int64_t size) {
+  std::array<char, 4096> block{};
+  for (int64_t end = size; end > 0;) {
+    const int64_t begin = std::max<int64_t>(0, end - static_cast<int64_t>(block.size()));
+    const ssize_t n = ::pread(descriptor, block.data(), static_cast<size_t>(end - begin), begin);
+    if (n != end - begin) return size;
+    for (ssize_t i = n; i > 0; --i) {
+      if (block[static_cast<size_t>(i - 1)] == '\n') return begin + i;
+    }
+    end = begin;
+  }
+  return 0;
+}
+
 }  // namespace
 
 std::string to_json_line(const events::Event& event) {
@@ -128,14 +157,41 @@ std::string to_json_line(const events::Event& event) {
 }
 
 EventLog::EventLog(const std::filesystem::path& path, int64_t step_interval)
-    : file_(path, std::ios::app), step_interval_(step_interval) {
-  if (!file_) throw InputError(path.string(), "", "a file that cannot be opened", "a place to write the log");
+    : descriptor_(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0644)),
+      step_interval_(step_interval) {
+  if (descriptor_ < 0) {
+    throw InputError(path.string(), "", std::generic_category().message(errno), "a place to write the log");
+  }
+  const int64_t size = ::lseek(descriptor_, 0, SEEK_END), whole = end_of_lines(descriptor_, size);
+  if (whole < size && ::ftruncate(descriptor_, whole) != 0) {
+    throw InputError(path.string(), "", std::generic_category().message(errno), "a place to write the log");
+  }
+}
+
+EventLog::~EventLog() { ::close(descriptor_); }
+
+bool EventLog::write(const std::string& line) {
+  const int64_t before = ::lseek(descriptor_, 0, SEEK_END);
+  for (size_t written = 0; written < line.size();) {
+    const ssize_t n = ::write(descriptor_, line.data() + written, line.size() - written);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) {
+      if (written > 0) cut_to(descriptor_, before);
+      return false;
+    }
+    written += static_cast<size_t>(n);
+  }
+  return true;
 }
 
 void EventLog::operator()(const events::Event& event) {
   const auto* step = std::get_if<events::Step>(&event);
   if (step != nullptr && step->iteration % step_interval_ != 0 && step->iteration != step->iterations) return;
-  file_ << to_json_line(event) << '\n' << std::flush;
+  if (missing_ > 0) {
+    const events::Warning gap{0, std::to_string(missing_) + " lines of the log could not be written here"};
+    if (write(to_json_line(gap) + '\n')) missing_ = 0;
+  }
+  if (!write(to_json_line(event) + '\n')) ++missing_;
 }
 
 }  // namespace traceflow

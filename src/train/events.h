@@ -111,7 +111,13 @@ struct Measured {
   std::vector<profile::Entry> steps;  // of those alone
 };
 
-enum class Ending { completed, interrupted, diverged, out_of_memory };
+enum class Ending {
+  completed,
+  interrupted,
+  diverged,
+  out_of_memory,
+  no_input,  // a photograph that could no longer be read
+};
 
 // Last of all events.
 struct Finished {

@@ -1,6 +1,7 @@
 #include "train/step_meter.h"
 
 #include <algorithm>
+#include <new>
 #include <utility>
 
 namespace traceflow {
@@ -35,7 +36,11 @@ StepMeter::Iteration::Iteration(StepMeter& meter, int64_t iteration)
 StepMeter::Iteration::~Iteration() {
   if (!measures_) return;
   profile::enable(was_on_);
-  meter_->add(before_, profile::entries());
+  try {
+    meter_->add(before_, profile::entries());
+  } catch (const std::bad_alloc&) {
+    // An iteration that was not measured; it may end because of this very want of memory.
+  }
 }
 
 void StepMeter::add(const std::vector<profile::Entry>& before, const std::vector<profile::Entry>& after) {

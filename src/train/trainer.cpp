@@ -16,10 +16,12 @@ namespace traceflow {
 
 namespace {
 
-constexpr int checkpoint_version = 1;
 // A surfel is bound to 8 of its 32 nearest: enough to hold a shape, far enough to hold it beyond a wrinkle.
 constexpr int bonds_each = 8;
 constexpr int bond_stride = 4;
+
+constexpr const char* when_there_is_room =
+    "; --resume goes on when there is room, or with a lower --memory-budget";
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) {
@@ -33,13 +35,13 @@ Tensor<double> row_of(const std::array<double, count>& values) {
   return row;
 }
 
-int64_t metadata_number(const Safetensors& file, const std::string& key) {
-  const auto found = file.metadata.find(key);
-  if (found == file.metadata.end() || found->second.find_first_not_of("0123456789") != std::string::npos ||
-      found->second.empty() || found->second.size() > 9) {
-    throw InputError("checkpoint", key, found == file.metadata.end() ? "nothing" : found->second, "a number");
+// A count that the checkpoint holds as metadata.
+int64_t count_in(const Safetensors& file, const std::string& key) {
+  const double value = file.number(key);
+  if (value > 1e9 || value != std::floor(value)) {
+    throw InputError("checkpoint", key, file.text(key), "a whole number up to 1e9");
   }
-  return std::stoll(found->second);
+  return static_cast<int64_t>(value);
 }
 
 void check_bonds(const Neighbours& bonds, int64_t surfels) {
@@ -51,6 +53,12 @@ void check_bonds(const Neighbours& bonds, int64_t surfels) {
                      Shape{surfels, bonds_each}.to_string());
   }
 }
+
+// A checkpoint that the disk refused.
+class NotSaved : public InputError {
+ public:
+  explicit NotSaved(const std::string& why) : InputError(why, "", "", "") {}
+};
 
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
 
@@ -103,7 +111,8 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
-      meter_(device) {
+      meter_(device),
+      before_step_{random_, views_, -1} {
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
 
@@ -264,44 +273,56 @@ void Trainer::tell_density() {
   density_changes_.clear();
 }
 
-events::Finished Trainer::run(const std::atomic<bool>& stop) {
-  tell_start();
-  while (iteration_ < options_.iterations && !stop && !stop_soon_) {
-    const Phase phase = schedule_.phase(iteration_);
-    if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
-      tell_measured();
-      stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
-    }
-    const Draws before_step{random_, views_, iteration_};
-    LossTerms terms;
-    const Clock::time_point start = Clock::now();
-    try {
-      const StepMeter::Iteration measured(meter_, iteration_);
-      terms = step();
-    } catch (const std::bad_alloc& error) {
-      seconds_ += seconds_since(start);
-      tell_density();
-      save_after_failure(before_step);
-      return finish(events::Ending::out_of_memory, error.what());
-    }
-    const std::string trouble = health_.check(terms, non_finite_);
-    const double step_seconds = seconds_since(start);
-    seconds_ += step_seconds;
-    tell_density();
-    stream_.emit(step_event(terms, step_seconds));
-
-    if (!trouble.empty()) {
-      // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
-      // still good.
-      if (health_.sound() || !std::filesystem::exists(run_.checkpoint())) save();
-      return finish(events::Ending::diverged, trouble);
-    }
-    if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && health_.sound()) save();
+std::string Trainer::tell_iteration() {
+  const Phase phase = schedule_.phase(iteration_);
+  if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
+    tell_measured();
+    stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
-  save();
-  const bool done = iteration_ >= options_.iterations;
-  return finish(done ? events::Ending::completed : events::Ending::interrupted,
-                done ? "" : "stopped on request");
+  before_step_ = Draws{random_, views_, iteration_};
+  const Clock::time_point start = Clock::now();
+  LossTerms terms;
+  {
+    const StepMeter::Iteration measured(meter_, iteration_);
+    terms = step();
+  }
+  std::string trouble = health_.check(terms, non_finite_);
+  const double step_seconds = seconds_since(start);
+  seconds_ += step_seconds;
+  tell_density();
+  stream_.emit(step_event(terms, step_seconds));
+  return trouble;
+}
+
+Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
+  try {
+    tell_start();
+    while (iteration_ < options_.iterations && !stop && !stop_soon_) {
+      const std::string trouble = tell_iteration();
+      if (!trouble.empty()) return {events::Ending::diverged, trouble};
+      if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && health_.sound())
+        save_on_the_way();
+    }
+  } catch (const memory::OutOfMemory& error) {
+    return {events::Ending::out_of_memory, std::string(error.what()) + when_there_is_room};
+  } catch (const std::bad_alloc&) {
+    return {events::Ending::out_of_memory, std::string("out of memory") + when_there_is_room};
+  } catch (const NotSaved&) {
+    throw;
+  } catch (const InputError& error) {
+    return {events::Ending::no_input, std::string(error.what()) + "; when it is back, --resume goes on"};
+  }
+  if (iteration_ < options_.iterations) return {events::Ending::interrupted, "stopped on request"};
+  return {events::Ending::completed, ""};
+}
+
+events::Finished Trainer::run(const std::atomic<bool>& stop) {
+  const End end = iterate(stop);
+  if (end.ending == events::Ending::out_of_memory || end.ending == events::Ending::no_input) step_back();
+  // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
+  // still good.
+  if (end.ending != events::Ending::diverged || health_.sound() || !run_.holds_a_run()) save_or_say_why_not();
+  return finish(end.ending, end.reason);
 }
 
 Safetensors Trainer::checkpoint() const {
@@ -320,7 +341,6 @@ Safetensors Trainer::checkpoint() const {
   file.add("random", random);
   const Health::State health = health_.state();
   file.add("health", row_of<3>({health.smoothed, health.best, static_cast<double>(health.steps)}));
-  file.metadata["version"] = std::to_string(checkpoint_version);
   file.metadata["iteration"] = std::to_string(iteration_);
   file.metadata["views_next"] = std::to_string(views_.next());
   file.metadata["options"] = options_to_json(options_);
@@ -332,34 +352,52 @@ Safetensors Trainer::checkpoint() const {
 void Trainer::save() {
   tell_measured();
   const Clock::time_point start = Clock::now();
-  std::filesystem::create_directories(run_.folder);
   Safetensors file = checkpoint();
   file.metadata["train_seconds"] = std::to_string(seconds_);
-  write_checkpoint(run_, file);
+  write_checkpoint(run_, std::move(file));
   const double took = seconds_since(start);
   seconds_ += took;
   stream_.emit(events::Saved{iteration_, run_.checkpoint(), took});
 }
 
-void Trainer::save_after_failure(const Draws& before_step) {
-  if (iteration_ == before_step.iteration) {
-    random_ = before_step.random;
-    views_ = before_step.views;
+void Trainer::save_or_say_why_not() {
+  try {
+    save();
+  } catch (const InputError& error) {
+    throw NotSaved("iteration " + std::to_string(iteration_) + " is not saved: " + error.what());
   }
+}
+
+// The work of hours is not given up for a disk that may have room again when the next checkpoint is due. One
+// that has not taken the first is another matter: little is lost yet.
+void Trainer::save_on_the_way() {
+  try {
+    save_or_say_why_not();
+  } catch (const NotSaved& error) {
+    if (!run_.holds_a_run()) throw;
+    stream_.emit(events::Warning{
+        iteration_, std::string(error.what()) + "; training goes on and tries again at the next checkpoint"});
+  }
+}
+
+void Trainer::step_back() {
+  if (iteration_ == before_step_.iteration) {
+    random_ = before_step_.random;
+    views_ = before_step_.views;
+  }
+  tell_density();
   // What the next frame would need is free for the copies that saving makes.
   renderer_ = Renderer(options_.render, memory_.kept);
   gradient_ = {};
   grad_frame_ = {};
-  save();
 }
 
 void Trainer::resume() {
   std::string note;
   const Safetensors file = read_checkpoint(run_, note);
-  if (!note.empty()) stream_.emit(events::Warning{0, note});
-  if (metadata_number(file, "version") != checkpoint_version) {
-    throw InputError("checkpoint", "version", file.metadata.at("version"),
-                     std::to_string(checkpoint_version));
+  if (!note.empty()) {
+    stream_.emit(events::Warning{0, note});
+    set_damaged_aside(run_);
   }
   scene_ = scene_on(device_, get_scene(file));
   optimiser_ = Optimiser(scene_);
@@ -375,7 +413,7 @@ void Trainer::resume() {
     check_bonds(bonds_, scene_.main.count());
     bonds_ = bonds_.on(device_);
   }
-  views_.set_state(file.tensor<int32_t>("views/order"), metadata_number(file, "views_next"));
+  views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");
   const Tensor<double> health = file.tensor<double>("health");
   if (random.size() != 4 || health.size() != 3) {
@@ -385,8 +423,8 @@ void Trainer::resume() {
   for (size_t i = 0; i < 4; ++i) state[i] = std::bit_cast<uint64_t>(random[static_cast<int64_t>(i)]);
   random_.set_state(state);
   health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
-  iteration_ = static_cast<int>(metadata_number(file, "iteration"));
-  seconds_ = std::stod(file.metadata.at("train_seconds"));
+  iteration_ = static_cast<int>(count_in(file, "iteration"));
+  seconds_ = file.number("train_seconds");
 }
 
 }  // namespace traceflow

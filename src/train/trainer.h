@@ -50,7 +50,10 @@ class Trainer {
   // Continues from the run's checkpoint; call before run(). Throws InputError when it does not fit.
   void resume();
 
-  // Trains to the last iteration, until `stop` is set, or until memory runs out; saves in every case.
+  // Trains to the last iteration, until `stop` is set, until memory runs out or until a photograph can no
+  // longer be read; saves in every case. A save on the way that the disk refuses is a warning, and tried
+  // again at the next; throws InputError when the first or the last one is
+  // refused.
   events::Finished run(const std::atomic<bool>& stop);
 
   // One iteration of the loop, without saving; returns the loss.
@@ -81,15 +84,26 @@ class Trainer {
   // Tells what was measured up to here, in the phase of the last iteration.
   void tell_measured();
   void tell_density();
+  struct End {
+    events::Ending ending;
+    std::string reason;
+  };
+  // Iterations until something ends them.
+  End iterate(const std::atomic<bool>& stop);
+  // One of them, with what is told of it; what is wrong with its numbers, or nothing.
+  std::string tell_iteration();
+  // Throw InputError where save() does, the second only where no checkpoint stands.
+  void save_or_say_why_not();
+  void save_on_the_way();
   // What a step draws from.
   struct Draws {
     Random random;
     ViewOrder views;
     int iteration;
   };
-  // Saves what stands after a step that ran out of memory: an iteration that did not come to its end draws
-  // the same again.
-  void save_after_failure(const Draws& before_step);
+  // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
+  // again.
+  void step_back();
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
   events::Step step_event(const LossTerms& terms, double step_seconds);
@@ -120,6 +134,7 @@ class Trainer {
   events::Stream stream_;
   StepMeter meter_;
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
+  Draws before_step_;
   std::atomic<bool> stop_soon_{false};
   int iteration_ = 0;   // done so far
   double seconds_ = 0;  // of steps and saves, earlier sessions included; listeners may take their time

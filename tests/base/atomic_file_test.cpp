@@ -46,6 +46,14 @@ TEST(AtomicFile, HoldsExactlyTheBytesGiven) {
   EXPECT_EQ(contents(folder / "large"), large);
 }
 
+TEST(AtomicFile, WritesPartsInOrder) {
+  const TempFolder folder;
+  const std::string first = "one ", second, third = "three";
+  write_atomically(folder / "parts", {std::as_bytes(std::span(first)), std::as_bytes(std::span(second)),
+                                      std::as_bytes(std::span(third))});
+  EXPECT_EQ(contents(folder / "parts"), "one three");
+}
+
 TEST(AtomicFile, ReplacesTheOldFileAndLeavesNothingElse) {
   const TempFolder folder;
   write_atomically(folder / "file", "a long first version");

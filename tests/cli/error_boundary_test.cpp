@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <new>
 #include <sstream>
+#include <system_error>
 
 #include "base/error.h"
 
@@ -36,6 +38,14 @@ TEST(ErrorBoundary, InputErrorsAreOneLineAndCode2) {
   EXPECT_EQ(o.line, "traceflow: a.json: scale: found x y, expected a number; mend it\n");
 }
 
+TEST(ErrorBoundary, StreamsAndThreadsThatTheSystemRefusesAreNoBugs) {
+  const Outcome o = outcome([]() -> int {
+    throw std::system_error(std::make_error_code(std::errc::no_space_on_device), "standard output");
+  });
+  EXPECT_EQ(o.code, 2);
+  EXPECT_EQ(o.line, "traceflow: standard output: No space left on device\n");
+}
+
 TEST(ErrorBoundary, FilesThatTheSystemRefusesAreInputErrors) {
   const Outcome o = outcome([]() -> int { return std::filesystem::file_size("/nowhere") != 0; });
   EXPECT_EQ(o.code, 2);
@@ -60,6 +70,16 @@ TEST(ErrorBoundary, MemoryIsCode4AndOneLine) {
   const Outcome o = outcome([]() -> int { throw std::bad_alloc(); });
   EXPECT_EQ(o.code, 4);
   EXPECT_EQ(std::count(o.line.begin(), o.line.end(), '\n'), 1);
+}
+
+void run_where_nothing_may_be_thrown(const std::function<void()>& work) noexcept { work(); }
+
+TEST(ErrorBoundary, WhatIsThrownWhereNothingMayBeStillEndsInItsLineAndCode) {
+  const auto end = [] {
+    guard_termination();
+    run_where_nothing_may_be_thrown([] { throw std::bad_alloc(); });
+  };
+  EXPECT_EXIT(end(), testing::ExitedWithCode(exit_memory), "^traceflow: out of memory; try [^\n]*\n$");
 }
 
 }  // namespace

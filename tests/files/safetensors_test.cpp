@@ -90,9 +90,10 @@ TEST(Safetensors, WritesTheDocumentedLayout) {
   file.write(path);
 
   // The wide type comes first although its name is second; the header is padded with spaces to a multiple
-  // of 8.
+  // of 8. Checksums by Python's zlib.crc32: of b'U8[3]\x01\x02\x03', b'F32[1,2]…' and b'{"format":"pt"}'.
   std::string header =
-      R"({"__metadata__":{"format":"pt"},"a":{"data_offsets":[8,11],"dtype":"U8","shape":[3]},)"
+      R"({"__metadata__":{"format":"pt","traceflow.crc32":"{\"metadata\":\"c1f700ee\",)"
+      R"(\"tensors\":{\"a\":\"f03a7dec\",\"b\":\"ad997724\"}}"},"a":{"data_offsets":[8,11],"dtype":"U8","shape":[3]},)"
       R"("b":{"data_offsets":[0,8],"dtype":"F32","shape":[1,2]}})";
   header.resize((header.size() + 7) / 8 * 8, ' ');
   const std::string data("\x00\x00\xC0\x3F\x00\x00\x00\xC0\x01\x02\x03", 11);
@@ -218,6 +219,96 @@ TEST(Safetensors, RefusesHeaderLengthsThatTheFileDoesNotHold) {
   EXPECT_THAT(refusal("1234567"), HasSubstr("7 bytes"));
   EXPECT_THAT(refusal(std::string(8, '\xFF')), HasSubstr("header length: found 18446744073709551615"));
   EXPECT_THAT(refusal(std::string("\x03\0\0\0\0\0\0\0{}", 10)), HasSubstr("expected at most 2"));
+}
+
+// What() of the InputError that changing one byte of a sound file ends in.
+std::string refusal_after(std::string bytes, size_t at, char change) {
+  bytes[at] = static_cast<char>(bytes[at] ^ change);
+  return refusal(bytes);
+}
+
+TEST(Safetensors, ADamagedSectionIsRefusedByItsName) {
+  Safetensors file;
+  file.metadata["iteration"] = "12";
+  file.add("scene/position", tensor_of<float>({4}, {1, 2, 3, 4}));
+  file.add("scene/seen", tensor_of<uint8_t>({3}, {7, 8, 9}));
+  const auto path = scratch("sound");
+  file.write(path);
+  EXPECT_TRUE(Safetensors::read(path).has_checksums());
+  const std::string bytes = contents(path);
+  const size_t data = bytes.size() - 19;
+  for (size_t at = data; at < bytes.size(); ++at) {
+    const std::string tensor = at < data + 16 ? "tensor scene/position" : "tensor scene/seen";
+    for (const char change : {'\x01', '\x80'}) {
+      EXPECT_THAT(
+          refusal_after(bytes, at, change),
+          testing::AllOf(HasSubstr(tensor + ": found bytes with the checksum "), HasSubstr("damaged")))
+          << at;
+    }
+  }
+  const auto at = [&](const std::string& text) { return bytes.find(text); };
+  EXPECT_THAT(refusal_after(bytes, at("12\""), '\x01'), HasSubstr(": metadata: found"));
+  EXPECT_THAT(refusal_after(bytes, at("iteration"), '\x01'), HasSubstr(": metadata: found"));
+  EXPECT_THAT(refusal_after(bytes, at("F32"), '\x0F'), HasSubstr("tensor scene/position"));  // "I32"
+  // A tensor whose name changed is missing under the old one.
+  EXPECT_THAT(refusal_after(bytes, at("scene/seen\":{"), '\x01'),
+              HasSubstr("tensor scene/seen: found nothing"));
+  // The checksums themselves.
+  EXPECT_THAT(refusal_after(bytes, at("tensors\\\""), '\x01'),
+              HasSubstr("metadata: found checksums that cannot"));
+}
+
+// No byte of the whole file can change without being noticed or without effect.
+TEST(Safetensors, NoBitFlipChangesWhatIsRead) {
+  Safetensors file;
+  file.metadata["iteration"] = "12";
+  file.add("a", tensor_of<float>({2, 1}, {1, 2}));
+  file.add("b", tensor_of<uint8_t>({3}, {7, 8, 9}));
+  const auto path = scratch("flips"), again = scratch("again");
+  file.write(path);
+  const std::string bytes = contents(path);
+  for (size_t at = 0; at < bytes.size(); ++at) {
+    for (int bit = 0; bit < 8; ++bit) {
+      std::string changed = bytes;
+      changed[at] = static_cast<char>(changed[at] ^ (1 << bit));
+      put(path, changed);
+      try {
+        const Safetensors back = Safetensors::read(path);
+        if (!back.has_checksums())
+          continue;  // the name of the checksums' entry: what needs them refuses this
+        back.write(again);
+        EXPECT_EQ(contents(again), bytes) << "byte " << at << ", bit " << bit;
+      } catch (const InputError&) {
+      }
+    }
+  }
+}
+
+TEST(Safetensors, FilesWithoutChecksumsAreRead) {
+  const auto path = scratch("foreign");
+  put(path,
+      file_bytes(R"({"__metadata__":{"k":"v"},"b":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}})", "x"));
+  const Safetensors file = Safetensors::read(path);
+  EXPECT_FALSE(file.has_checksums());
+  EXPECT_EQ(file.text("k"), "v");
+}
+
+// A folder's name need not be UTF-8; what is written of it must still agree with its checksum.
+TEST(Safetensors, MetadataThatIsNotUtf8IsReplacedAndReadAgain) {
+  Safetensors file;
+  file.metadata["capture_folder"] = "/home/caf\xE9";
+  const auto path = scratch("latin");
+  file.write(path);
+  EXPECT_EQ(Safetensors::read(path).text("capture_folder"), "/home/caf\xEF\xBF\xBD");
+}
+
+TEST(Safetensors, MetadataAreReadAsTextAndNumbers) {
+  Safetensors file;
+  file.metadata = {{"iteration", "12"}, {"seconds", "1.5"}, {"minus", "-1"}, {"nan", "nan"}, {"word", "12a"}};
+  EXPECT_EQ(file.number("iteration"), 12);
+  EXPECT_EQ(file.number("seconds"), 1.5);
+  for (const char* key : {"minus", "nan", "word", "none"}) EXPECT_THROW(file.number(key), InputError) << key;
+  EXPECT_THROW(file.text("none"), InputError);
 }
 
 RC_GTEST_PROP(SafetensorsProperty, RoundTripKeepsBytesAndIsStable, ()) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <tuple>
 
@@ -101,6 +102,23 @@ TEST(EventLog, AppendsAndThinsStepsButKeepsTheLast) {
   EXPECT_EQ(iterations, (std::vector<int64_t>{3, 6, 7, 7, 3, 6, 7, 7}));
 }
 
+TEST(EventLog, CutsOffHalfALineThatAKilledRunLeft) {
+  const TempFolder folder;
+  const auto path = folder / "log.jsonl";
+  const std::string whole = to_json_line(step(1, 9)) + "\n";
+  // Nothing but half a line, half a line after a whole one, one longer than a block, none.
+  for (const std::string& before : {std::string(), whole}) {
+    for (const std::string& torn :
+         {std::string("{\"event\":\"st"), std::string(10'000, 'x'), std::string()}) {
+      std::ofstream(path) << before << torn;
+      EventLog{path}(step(2, 9));
+      const std::vector<json> written = lines(path);
+      ASSERT_EQ(written.size(), before.empty() ? 1U : 2U);
+      EXPECT_EQ(written.back()["iteration"], 2);
+    }
+  }
+}
+
 TEST(EventLog, WritesNullForWhatIsNotFinite) {
   events::Step diverged = step(1, 1);
   diverged.loss = std::nan("");
@@ -112,6 +130,11 @@ TEST(EventLog, WritesNullForWhatIsNotFinite) {
 
 TEST(EventLog, TextThatIsNotUtf8StillMakesALine) {
   EXPECT_NO_THROW(std::ignore = json::parse(to_json_line(events::Warning{0, "\xFF"})));
+}
+
+TEST(EventLog, ADiskThatIsFullLosesLinesAndNothingElse) {
+  EventLog log("/dev/full");
+  EXPECT_NO_THROW(log(step(1, 9)));
 }
 
 TEST(EventLog, RefusesAPlaceThatCannotBeWritten) {

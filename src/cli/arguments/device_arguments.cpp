@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <iostream>
+
 #include "base/device_memory.h"
 #include "base/error.h"
 #include "base/parallel.h"
@@ -45,11 +47,11 @@ Device DeviceArguments::choose(bool quiet) const {
   }
   if (!quiet) {
     const std::string reason = asked == "auto" ? "it answers" : "asked for with --device cuda";
-    fmt::print(
-        stderr, "{}\n",
-        cuda ? fmt::format("device: cuda, {}; {}", cuda_text(), reason)
-             : fmt::format("device: cpu, {} thread{}; {}", thread_count(), thread_count() == 1 ? "" : "s",
-                           asked == "auto" ? "no CUDA: " + why_not : why_not));
+    std::cerr << (cuda ? fmt::format("device: cuda, {}; {}", cuda_text(), reason)
+                       : fmt::format("device: cpu, {} thread{}; {}", thread_count(),
+                                     thread_count() == 1 ? "" : "s",
+                                     asked == "auto" ? "no CUDA: " + why_not : why_not))
+              << std::endl;
   }
   return cuda ? Device::cuda : Device::cpu;
 }

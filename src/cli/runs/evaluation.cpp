@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 
 #include <ctime>
+#include <iostream>
 
 #include "base/atomic_file.h"
 #include "base/option_fields.h"
@@ -19,9 +20,9 @@ namespace {
 
 std::optional<lpips::Network> read_lpips(const std::string& path) {
   if (!path.empty()) return lpips::network_of(lpips::read_weights(path));
-  fmt::print(stderr,
-             "LPIPS is null: it needs weights. scripts/export_lpips.py writes them, --lpips FILE reads them "
-             "(docs/eval.md)\n");
+  std::cerr
+      << "LPIPS is null: it needs weights. scripts/export_lpips.py writes them, --lpips FILE reads them "
+         "(docs/eval.md)\n";
   return std::nullopt;
 }
 
@@ -75,7 +76,7 @@ Evaluation::Evaluation(const EvaluationArguments& a, const DeviceArguments& devi
       capture_(capture_of(run_, a.capture, a.downscale)),
       views_(&views_of(capture_, a.split)),
       pictures_(views_->size()) {
-  if (!run_.note.empty()) fmt::print(stderr, "{}\n", run_.note);
+  if (!run_.note.empty()) std::cerr << run_.note << std::endl;
   for (const View& view : *views_) show::check_name(capture_.folder.string(), "view id", view.id);
   network_ = read_lpips(a.lpips);
   device_ = devices.choose();

@@ -1,7 +1,5 @@
 #include "cli/runs/trained_run.h"
 
-#include <algorithm>
-#include <charconv>
 #include <cmath>
 
 #include "files/options_json.h"
@@ -10,28 +8,6 @@
 #include "train/schedule.h"
 
 namespace traceflow::cli {
-
-namespace {
-
-std::string metadata(const Safetensors& file, const std::string& where, const char* key) {
-  const auto found = file.metadata.find(key);
-  if (found == file.metadata.end()) {
-    throw InputError(where, key, "nothing", "the metadata that `traceflow train` writes");
-  }
-  return found->second;
-}
-
-double metadata_number(const Safetensors& file, const std::string& where, const char* key) {
-  const std::string text = metadata(file, where, key);
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value >= 0) || value > 1e15) {
-    throw InputError(where, key, text, "a number");
-  }
-  return value;
-}
-
-}  // namespace
 
 std::string run_name(const std::filesystem::path& folder) {
   return (std::filesystem::absolute(folder) / "").lexically_normal().parent_path().filename().string();
@@ -42,15 +18,15 @@ TrainedRun read_run(const std::filesystem::path& folder) {
   const std::string where = files.checkpoint().string();
   TrainedRun run;
   const Safetensors file = read_checkpoint(files, run.note);
-  options_from_json(metadata(file, where, "options"), option_fields(run.options), where + ": options");
+  options_from_json(file.text("options"), option_fields(run.options), where + ": options");
   run.options.validate();
   run.subject.scene = get_scene(file);
   run.subject.render = run.options.render;
-  run.iterations = std::llround(metadata_number(file, where, "iteration"));
+  run.iterations = std::llround(file.number("iteration"));
   run.subject.request = picture_request(run.options, run.iterations);
-  run.train_seconds = metadata_number(file, where, "train_seconds");
-  run.capture = metadata(file, where, "capture");
-  run.capture_folder = metadata(file, where, "capture_folder");
+  run.train_seconds = file.number("train_seconds");
+  run.capture = file.text("capture");
+  run.capture_folder = file.text("capture_folder");
   return run;
 }
 

@@ -1,10 +1,13 @@
 #include "cli/terminal/error_boundary.h"
 
-#include <algorithm>
-#include <filesystem>
+#include <unistd.h>
+
+#include <exception>
+#include <iostream>
 #include <new>
-#include <ostream>
-#include <string>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
 
 #include "base/device_memory.h"
 #include "base/error.h"
@@ -13,13 +16,27 @@ namespace traceflow::cli {
 
 namespace {
 
-int report(std::ostream& err, const char* kind, std::string text, const char* remedy, int code) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  err << "traceflow: " << kind << text << remedy << std::endl;
+// Asks for no memory: there may be none.
+int report(std::ostream& err, const char* kind, std::string_view text, const char* remedy, int code) {
+  err << "traceflow: " << kind;
+  for (const char c : text) err << (c == '\n' ? ' ' : c);
+  err << remedy << std::endl;
   return code;
 }
 
 }  // namespace
+
+void guard_termination() {
+  std::set_terminate([] {
+    const std::exception_ptr thrown = std::current_exception();
+    ::_exit(guarded(
+        [&]() -> int {
+          if (thrown) std::rethrow_exception(thrown);
+          throw std::runtime_error("a library ended the program");
+        },
+        std::cerr));
+  });
+}
 
 int guarded(const std::function<int()>& work, std::ostream& err) {
   constexpr const char* bug = "; this is a bug, please report it with the command that led here";
@@ -29,7 +46,7 @@ int guarded(const std::function<int()>& work, std::ostream& err) {
     return e.code;
   } catch (const InputError& e) {
     return report(err, "", e.what(), "", exit_input);
-  } catch (const std::filesystem::filesystem_error& e) {
+  } catch (const std::system_error& e) {  // a file, a stream or a thread that the system refuses
     return report(err, "", e.what(), "", exit_input);
   } catch (const memory::OutOfMemory& e) {
     return report(err, "", e.what(), "; try a higher --downscale, or --device cpu", exit_memory);

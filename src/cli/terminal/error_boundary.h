@@ -18,6 +18,11 @@ struct Exit {
   int code;
 };
 
+// From now on what cannot reach a boundary, since it is thrown where nothing may be (libraries ask for memory
+// in destructors), ends the program at once, with its line on standard error and its code. What is on disk is
+// as a killed program leaves it.
+void guard_termination();
+
 // Runs `work`, which returns an exit code, and turns what it throws into a line and a code.
 int guarded(const std::function<int()>& work, std::ostream& err);
 

@@ -45,6 +45,8 @@ const char* ending_text(events::Ending ending) {
       return "diverged";
     case events::Ending::out_of_memory:
       return "ended for want of memory";
+    case events::Ending::no_input:
+      return "ended for want of the capture";
   }
   return "ended";
 }

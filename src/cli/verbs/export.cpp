@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <iostream>
 #include <memory>
 
 #include "cli/runs/trained_run.h"
@@ -20,11 +21,10 @@ void run_export(const ExportArguments& a) {
   // The parser's range lets "nan" through.
   check_option(a.time >= 0 && a.time <= 1, "time", a.time, "0 to 1");
   const TrainedRun run = read_run(a.run);
-  if (!run.note.empty()) fmt::print(stderr, "{}\n", run.note);
+  if (!run.note.empty()) std::cerr << run.note << std::endl;
   if (run.subject.request.specular && run.subject.scene.specular == Specular::environment_map) {
-    fmt::print(
-        stderr,
-        "this run's reflections are a cube map, which a .ply cannot hold: main.ply alone is written\n");
+    std::cerr
+        << "this run's reflections are a cube map, which a .ply cannot hold: main.ply alone is written\n";
   }
   const std::optional<float> time = a.undeformed ? std::nullopt : std::optional(a.time);
   for (const auto& path : show::export_subject(run.subject, time, a.output))

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include <chrono>
+#include <iostream>
 #include <memory>
 
 #include "cli/arguments/device_arguments.h"
@@ -105,7 +106,7 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
   const ChosenShots chosen = choose_shots(a.shots, scene);
   if (!(subject.scene.extent > 0))
     subject.scene.extent = show::extent_seen_from(subject.scene.main, chosen.shots);
-  if (!subject.warning.empty()) fmt::print(stderr, "{}\n", subject.warning);
+  if (!subject.warning.empty()) std::cerr << subject.warning << std::endl;
   subject.scene.move_to(devices.choose());
 
   Output output(a, chosen, subject.scene.normalisation.scale);
@@ -113,8 +114,8 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
   std::string where = a.output;
   if (!a.video.empty()) where += (where.empty() ? "" : " and ") + a.video;
   if (done < chosen.shots.size()) {
-    fmt::print(stderr, "stopped after {} of {} frames: {}\n", done, chosen.shots.size(),
-               done > 0 ? where : "nothing was written");
+    std::cerr << fmt::format("stopped after {} of {} frames: {}\n", done, chosen.shots.size(),
+                             done > 0 ? where : "nothing was written");
     throw Exit{exit_interrupted};
   }
   fmt::print("{} views of {} surfels: {}\n", done, subject.scene.main.count(), where);

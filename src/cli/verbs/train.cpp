@@ -1,6 +1,8 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <iostream>
+#include <map>
 #include <memory>
 #include <optional>
 
@@ -13,6 +15,7 @@
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
 #include "files/options_json.h"
+#include "scene/run_lock.h"
 #include "serve/live_view.h"
 #include "train/event_log.h"
 #include "train/log_history.h"
@@ -35,31 +38,58 @@ struct TrainArguments {
 // The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
 // either.
 TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given,
-                      const Safetensors* checkpoint) {
+                      const std::map<std::string, std::string>& checkpoint) {
   TrainOptions options = preset(arguments.preset_name);
-  if (checkpoint) options_from_json(checkpoint->metadata.at("options"), option_fields(options), "checkpoint");
+  if (arguments.resume) options_from_json(checkpoint.at("options"), option_fields(options), "checkpoint");
   given.apply(option_fields(options));
   options.validate();
   return options;
 }
 
-std::unique_ptr<Safetensors> checkpoint_to_resume(const TrainArguments& arguments) {
+// What the checkpoint says beside its tensors; nothing for a run that begins.
+std::map<std::string, std::string> metadata_to_resume(const TrainArguments& arguments) {
   const RunFolder run{arguments.output};
-  if (arguments.resume) {
-    std::string note;
-    return std::make_unique<Safetensors>(read_checkpoint(run, note));
-  }
-  if (std::filesystem::exists(run.checkpoint()) || std::filesystem::exists(run.previous_checkpoint())) {
-    throw InputError("--output", "", arguments.output + ", which holds a run", "a new folder",
-                     "add --resume to continue it, or choose another");
-  }
-  return nullptr;
+  if (!arguments.resume) return {};
+  std::string note;
+  const Safetensors checkpoint = read_checkpoint(run, note);
+  for (const char* key : {"options", "capture_folder"}) checkpoint.text(key);
+  return checkpoint.metadata;
 }
+
+void refuse_another_run(const TrainArguments& arguments) {
+  if (arguments.resume || !RunFolder{arguments.output}.holds_a_run()) return;
+  throw InputError("--output", "", arguments.output + ", which holds a run", "a new folder",
+                   "add --resume to continue it, or choose another");
+}
+
+// The run's folder, held against other trainings. One that is not there yet is made when all else that was
+// given has been found good.
+class HeldFolder {
+ public:
+  explicit HeldFolder(const TrainArguments& arguments) : arguments_(&arguments) {
+    if (arguments.resume || std::filesystem::exists(arguments.output)) hold();
+  }
+  void make() {
+    if (!lock_) hold();
+  }
+
+ private:
+  void hold() {
+    if (!arguments_->resume) std::filesystem::create_directories(arguments_->output);
+    const RunFolder run{arguments_->output};
+    if (arguments_->resume && !run.holds_a_run()) return;  // refused when it is read
+    lock_.emplace(run);
+    refuse_another_run(*arguments_);
+  }
+
+  const TrainArguments* arguments_;
+  std::optional<RunLock> lock_;
+};
 
 // A quiet run still says why it ended early.
 [[noreturn]] void end_with(int code, const TrainArguments& arguments, const events::Finished& end) {
   if (arguments.quiet && code != exit_interrupted) {
-    fmt::print(stderr, "traceflow: ended at iteration {}: {}\n", end.iteration, end.reason);
+    std::cerr << fmt::format("traceflow: ended at iteration {}: {}\n", end.iteration, end.reason);
   }
   throw Exit{code};
 }
@@ -83,7 +113,7 @@ class Watched {
   // After the training, for as long as somebody looks.
   void stay(bool quiet) {
     if (!view_.is_wanted()) return;
-    if (!quiet) fmt::print(stderr, "still shown to those who look; Ctrl-C ends it\n");
+    if (!quiet) std::cerr << "still shown to those who look; Ctrl-C ends it\n";
     view_.stay();
   }
 
@@ -100,20 +130,21 @@ class Watched {
 void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices,
            const ServerArguments& where) {
   arguments.view_options.validate();
-  const std::unique_ptr<Safetensors> checkpoint = checkpoint_to_resume(arguments);
-  const TrainOptions options = settings(arguments, given, checkpoint.get());
+  HeldFolder folder(arguments);
+  const std::map<std::string, std::string> checkpoint = metadata_to_resume(arguments);
+  const TrainOptions options = settings(arguments, given, checkpoint);
   std::string data = arguments.data;
-  if (data.empty() && checkpoint) data = checkpoint->metadata.at("capture_folder");
+  if (data.empty() && arguments.resume) data = checkpoint.at("capture_folder");
   if (data.empty()) throw InputError("--data", "", "nothing", "a capture's folder");
 
   Capture capture = load_capture(data, options.capture);
   const Device device = devices.choose(arguments.quiet);
   Trainer trainer(options, std::move(capture), arguments.output, device);
-  std::filesystem::create_directories(arguments.output);
+  folder.make();
   if (!arguments.quiet) trainer.stream().listen(Progress::for_stderr());
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
   trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
-  if (checkpoint) trainer.resume();
+  if (arguments.resume) trainer.resume();
   const std::atomic<bool>& stop = stop_on_signals();
   std::optional<Watched> watched;
   if (arguments.view) watched.emplace(trainer, arguments, where, stop);
@@ -122,6 +153,7 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   if (watched) watched->stay(arguments.quiet);
   if (end.ending == events::Ending::diverged) end_with(exit_diverged, arguments, end);
   if (end.ending == events::Ending::out_of_memory) end_with(exit_memory, arguments, end);
+  if (end.ending == events::Ending::no_input) end_with(exit_input, arguments, end);
   if (end.ending == events::Ending::interrupted) end_with(exit_interrupted, arguments, end);
 }
 

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <iostream>
 #include <memory>
 
 #include "cli/arguments/device_arguments.h"
@@ -38,8 +39,8 @@ std::optional<Capture> capture_beside(const ViewArguments& a, const LoadedScene&
   if (!scene.run) return std::nullopt;
   const std::filesystem::path& folder = scene.run->capture_folder;
   if (std::filesystem::exists(folder)) return capture_of(scene, folder, a.downscale);
-  fmt::print(stderr, "{} is not there: no photographs to compare with; say where they are with -d CAPTURE\n",
-             folder.string());
+  std::cerr << folder.string()
+            << " is not there: no photographs to compare with; say where they are with -d CAPTURE\n";
   return std::nullopt;
 }
 
@@ -47,7 +48,7 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
   serve::RunWatch watch(RunFolder{a.scene});
   LoadedScene loaded = load_scene(a.scene, a.environment);
   Scene& scene = loaded.subject.scene;
-  if (!loaded.subject.warning.empty()) fmt::print(stderr, "{}\n", loaded.subject.warning);
+  if (!loaded.subject.warning.empty()) std::cerr << loaded.subject.warning << std::endl;
   const std::optional<Capture> capture = capture_beside(a, loaded);
   serve::Setting setting = serve::make_setting(loaded.run ? "run" : "ply", run_name(a.scene),
                                                capture ? &*capture : nullptr, scene.normalisation);

@@ -1,0 +1,90 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <iostream>
+#include <set>
+
+#include "base/random.h"
+#include "cli/faults/small_training.h"
+
+// The n-th request for memory is refused, for many n; or that one and all that follow.
+namespace traceflow::faults {
+namespace {
+
+using testing::HasSubstr;
+
+int trials_wanted() {
+  const char* wanted = std::getenv("TRACEFLOW_REFUSALS");
+  return wanted == nullptr ? 12 : std::atoi(wanted);
+}
+
+class Allocation : public Faults {
+ protected:
+  // Half of them among the first thousands, where every one is another place, the others anywhere.
+  std::set<int64_t> moments(int64_t all) {
+    std::set<int64_t> chosen;
+    while (static_cast<int>(chosen.size()) < trials_wanted()) {
+      const double spread = static_cast<double>(all);
+      chosen.insert(1 + static_cast<int64_t>(random_.below(2) == 0 ? std::pow(spread, random_.uniform())
+                                                                   : spread * random_.uniform()));
+    }
+    return chosen;
+  }
+  int64_t allocations_of(const std::vector<std::string>& words) {
+    const Outcome counted = run(words, {.failing_allocation = count_only});
+    EXPECT_EQ(counted.code, 0) << counted.error;
+    return allocations_said(counted.error);
+  }
+
+  Random random_{7};
+};
+
+TEST_F(Allocation, ATrainingEndsInOneLineAndAStateThatGoesOn) {
+  const int64_t all = allocations_of(training("counted"));
+  ASSERT_GT(all, 10'000);
+  int ended = 0, saved = 0;
+  for (const bool from_there : {false, true}) {
+    for (const int64_t n : moments(all)) {
+      SCOPED_TRACE((from_there ? "from allocation " : "allocation ") + std::to_string(n));
+      fs::remove_all(path("starved"));
+      const Outcome end =
+          run(training("starved"), {.failing_allocation = n, .failing_from_there = from_there});
+      // What asks again with less, such as a sort for its buffer, goes on.
+      if (end.code == 0) {
+        EXPECT_EQ(state_of(path("starved")), whole_state());
+        continue;
+      }
+      ++ended;
+      expect_one_line(end, 4);
+      EXPECT_THAT(end.error, HasSubstr("out of memory"));
+      if (!run_in("starved").holds_a_run()) continue;
+      ++saved;
+      const Outcome resumed = run(resuming("starved"));
+      EXPECT_EQ(resumed.code, 0) << resumed.error;
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(saved, 0);
+  std::cout << ended << " of " << 2 * trials_wanted() << " trainings ended, " << saved
+            << " in a saved state; " << all << " allocations in all\n";
+}
+
+TEST_F(Allocation, VerbsThatReadARunEndInOneLine) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"export", path("whole"), "-o", path("starved_ply")},
+        {"eval", path("whole"), "--device", "cpu"}}) {
+    const int64_t all = allocations_of(words);
+    for (const int64_t n : moments(all)) {
+      SCOPED_TRACE(words[0] + ", allocation " + std::to_string(n));
+      const Outcome end = run(words, {.failing_allocation = n});
+      if (end.code == 0) continue;
+      EXPECT_EQ(end.code, 4);
+      EXPECT_THAT(end.error, HasSubstr("out of memory"));
+      if (HasFailure()) return;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace traceflow::faults

@@ -1,0 +1,111 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "base/random.h"
+#include "cli/faults/small_training.h"
+
+// `kill -9` at any moment. A few kills here; scripts/kill_test makes as many as it is told.
+namespace traceflow::faults {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Seconds = std::chrono::duration<double>;
+
+int kills_wanted() {
+  const char* wanted = std::getenv("TRACEFLOW_KILLS");
+  return wanted == nullptr ? 6 : std::atoi(wanted);
+}
+
+bool is_being_written(const RunFolder& run) {
+  return fs::exists(run.folder / "checkpoint.new.safetensors.partial") ||
+         fs::exists(run.folder / "checkpoint.new.safetensors");
+}
+
+struct Account {
+  int kills = 0, while_writing = 0, before_the_first = 0, runs = 0;
+};
+
+class Kill : public Faults {
+ protected:
+  // Half of the time at a random moment, else just when a checkpoint is being written. Whether it was killed
+  // before it ended.
+  bool kill_somewhere(Process& training, double usual_seconds) {
+    const bool while_writing = random_.below(2) == 0;
+    const Seconds wait(random_.uniform() * usual_seconds), more(random_.uniform() * 4e-4);
+    const Clock::time_point start = Clock::now();
+    while (!training.has_ended() && (while_writing ? !is_being_written(run_) : Clock::now() - start < wait)) {
+      std::this_thread::sleep_for(std::chrono::microseconds(while_writing ? 5 : 500));
+    }
+    if (while_writing) std::this_thread::sleep_for(more);
+    if (training.has_ended()) return false;
+    training.send(SIGKILL);
+    return training.wait().code == -SIGKILL;
+  }
+
+  // A checkpoint that can be read stands, no older than the one before, or none was ever written.
+  void check_what_stands() {
+    if (!run_.holds_a_run()) {
+      EXPECT_EQ(reached_, 0);
+      ++account_.before_the_first;
+      return;
+    }
+    std::string note;
+    const double now = read_checkpoint(run_, note).number("iteration");
+    EXPECT_GE(now, reached_) << note;
+    reached_ = now;
+  }
+
+  void check_the_end() {
+    EXPECT_EQ(state_of(run_.folder), whole_state());
+    std::ifstream log(run_.log());
+    for (std::string line; std::getline(log, line);) EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    EXPECT_EQ(run({"export", run_.folder.string(), "-o", path("ply")}).code, 0);
+    for (const char* name : {"main.ply", "environment.ply"})
+      EXPECT_EQ(text_of(fs::path(path("ply")) / name), text_of(fs::path(path("whole_ply")) / name));
+    fs::remove_all(run_.folder);
+    reached_ = 0;
+    ++account_.runs;
+  }
+
+  RunFolder run_ = run_in("killed");
+  Random random_{20261122};
+  double reached_ = 0;  // iterations
+  Account account_;
+};
+
+TEST_F(Kill, ALoadableCheckpointStandsAndTheResumedRunEndsInTheSameBytes) {
+  const int wanted = kills_wanted();
+  ASSERT_EQ(run({"export", path("whole"), "-o", path("whole_ply")}).code, 0);
+  const Clock::time_point start = Clock::now();
+  ASSERT_EQ(run(training("timed")).code, 0);
+  const double usual = Seconds(Clock::now() - start).count();
+
+  for (bool over = false; !over;) {
+    over = account_.kills >= wanted;
+    Process training(run_.holds_a_run() ? resuming("killed") : this->training("killed"), {});
+    if (!over && kill_somewhere(training, usual)) {
+      ++account_.kills;
+      account_.while_writing += is_being_written(run_) ? 1 : 0;
+      check_what_stands();
+    } else {
+      const Outcome end = training.wait();
+      ASSERT_EQ(end.code, 0) << end.error;
+      check_the_end();
+    }
+    if (HasFailure()) return;
+  }
+  std::cout << account_.kills << " kills in " << Seconds(Clock::now() - start).count()
+            << " s: " << account_.while_writing << " while a checkpoint was being written, "
+            << account_.before_the_first << " before the first; " << account_.runs
+            << " runs came to their end in the same bytes\n";
+}
+
+}  // namespace
+}  // namespace traceflow::faults

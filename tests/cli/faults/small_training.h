@@ -1,0 +1,111 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "cli/faults/world.h"
+#include "scene/run_folder.h"
+#include "support/temp_folder.h"
+
+// A training of a second or two, for worlds in which something goes wrong.
+namespace traceflow::faults {
+
+namespace fs = std::filesystem;
+
+inline std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+inline int lines(const std::string& text) {
+  return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// A run's state in bytes, without how long it took.
+inline std::string state_of(const fs::path& run) {
+  std::string note;
+  Safetensors file = read_checkpoint(RunFolder{run}, note);
+  EXPECT_EQ(note, "");
+  file.metadata["train_seconds"] = "0";
+  const TempFolder folder;
+  file.write(folder / "state");
+  return text_of(folder / "state");
+}
+
+class Faults : public testing::Test {
+ protected:
+  static constexpr int iterations = 24;
+
+  static void SetUpTestSuite() {
+    if (folder_ != nullptr) return;
+    static const TempFolder folder;
+    folder_ = &folder;
+    fs::permissions(folder.path(), fs::perms::all);
+    ASSERT_EQ(run({"synth", path("capture"), "--frames", "5", "--width", "40", "--height", "24", "--samples",
+                   "2", "--points", "200", "--test-every", "2"})
+                  .code,
+              0);
+    const Outcome whole = run(training("whole"));
+    ASSERT_EQ(whole.code, 0) << whole.error;
+  }
+
+  static std::string path(const std::string& name) { return (*folder_ / name).string(); }
+  static RunFolder run_in(const std::string& name) { return RunFolder{*folder_ / name}; }
+  static std::vector<std::string> training(const std::string& name,
+                                           const std::vector<std::string>& more = {}) {
+    std::vector<std::string> words{"train",
+                                   "-d",
+                                   path("capture"),
+                                   "-o",
+                                   path(name),
+                                   "--preset",
+                                   "demo",
+                                   "--set",
+                                   "deform.network.width=16",
+                                   "--set",
+                                   "deform.environment_network.width=16",
+                                   "--set",
+                                   "initial.environment_cells=4",
+                                   "--set",
+                                   "save_every=3",
+                                   "--device",
+                                   "cpu",
+                                   "--threads",
+                                   "2",
+                                   "-q"};
+    if (std::find(more.begin(), more.end(), "-i") == more.end())
+      words.insert(words.end(), {"-i", std::to_string(iterations)});
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  static std::vector<std::string> resuming(const std::string& name) {
+    return {"train", "-o", path(name), "--resume", "-q", "--device", "cpu"};
+  }
+  // Of a run that nothing went wrong with.
+  static std::string whole_state() { return state_of(path("whole")); }
+
+  // That a training ended in one line and nothing half written beside the run's own files.
+  static void expect_one_line(const Outcome& outcome, int code) {
+    EXPECT_EQ(outcome.code, code) << outcome.error;
+    EXPECT_EQ(lines(outcome.error), 1) << outcome.error;
+    EXPECT_TRUE(outcome.error.starts_with("traceflow: ")) << outcome.error;
+    EXPECT_EQ(outcome.output, "");
+  }
+  static std::vector<std::string> files_in(const std::string& name) {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(path(name)))
+      names.push_back(entry.path().filename().string());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
+ private:
+  static inline const TempFolder* folder_ = nullptr;
+};
+
+}  // namespace traceflow::faults

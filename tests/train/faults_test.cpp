@@ -1,0 +1,123 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <optional>
+
+#include "train/small_run.h"
+
+// What happens to a training when the disk refuses and when photographs vanish (docs/faults.md). The program
+// as a whole: tests/cli/faults.
+namespace traceflow {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+fs::path new_run(const std::string& name) {
+  fs::path run = fs::path(testing::TempDir()) / (name + "_" + std::to_string(::getpid()));
+  fs::remove_all(run);
+  return run;
+}
+
+std::string whole_bytes(const TrainOptions& options) {
+  Trainer whole(options, load_capture(capture_folder(), options.capture), new_run("unhindered"));
+  whole.run(never);
+  return scene_bytes(whole.scene());
+}
+
+// Calls `act` after an iteration.
+void after(Trainer& trainer, int64_t iteration, const std::function<void()>& act) {
+  trainer.stream().listen([=](const events::Event& event) {
+    const auto* step = std::get_if<events::Step>(&event);
+    if (step != nullptr && step->iteration == iteration) act();
+  });
+}
+
+TEST(TrainingFaults, ASaveThatTheDiskRefusesIsAWarningAndTriedAgain) {
+  TrainOptions options = small_run(20);
+  options.save_every = 5;
+  const fs::path run = new_run("refusing");
+  const fs::path in_the_way = run / "checkpoint.new.safetensors.partial";
+  Trainer trainer(options, load_capture(capture_folder(), options.capture), run);
+  std::vector<std::string> told;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* saved = std::get_if<events::Saved>(&event))
+      told.push_back("saved " + std::to_string(saved->iteration));
+    const auto* warning = std::get_if<events::Warning>(&event);
+    if (warning != nullptr && warning->text.find("not saved") != std::string::npos) {
+      told.push_back("not saved " + std::to_string(warning->iteration));
+      EXPECT_THAT(warning->text, AllOf(HasSubstr(in_the_way.parent_path().string()),
+                                       HasSubstr("iteration 10 is not saved: "), HasSubstr("tries again")));
+    }
+  });
+  after(trainer, 9, [&] { fs::create_directory(in_the_way); });
+  after(trainer, 12, [&] { fs::remove(in_the_way); });
+  EXPECT_EQ(trainer.run(never).ending, events::Ending::completed);
+  EXPECT_EQ(told, (std::vector<std::string>{"saved 5", "not saved 10", "saved 15", "saved 20"}));
+  EXPECT_EQ(scene_bytes(trainer.scene()), whole_bytes(options));
+}
+
+TEST(TrainingFaults, TheLastSaveRefusedIsAnErrorAndTheOneBeforeStands) {
+  TrainOptions options = small_run(8);
+  options.save_every = 5;
+  const fs::path run = new_run("refused");
+  Trainer trainer(options, load_capture(capture_folder(), options.capture), run);
+  after(trainer, 7, [&] { fs::create_directory(run / "checkpoint.new.safetensors.partial"); });
+  EXPECT_THROW(trainer.run(never), InputError);
+  std::string note;
+  EXPECT_EQ(read_checkpoint(RunFolder{run}, note).number("iteration"), 5);
+}
+
+TEST(TrainingFaults, ACaptureThatVanishesEndsInTheStateBeforeThatIteration) {
+  TrainOptions options = small_run(20);
+  options.capture.cache_mebibytes = 0;
+  const fs::path fleeting = new_run("fleeting"), gone = new_run("gone"), run = new_run("vanished");
+  fs::copy(capture_folder(), fleeting, fs::copy_options::recursive);
+  {
+    Trainer trainer(options, load_capture(fleeting, options.capture), run);
+    after(trainer, 11, [&] { fs::rename(fleeting, gone); });
+    const events::Finished end = trainer.run(never);
+    EXPECT_EQ(end.ending, events::Ending::no_input);
+    EXPECT_EQ(end.iteration, 11);
+    EXPECT_THAT(end.reason, AllOf(HasSubstr(fleeting.string()), HasSubstr("No such file")));
+  }
+  fs::rename(gone, fleeting);
+  Trainer resumed(options, load_capture(fleeting, options.capture), run);
+  resumed.resume();
+  EXPECT_EQ(resumed.iteration(), 11);
+  EXPECT_EQ(resumed.run(never).ending, events::Ending::completed);
+  EXPECT_EQ(scene_bytes(resumed.scene()), whole_bytes(options));
+  fs::remove_all(fleeting);
+}
+
+// Checkpoints of version 1 had no checksums and are else the same.
+TEST(TrainingFaults, ACheckpointOfAnEarlierVersionIsResumed) {
+  const TrainOptions options = small_run(12);
+  const fs::path run = new_run("earlier");
+  {
+    Trainer first(options, load_capture(capture_folder(), options.capture), run);
+    std::atomic<bool> stop{false};
+    after(first, 6, [&] { stop = true; });
+    first.run(stop);
+  }
+  // The same file without its checksums and of version 1: both stand in the header alone.
+  const RunFolder folder{run};
+  std::ifstream in(folder.checkpoint(), std::ios::binary);
+  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const size_t name = bytes.find("traceflow.crc32"), version = bytes.find(R"("version":"2")");
+  ASSERT_NE(name, std::string::npos);
+  ASSERT_NE(version, std::string::npos);
+  bytes[name] = 'T';
+  bytes[version + 11] = '1';
+  std::ofstream(folder.checkpoint(), std::ios::binary) << bytes;
+  ASSERT_FALSE(Safetensors::read(folder.checkpoint()).has_checksums());
+
+  Trainer resumed(options, load_capture(capture_folder(), options.capture), run);
+  resumed.resume();
+  EXPECT_EQ(resumed.iteration(), 6);
+  resumed.run(never);
+  EXPECT_EQ(scene_bytes(resumed.scene()), whole_bytes(options));
+}
+
+}  // namespace
+}  // namespace traceflow
