@@ -106,9 +106,10 @@ std::vector<double> times_by_names(const std::vector<std::string>& paths) {
   for (const std::string& path : paths) names.insert(std::filesystem::path(path).filename().string());
   std::map<std::string, double> place;
   for (const std::string& name : names) place.emplace(name, static_cast<double>(place.size()));
-  std::vector<double> times;
-  for (const std::string& path : paths)
-    times.push_back(place.at(std::filesystem::path(path).filename().string()));
+  std::vector<double> times(paths.size());
+  std::transform(paths.begin(), paths.end(), times.begin(), [&](const std::string& path) {
+    return place.at(std::filesystem::path(path).filename().string());
+  });
   return times;
 }
 
