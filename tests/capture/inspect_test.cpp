@@ -27,7 +27,7 @@ TEST(Inspect, counts_what_is_there) {
   Tensor<float> points({2, 3});
   points(1, 0) = 1;
   points(1, 2) = 4;
-  write_npy(fake.path() / "points.npy", points);
+  write_npy(fake.path() / "points (", points);
   fake.cameras["000001_left"]["orientation"] = {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}};
   fake.save();
   const Inspection found = inspect(load_capture(fake.path(), {}));
