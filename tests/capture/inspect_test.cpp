@@ -65,7 +65,7 @@ TEST(Inspect, tells_what_is_missing_and_what_looks_wrong) {
   fake.write_image("mask/1x/000000.png.png", mask);
   fake.save();
   const Inspection found = inspect(load_capture(fake.path(), {}));
-  EXPECT_TRUE(names(found.missing, "points.npy"));
+  EXPECT_TRUE(names(found.missing, "points ("));
   EXPECT_TRUE(names(found.missing, "normal priors"));
   EXPECT_TRUE(names(found.missing, "test views"));
   EXPECT_TRUE(names(found.missing, "near and far"));

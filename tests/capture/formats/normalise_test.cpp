@@ -43,14 +43,15 @@ TEST(Normalise, without_points_the_origin_is_where_all_cameras_look) {
 
 TEST(Normalise, cameras_side_by_side_or_back_to_back_have_no_common_sight) {
   std::vector<FoundView> side_by_side, outward;
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i <= 10; ++i) {
     side_by_side.push_back(looking({i, 0, 0}, {i, 0, 10}));
-    const Vec3<double> d(std::cos(i), std::sin(i), 0.3 * std::sin(5 * i));
+    // On half a ring: its axes meet behind the cameras, in the origin.
+    const Vec3<double> d(std::cos(0.314 * i), std::sin(0.314 * i), 0.1 * (i % 2));
     outward.push_back(looking(d, 2.0 * d));
   }
-  EXPECT_LT(length(normalise(side_by_side, {}).centre - Vec3<double>(4.5, 0, 0)), 1e-9);
-  EXPECT_NEAR(normalise(side_by_side, {}).scale, 1.0 / 9, 1e-9);
-  EXPECT_LT(length(normalise(outward, {}).centre), 1);
+  EXPECT_LT(length(normalise(side_by_side, {}).centre - Vec3<double>(5, 0, 0)), 1e-9);
+  EXPECT_NEAR(normalise(side_by_side, {}).scale, 1.0 / 10, 1e-9);
+  EXPECT_LT(length(normalise(outward, {}).centre - Vec3<double>(0, 0.5, 0.05)), 0.01);
 }
 
 TEST(Normalise, points_and_cameras_share_a_box_that_outliers_do_not_move) {
