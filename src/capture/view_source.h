@@ -19,6 +19,7 @@ struct ViewSource {
   double zoom = 1;                // of the straightened image (capture/lens.h)
   int factor = 1;                 // pixels of the stored image a side that make one of the view's
   Mat3<double> camera_from_world{1};
+  std::string rig_camera;  // which of a rig's cameras took it; empty: not known
 
   int64_t width() const { return static_cast<int64_t>(lens.width) / factor; }
   int64_t height() const { return static_cast<int64_t>(lens.height) / factor; }
