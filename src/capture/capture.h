@@ -8,6 +8,7 @@
 
 #include "base/tensor.h"
 #include "capture/formats/capture_options.h"
+#include "capture/formats/finding.h"
 #include "math/camera.h"
 #include "scene/scene.h"
 
@@ -52,7 +53,7 @@ struct Capture {
   bool has_normal_priors = false;
   bool has_truth = false;
   PriorAxes prior_axes = PriorAxes::opengl;  // the axes in use, never `automatic`
-  std::vector<std::string> warnings;         // what looks wrong, one line each
+  std::vector<Finding> warnings;             // what looks wrong
   std::shared_ptr<ImageCache> images;
 };
 

@@ -7,9 +7,11 @@
 #include "base/parallel.h"
 #include "capture/capture.h"
 #include "capture/decode.h"
+#include "capture/extent.h"
 #include "capture/formats/formats.h"
 #include "capture/image_cache.h"
 #include "capture/prior_axes.h"
+#include "capture/unregistered.h"
 #include "files/image.h"
 
 namespace traceflow {
@@ -46,6 +48,7 @@ class Assembly {
 
   Capture finish() {
     make_views();
+    find_unregistered();
     set_extent();
     take_points();
     find_masks();
@@ -58,7 +61,9 @@ class Assembly {
   }
 
  private:
-  void warn(const std::string& text) { capture_.warnings.push_back(text); }
+  Finding& warn(const std::string& text, const std::string& kind, Severity severity = Severity::problem) {
+    return capture_.warnings.emplace_back(text, kind, severity);
+  }
 
   // The first of the candidates that exists, or none.
   TreeFile first_file(std::initializer_list<std::string> candidates) const {
@@ -73,12 +78,13 @@ class Assembly {
       for (const FoundView& view : *split) last_time_ = std::max(last_time_, view.time);
     }
     if (found_.train.empty()) {
-      throw InputError(capture_.folder.string(), "training views", "none that is whole",
-                       "an image, a camera and a time each",
-                       "see what is missing: " + (capture_.warnings.empty() ? "" : capture_.warnings.back()));
+      throw InputError(
+          capture_.folder.string(), "training views", "none that is whole",
+          "an image, a camera and a time each",
+          "see what is missing: " + (capture_.warnings.empty() ? "" : capture_.warnings.back().text));
     }
     if (!(last_time_ > 0)) {
-      warn("all views have time 0: the scene cannot move");
+      warn("all views have time 0: the scene cannot move", "one-time");
       last_time_ = 1;
     }
     capture_.train = make_split(found_.train);
@@ -104,7 +110,9 @@ class Assembly {
     std::erase(misfits, "");
     if (!misfits.empty()) {
       warn("image_size of " + ids_text(misfits) +
-           " has other proportions than the image: the camera is stretched to it");
+               " has other proportions than the image: the camera is stretched to it",
+           "camera-size")
+          .views = misfits;
     }
     std::erase(turned, "");
     if (!turned.empty()) {
@@ -128,6 +136,7 @@ class Assembly {
     if (!source.lens.is_pinhole()) source.zoom = pinhole_zoom(source.lens, found.camera_name);
     source.camera_from_world = found.camera_from_world;
     source.background = background_;
+    source.rig_camera = found.rig_camera;
     return source;
   }
 
@@ -152,31 +161,40 @@ class Assembly {
     }
     if (sizes.size() > 1) {
       warn("the views have " + std::to_string(sizes.size()) + " different sizes, from " +
-           std::to_string(sizes.begin()->first) + "×" + std::to_string(sizes.begin()->second) + " to " +
-           std::to_string(sizes.rbegin()->first) + "×" + std::to_string(sizes.rbegin()->second));
+               std::to_string(sizes.begin()->first) + "×" + std::to_string(sizes.begin()->second) + " to " +
+               std::to_string(sizes.rbegin()->first) + "×" + std::to_string(sizes.rbegin()->second),
+           "mixed-sizes", Severity::notice);
     }
   }
 
+  void find_unregistered() {
+    std::vector<std::string> files = unregistered_images(*tree_, found_);
+    if (files.empty()) return;
+    warn(std::to_string(files.size()) + (files.size() == 1 ? " image has" : " images have") + " no camera (" +
+             ids_text(files) + ")",
+         "unregistered-image", Severity::notice)
+        .files = std::move(files);
+  }
+
   void set_extent() {
-    Vec3<double> mean(0);
-    for (const View& view : capture_.train) {
-      mean += Vec3<double>(view.camera.position) / static_cast<double>(capture_.train.size());
-    }
-    double farthest = 0;
-    for (const View& view : capture_.train) {
-      farthest = std::max(farthest, length(Vec3<double>(view.camera.position) - mean));
-    }
-    if (farthest > 0) {
-      capture_.extent = static_cast<float>(1.1 * farthest);
+    std::vector<Vec3<double>> positions;
+    for (const View& view : capture_.train) positions.emplace_back(view.camera.position);
+    const double extent = camera_extent(positions);
+    if (extent > 0) {
+      capture_.extent = static_cast<float>(extent);
     } else {
       warn(
           "all training cameras stand at one place: the scene's extent is taken as 1, and depth cannot be "
-          "learned");
+          "learned",
+          "one-place");
     }
   }
 
   void take_points() {
-    if (found_.points_file.empty()) return warn("there are no points: surfels start at random");
+    if (found_.points_file.empty()) {
+      warn("there are no points: surfels start at random", "no-points", Severity::notice);
+      return;
+    }
     std::vector<float> kept;
     kept.reserve(3 * found_.points.size());
     for (const Vec3<double>& point : found_.points) {
@@ -189,11 +207,13 @@ class Assembly {
     std::copy(kept.begin(), kept.end(), capture_.points.data());
     if (count < all) {
       warn(found_.points_file + ": " + std::to_string(all - count) + " of " + std::to_string(all) +
-           " points are not finite: left out");
+               " points are not finite: left out",
+           "points-not-finite");
     }
     if (count > 0 && share_seen() < 0.1) {
       warn(found_.points_file +
-           ": hardly any point falls into an image; is it in the capture's own coordinates?");
+               ": hardly any point falls into an image; is it in the capture's own coordinates?",
+           "points-unseen");
     }
   }
 
@@ -226,10 +246,12 @@ class Assembly {
   }
 
   void warn_if_partial(const std::vector<View>& views, const std::vector<std::string>& missing,
-                       const std::string& what) {
+                       const std::string& what, const std::string& kind) {
     if (missing.empty() || missing.size() == views.size()) return;
     warn(std::to_string(missing.size()) + " of " + std::to_string(views.size()) + " " + what + " (" +
-         ids_text(missing) + ")");
+             ids_text(missing) + ")",
+         kind)
+        .views = missing;
   }
 
   void find_masks() {
@@ -248,10 +270,11 @@ class Assembly {
       capture_.has_masks |= static_cast<bool>(source.mask);
     }
     const auto has = [](const ViewSource& source) { return static_cast<bool>(source.mask); };
-    warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has),
-                    "training views have no mask");
-    warn_if_partial(capture_.test, ids_without(capture_.test, sources_, has), "test views have no mask");
-    warn_about_proportions("mask", [](const ViewSource& source) { return source.mask; });
+    warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has), "training views have no mask",
+                    "missing-mask");
+    warn_if_partial(capture_.test, ids_without(capture_.test, sources_, has), "test views have no mask",
+                    "missing-mask");
+    warn_about_proportions("mask", "mask-size", [](const ViewSource& source) { return source.mask; });
   }
 
   void find_priors() {
@@ -265,8 +288,9 @@ class Assembly {
     if (!capture_.has_normal_priors) return;
     const auto has = [](const ViewSource& source) { return source.has_prior(); };
     warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has),
-                    "training views have no normal prior");
-    warn_about_proportions("normal prior", [](const ViewSource& source) { return source.prior; });
+                    "training views have no normal prior", "missing-prior");
+    warn_about_proportions("normal prior", "prior-size",
+                           [](const ViewSource& source) { return source.prior; });
   }
 
   // One element for each training id in the order of the capture's list, or one for each of all ids.
@@ -292,7 +316,7 @@ class Assembly {
   // Reads the header of every file that `file_of` names; a file that is no image ends the loading here, not
   // in the middle of a run.
   template <class F>
-  void warn_about_proportions(const std::string& what, F&& file_of) {
+  void warn_about_proportions(const std::string& what, const std::string& kind, F&& file_of) {
     std::vector<std::string> misfits;
     for (const auto* split : {&capture_.train, &capture_.test}) {
       for (const View& view : *split) {
@@ -304,7 +328,9 @@ class Assembly {
     }
     if (!misfits.empty()) {
       warn("the " + what + " of " + ids_text(misfits) +
-           " has other proportions than the image: stretched to it");
+               " has other proportions than the image: stretched to it",
+           kind)
+          .views = misfits;
     }
   }
 
@@ -341,7 +367,7 @@ class Assembly {
       const AxisChoice choice =
           choose_prior_axes(options_.prior_axes, measure_prior_axes(capture_.points, priors));
       capture_.prior_axes = choice.axes;
-      if (!choice.warning.empty()) warn(choice.warning);
+      if (!choice.warning.empty()) warn(choice.warning, "prior-axes");
     }
     shared_.prior_signs = prior_axis_signs(capture_.prior_axes);
   }

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <string_view>
 
 #include "files/png.h"
+#include "show/drawing.h"
 
 namespace traceflow::show {
 
@@ -17,37 +17,9 @@ constexpr std::array<Layer, 6> shown_layers = {Layer::diffuse, Layer::specular, 
                                                Layer::normal,  Layer::depth,    Layer::alpha};
 constexpr int64_t gap = 3;
 constexpr int64_t title_height = 16;
-constexpr uint8_t paper = 255, ink = 40;
+constexpr uint8_t paper = 255;
+constexpr Ink ink{40, 40, 40};
 constexpr float difference_gain = 3;
-
-// Letters a to z, 3 wide and 5 high, the top row's left pixel in the highest of 15 bits.
-constexpr std::array<uint16_t, 26> glyphs = {
-    0b010101111101101, 0b110101110101110, 0b011100100100011, 0b110101101101110, 0b111100110100111,
-    0b111100110100100, 0b011100101101011, 0b101101111101101, 0b111010010010111, 0b001001001101010,
-    0b101101110101101, 0b100100100100111, 0b101111111101101, 0b110101101101101, 0b010101101101010,
-    0b110101110100100, 0b010101101111011, 0b110101110101101, 0b011100010001110, 0b111010010010010,
-    0b101101101101111, 0b101101101101010, 0b101101111111101, 0b101101010101101, 0b101101010010010,
-    0b111001010100111};
-
-// Every pixel of a glyph is 2×2.
-void write_text(std::string_view text, int64_t top, int64_t left, Tensor<uint8_t>& sheet) {
-  for (const char letter : text) {
-    for (int64_t bit = 0; bit < 15; ++bit) {
-      if (((glyphs[static_cast<size_t>(letter - 'a')] >> (14 - bit)) & 1) == 0) continue;
-      for (int64_t k = 0; k < 4; ++k) {
-        const int64_t y = top + bit / 3 * 2 + k / 2, x = left + bit % 3 * 2 + k % 2;
-        if (y < sheet.dim(0) && x < sheet.dim(1)) std::fill_n(&sheet(y, x, 0), 3, ink);
-      }
-    }
-    left += 8;
-  }
-}
-
-void paste(const Tensor<uint8_t>& image, int64_t top, int64_t left, Tensor<uint8_t>& sheet) {
-  for (int64_t y = 0; y < image.dim(0); ++y) {
-    std::copy(image.row(y), image.row(y) + image.row_size(), &sheet(top + y, left, 0));
-  }
-}
 
 }  // namespace
 
@@ -80,10 +52,10 @@ void ContactSheet::write(const std::filesystem::path& path) const {
   sheet.fill(paper);
   for (size_t column = 0; column < titles.size(); ++column) {
     const int64_t left = static_cast<int64_t>(column) * (width + gap);
-    write_text(titles[column], 3, left + 1, sheet);
+    write_text(titles[column], {left + 1, 3}, ink, sheet);
     int64_t top = title_height;
     for (const auto& row : rows_) {
-      paste(row[column], top, left, sheet);
+      paste(row[column], {left, top}, sheet);
       top += row[column].dim(0) + gap;
     }
   }

@@ -117,4 +117,10 @@ MemoryPlan plan_memory(const MemorySetting& run) {
   return plan;
 }
 
+int64_t unlimited_forecast(const MemorySetting& run) {
+  TrainOptions options = run.options;
+  options.memory_budget = mebibyte * 1024;  // a pebibyte
+  return plan_memory({options, run.device, run.width, run.height}).forecast_bytes;
+}
+
 }  // namespace traceflow

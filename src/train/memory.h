@@ -39,4 +39,8 @@ struct MemoryPlan {
 };
 MemoryPlan plan_memory(const MemorySetting& run);
 
+// What a run takes at most, in bytes, where no budget limits it: both sets at the options' caps, all kept
+// that is worth keeping.
+int64_t unlimited_forecast(const MemorySetting& run);
+
 }  // namespace traceflow

@@ -260,7 +260,7 @@ void Trainer::tell_start() {
                                std::string(name_of(device_)), thread_count(),
                                static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes,
                                version(), this_machine(device_)});
-  for (const std::string& warning : capture_.warnings) stream_.emit(events::Warning{iteration_, warning});
+  for (const Finding& found : capture_.warnings) stream_.emit(events::Warning{iteration_, found.text});
   if (memory_.caps.lowered) {
     stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(memory_.caps.main) +
                                                  " main and " + std::to_string(memory_.caps.environment) +

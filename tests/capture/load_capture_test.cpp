@@ -21,7 +21,7 @@ using Ids = std::vector<std::string>;
 
 bool has_warning(const Capture& capture, const std::string& part) {
   return std::any_of(capture.warnings.begin(), capture.warnings.end(),
-                     [&](const std::string& text) { return text.find(part) != std::string::npos; });
+                     [&](const Finding& found) { return found.text.find(part) != std::string::npos; });
 }
 
 TEST(Layouts, nerf_ds) {

@@ -16,7 +16,7 @@ namespace {
 
 bool has_warning(const Capture& capture, const std::string& part) {
   return std::any_of(capture.warnings.begin(), capture.warnings.end(),
-                     [&](const std::string& text) { return text.find(part) != std::string::npos; });
+                     [&](const Finding& found) { return found.text.find(part) != std::string::npos; });
 }
 
 std::string bytes_of(const std::filesystem::path& path) {

@@ -32,7 +32,7 @@ std::vector<std::string> read_split(const FileTree& tree, const char* path, Nerf
 
 bool is_dycheck(const FileTree& tree) { return tree.has(train_split); }
 
-NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<std::string>& warnings) {
+NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<Finding>& warnings) {
   for (const char* name : {train_split, "scene.json"}) {
     if (tree.has(name)) continue;
     throw InputError(tree.path().string(), name, "no such file", "a capture in the DyCheck layout",

@@ -6,23 +6,20 @@
 
 namespace traceflow {
 
-std::string ids_text(const std::vector<std::string>& ids) {
-  constexpr size_t named = 3;
-  std::string text;
-  for (size_t i = 0; i < std::min(named, ids.size()); ++i) text += (i == 0 ? "" : ", ") + ids[i];
-  if (ids.size() > named) text += " and " + std::to_string(ids.size() - named) + " more";
-  return text;
-}
-
 std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const std::string& split,
                                     const std::string& what,
                                     const std::function<bool(const std::string& id)>& exists,
-                                    std::vector<std::string>& warnings) {
+                                    std::vector<Finding>& warnings, const std::string& kind,
+                                    const std::function<std::string(const std::string& id)>& path_of) {
   std::vector<std::string> kept, missing;
   for (const std::string& id : ids) (exists(id) ? kept : missing).push_back(id);
   if (!missing.empty()) {
-    warnings.push_back(std::to_string(missing.size()) + " of " + std::to_string(ids.size()) + " " + split +
-                       " views have no " + what + " (" + ids_text(missing) + "): left out");
+    Finding& finding =
+        warnings.emplace_back(std::to_string(missing.size()) + " of " + std::to_string(ids.size()) + " " +
+                                  split + " views have no " + what + " (" + ids_text(missing) + "): left out",
+                              kind);
+    if (path_of) std::transform(missing.begin(), missing.end(), std::back_inserter(finding.files), path_of);
+    finding.views = std::move(missing);
   }
   return kept;
 }

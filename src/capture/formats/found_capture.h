@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "capture/formats/capture_options.h"
+#include "capture/formats/finding.h"
 #include "capture/lens/lens.h"
 #include "files/file_tree.h"
 #include "scene/normalisation.h"
@@ -20,7 +21,8 @@ struct FoundView {
   std::string camera_name;  // of the file and field that say the lens, for errors
   Mat3<double> camera_from_world{1};  // camera axes x right, y down, z forward
   Vec3<double> position{0};
-  double time = 0;  // in any unit, at least 0
+  double time = 0;         // in any unit, at least 0
+  std::string rig_camera;  // which of a rig's cameras took it; empty: not known
 };
 
 // Stored images at 1/stored of the full size, to be filtered by `factor`: stored · factor is the downscale.
@@ -41,18 +43,16 @@ struct FoundCapture {
   std::vector<Vec3<double>> points;
   std::string points_file;                    // where they come from; empty: there are none
   Background background = Background::black;  // the format's custom, never `automatic`
-  std::vector<std::string> warnings;
+  std::vector<Finding> warnings;
 };
 
-// "a, b, c and 4 more": at most three are named.
-std::string ids_text(const std::vector<std::string>& ids);
-
 // The ids for which `exists` holds; the others become a warning: "3 of 80 training views have no image (a, b,
-// c): left out".
+// c): left out". kind: of the warning. path_of: the file in which it should be.
 std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const std::string& split,
                                     const std::string& what,
                                     const std::function<bool(const std::string& id)>& exists,
-                                    std::vector<std::string>& warnings);
+                                    std::vector<Finding>& warnings, const std::string& kind = "left-out",
+                                    const std::function<std::string(const std::string& id)>& path_of = {});
 
 // The folder with the largest stored images that `downscale` is a multiple of. folder_of: the folder's name
 // by the scale that it is stored at. Throws InputError where there is none.

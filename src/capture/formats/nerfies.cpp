@@ -52,12 +52,19 @@ class Reader {
   }
 
   std::vector<FoundView> read_split(std::vector<std::string> ids, const std::string& split) {
-    const auto keep = [&](const std::string& what, auto&& exists) {
-      ids = keep_whole(ids, split, what, exists, found_.warnings);
+    const auto keep = [&](const std::string& what, const std::string& kind, auto&& exists, auto&& path_of) {
+      ids = keep_whole(ids, split, what, exists, found_.warnings, kind, path_of);
     };
-    keep("image", [&](const std::string& id) { return !image_path(id).empty(); });
-    keep("camera", [&](const std::string& id) { return tree_->has(camera_path(id)); });
-    keep("entry in metadata.json", [&](const std::string& id) { return layout_.time_id.contains(id); });
+    const auto usual_image = [&](const std::string& id) { return found_.images.folder + "/" + id + ".png"; };
+    keep(
+        "image", "missing-image", [&](const std::string& id) { return !image_path(id).empty(); },
+        usual_image);
+    keep(
+        "camera", "missing-camera", [&](const std::string& id) { return tree_->has(camera_path(id)); },
+        camera_path);
+    keep(
+        "entry in metadata.json", "missing-time",
+        [&](const std::string& id) { return layout_.time_id.contains(id); }, nullptr);
     std::vector<FoundView> views(ids.size());
     parallel_for(
         "capture: cameras", static_cast<int64_t>(ids.size()),
@@ -67,13 +74,15 @@ class Reader {
 
   FoundView read_view(const std::string& id) const {
     const CapturedCamera camera = read_nerfies_camera(tree_->open_file(camera_path(id)));
+    const auto rig_camera = layout_.rig_camera.find(id);
     return {id,
             {tree_, image_path(id)},
             camera.lens,
             tree_->name_of(camera_path(id)),
             camera.camera_from_world,
             camera.position,
-            layout_.time_id.at(id)};
+            layout_.time_id.at(id),
+            rig_camera == layout_.rig_camera.end() ? "" : rig_camera->second};
   }
 
   void read_points() {

@@ -12,7 +12,7 @@ namespace traceflow {
 namespace {
 
 std::vector<std::string> read_ids(const JsonFile& dataset, const std::string& key,
-                                  std::vector<std::string>& warnings) {
+                                  std::vector<Finding>& warnings) {
   if (!dataset.has(key)) return {};
   const JsonField field = dataset[key];
   std::vector<std::string> kept, repeated;
@@ -22,8 +22,10 @@ std::vector<std::string> read_ids(const JsonFile& dataset, const std::string& ke
     (seen.insert(id).second ? kept : repeated).push_back(id);
   }
   if (!repeated.empty()) {
-    warnings.push_back("dataset.json: " + key + " names " + ids_text(repeated) +
-                       " more than once: used once");
+    warnings
+        .emplace_back("dataset.json: " + key + " names " + ids_text(repeated) + " more than once: used once",
+                      "repeated-id")
+        .views = repeated;
   }
   return kept;
 }
@@ -41,7 +43,7 @@ void split_for_interpolation(NerfiesLayout& layout) {
   layout.test_ids = std::move(test);
 }
 
-void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<std::string>& warnings) {
+void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding>& warnings) {
   const JsonFile dataset(tree.open_file("dataset.json"));
   layout.all_ids = read_ids(dataset, "ids", warnings);
   layout.train_ids = read_ids(dataset, "train_ids", warnings);
@@ -53,7 +55,8 @@ void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<std::st
     layout.format = "hypernerf-interp";
     split_for_interpolation(layout);
     if (layout.test_ids.empty())
-      warnings.emplace_back("too few views for a test split: there is nothing to evaluate on");
+      warnings.emplace_back("too few views for a test split: there is nothing to evaluate on", "no-test",
+                            Severity::notice);
     return;
   }
   const std::set<std::string> train(layout.train_ids.begin(), layout.train_ids.end());
@@ -61,8 +64,11 @@ void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<std::st
   std::copy_if(layout.test_ids.begin(), layout.test_ids.end(), std::back_inserter(both),
                [&](const std::string& id) { return train.contains(id); });
   if (!both.empty()) {
-    warnings.push_back("dataset.json: " + ids_text(both) +
-                       " in train_ids and in val_ids: the test is of trained views");
+    warnings
+        .emplace_back(
+            "dataset.json: " + ids_text(both) + " in train_ids and in val_ids: the test is of trained views",
+            "id-in-both-splits")
+        .views = both;
   }
 }
 
@@ -83,7 +89,7 @@ std::string format_of(const FileTree& tree, const NerfiesLayout& layout, bool ha
   return has_time_ids ? "hypernerf-vrig" : "nerfies";
 }
 
-void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<std::string>& warnings) {
+void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding>& warnings) {
   const JsonFile metadata(tree.open_file("metadata.json"));
   bool has_time_ids = false;
   std::set<std::string> ids(layout.train_ids.begin(), layout.train_ids.end());
@@ -96,11 +102,16 @@ void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<std::st
     const JsonField field = has_time ? entry["time_id"] : entry["warp_id"];
     if (field.number() < 0) field.fail(std::to_string(field.number()), "a number of at least zero");
     layout.time_id[id] = field.number();
+    if (entry.has("camera_id") && entry["camera_id"].json().is_primitive())
+      layout.rig_camera[id] = entry["camera_id"].json().dump();
     has_time_ids |= has_time;
     if (!has_time) by_warp.push_back(id);
   }
   if (has_time_ids && !by_warp.empty()) {
-    warnings.push_back("metadata.json: no time_id for " + ids_text(by_warp) + ": warp_id taken in its place");
+    warnings
+        .emplace_back("metadata.json: no time_id for " + ids_text(by_warp) + ": warp_id taken in its place",
+                      "no-time-id")
+        .views = by_warp;
   }
   layout.format = format_of(tree, layout, has_time_ids);
 }
@@ -126,7 +137,7 @@ void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout) {
   }
 }
 
-NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<std::string>& warnings) {
+NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<Finding>& warnings) {
   for (const char* name : {"dataset.json", "metadata.json", "scene.json"}) {
     if (tree.has(name)) continue;
     throw InputError(tree.path().string(), name, "no such file",

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "capture/formats/finding.h"
 #include "files/file_tree.h"
 #include "files/json_document.h"
 #include "scene/normalisation.h"
@@ -16,6 +17,7 @@ struct NerfiesLayout {
   std::string format;
   std::vector<std::string> all_ids, train_ids, test_ids;  // in the file's order, each id once
   std::map<std::string, double> time_id;                  // of the ids that metadata.json knows
+  std::map<std::string, std::string> rig_camera;          // camera_id, where it says one
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;
 };
@@ -26,6 +28,6 @@ void check_capture_id(const JsonField& field, const std::string& id);
 void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout);
 
 // Reads dataset.json, metadata.json and scene.json; adds what looks wrong to `warnings`. Throws InputError.
-NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<std::string>& warnings);
+NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<Finding>& warnings);
 
 }  // namespace traceflow

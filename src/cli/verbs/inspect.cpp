@@ -4,108 +4,39 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "capture/inspect.h"
-#include "capture/prior_axes.h"
 #include "cli/arguments/option_arguments.h"
+#include "cli/runs/capture_report.h"
 #include "cli/verbs/verbs.h"
+#include "files/png.h"
+#include "show/capture_picture/capture_picture.h"
 
 namespace traceflow::cli {
 
 namespace {
 
-nlohmann::json to_json(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
+struct InspectArguments {
+  std::string data;
+  std::string preset_name = "paper";
+  std::string picture;
+  bool as_json = false;
+  bool quick = false;
+};
 
-nlohmann::json to_json(const Inspection::Split& split) {
-  return {{"views", split.views},
-          {"masks", split.masks},
-          {"normal_priors", split.normal_priors},
-          {"truth_normals", split.truth_normals},
-          {"truth_depths", split.truth_depths},
-          {"times", split.times},
-          {"time_range", {split.first_time, split.last_time}}};
-}
-
-nlohmann::json to_json(const Capture& capture, const Inspection& found) {
-  nlohmann::json sizes = nlohmann::json::array();
-  for (const auto& [size, views] : found.sizes) {
-    sizes.push_back({{"width", size.first}, {"height", size.second}, {"views", views}});
+void inspect_capture(const InspectArguments& arguments, const OptionArguments& given) {
+  TrainOptions options = preset(arguments.preset_name);
+  given.apply(option_fields(options));
+  options.validate();
+  const Capture capture = load_capture(arguments.data, options.capture);
+  Inspection found = inspect(capture, arguments.quick);
+  const MemoryNeeds memory = memory_needs(capture, options, found);
+  if (!arguments.picture.empty())
+    write_png(arguments.picture, show::capture_picture(capture, found.findings));
+  if (arguments.as_json) {
+    const nlohmann::json report = report_json(capture, found, memory);
+    fmt::print("{}\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  } else {
+    print_report(capture, found, memory);
   }
-  nlohmann::json points = {{"count", capture.points.empty() ? 0 : capture.points.dim(0)}};
-  if (!capture.points.empty()) points["box"] = {to_json(found.points_low), to_json(found.points_high)};
-  return {{"name", capture.name},
-          {"format", capture.format},
-          {"train", to_json(found.train)},
-          {"test", to_json(found.test)},
-          {"images",
-           {{"folder", found.image_folder},
-            {"box_factor", found.box_factor},
-            {"sizes", sizes},
-            {"resampled_views", found.resampled_views},
-            {"largest_zoom", found.largest_zoom}}},
-          {"cameras",
-           {{"extent", capture.extent},
-            {"box", {to_json(found.camera_low), to_json(found.camera_high)}},
-            {"turn_degrees", found.camera_turn_degrees},
-            {"field_of_view_degrees", found.field_of_view_degrees},
-            {"near", capture.near_plane},
-            {"far", capture.far_plane}}},
-          {"normalisation",
-           {{"centre", to_json(capture.normalisation.centre)}, {"scale", capture.normalisation.scale}}},
-          {"points", points},
-          {"prior_axes",
-           capture.has_normal_priors ? nlohmann::json(prior_axes_name(capture.prior_axes)) : nullptr},
-          {"decoded",
-           {{"views", found.pixels.views},
-            {"mean_colour", found.pixels.mean_colour},
-            {"masked", found.pixels.masked},
-            {"with_prior", found.pixels.with_prior}}},
-          {"missing", found.missing},
-          {"warnings", found.warnings}};
-}
-
-void row(const std::string& name, const std::string& text) { fmt::print("{:<16}{}\n", name, text); }
-
-void row(const std::string& name, const Inspection::Split& split) {
-  row(name,
-      fmt::format("{} views at {} times from {:.3f} to {:.3f}; {} masks, {} normal priors, {} true normals, "
-                  "{} true depths",
-                  split.views, split.times, split.first_time, split.last_time, split.masks,
-                  split.normal_priors, split.truth_normals, split.truth_depths));
-}
-
-std::string box(const Vec3<double>& low, const Vec3<double>& high) {
-  return fmt::format("({:.3f} {:.3f} {:.3f}) to ({:.3f} {:.3f} {:.3f})", low.x, low.y, low.z, high.x, high.y,
-                     high.z);
-}
-
-void print(const Capture& capture, const Inspection& found) {
-  row("capture", fmt::format("{} ({})", capture.name, capture.format));
-  row("train", found.train);
-  row("test", found.test);
-  for (const auto& [size, views] : found.sizes)
-    row("images", fmt::format("{} of {}×{}", views, size.first, size.second));
-  row("", fmt::format("from {}{}{}", found.image_folder,
-                      found.box_factor > 1 ? fmt::format(", box-filtered by {}", found.box_factor) : "",
-                      found.resampled_views > 0 ? fmt::format(", {} straightened (zoom up to {:.3f})",
-                                                              found.resampled_views, found.largest_zoom)
-                                                : ""));
-  row("cameras",
-      fmt::format("extent {:.3f}, box {}", capture.extent, box(found.camera_low, found.camera_high)));
-  row("", fmt::format("turning by up to {:.0f}°, {:.0f}° wide", found.camera_turn_degrees,
-                      found.field_of_view_degrees));
-  if (capture.far_plane > 0)
-    row("depth", fmt::format("{:.3f} to {:.3f}", capture.near_plane, capture.far_plane));
-  if (!capture.points.empty()) {
-    row("points", fmt::format("{} in {}", capture.points.dim(0), box(found.points_low, found.points_high)));
-  }
-  if (capture.has_masks) row("masks", fmt::format("cover {:.1f}% of the pixels", 100 * found.pixels.masked));
-  if (capture.has_normal_priors) {
-    row("normal priors", fmt::format("axes {}, on {:.1f}% of the pixels", prior_axes_name(capture.prior_axes),
-                                     100 * found.pixels.with_prior));
-  }
-  for (const std::string& text : found.missing) row("missing", text);
-  for (const std::string& text : found.warnings) row("warning", text);
-  if (found.warnings.empty()) row("warnings", "none");
 }
 
 }  // namespace
@@ -113,22 +44,22 @@ void print(const Capture& capture, const Inspection& found) {
 void add_inspect(CLI::App& program) {
   CLI::App* verb =
       program.add_subcommand("inspect", "Tell what a capture holds, what it lacks, and what looks wrong.");
-  const auto folder = std::make_shared<std::string>();
-  const auto as_json = std::make_shared<bool>(false);
-  const auto options = std::make_shared<CaptureOptions>();
-  verb->add_option("-d,--data", *folder, "The capture's folder.")->required();
-  verb->add_flag("--json", *as_json, "Print one JSON object (docs/inspect.md).");
-  const OptionArguments arguments(*verb, option_fields(*options));
-  verb->callback([=] {
-    arguments.apply(option_fields(*options));
-    const Capture capture = load_capture(*folder, *options);
-    const Inspection found = inspect(capture);
-    if (*as_json) {
-      fmt::print("{}\n", to_json(capture, found).dump(2));
-    } else {
-      print(capture, found);
-    }
-  });
+  const auto arguments = std::make_shared<InspectArguments>();
+  verb->add_option("-d,--data", arguments->data, "The capture: a folder or a zip archive")
+      ->required()
+      ->option_text("CAPTURE");
+  verb->add_flag("--json", arguments->as_json, "Print one JSON object (docs/inspect.md)");
+  verb->add_option("--picture", arguments->picture, "Draw views, cameras and points into this PNG")
+      ->option_text("FILE");
+  verb->add_flag("--quick", arguments->quick, "Decode 32 views of each split and do not compare neighbours");
+  verb->add_option("--preset", arguments->preset_name,
+                   "Whose memory is told, with the settings below: as in train")
+      ->option_text("NAME")
+      ->capture_default_str();
+  const auto defaults = std::make_shared<TrainOptions>();
+  const auto given =
+      std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
+  verb->callback([arguments, given] { inspect_capture(*arguments, *given); });
 }
 
 }  // namespace traceflow::cli

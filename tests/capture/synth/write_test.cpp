@@ -114,7 +114,7 @@ TEST(SynthWrite, ReaderFindsWhatWasWritten) {
   EXPECT_TRUE(capture.has_masks);
   EXPECT_TRUE(capture.has_normal_priors);
   EXPECT_TRUE(capture.has_truth);
-  EXPECT_TRUE(capture.warnings.empty()) << capture.warnings.front();
+  EXPECT_TRUE(capture.warnings.empty()) << capture.warnings.front().text;
   ASSERT_EQ(capture.train.size(), 6U);
   ASSERT_EQ(capture.test.size(), 1U);
 

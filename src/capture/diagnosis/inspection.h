@@ -17,12 +17,20 @@ struct Inspection {
     int64_t times = 0;  // different ones
     double first_time = 0, last_time = 0;
   };
-  // Over some views that were decoded, spread evenly. Shares are of pixels.
+  // Over the views that were decoded. Shares are of pixels.
   struct Pixels {
     int64_t views = 0;
     double mean_colour = 0;  // in [0, 1]
     double masked = 0;
     double with_prior = 0;
+    double prior_angle =
+        0;  // degrees, median over the views, against planes through the points; 0: not known
+  };
+  // Over the training views, by a sample of the points. Shares are of points.
+  struct Sight {
+    double in_view = 0;  // in one view's image: median over the views
+    double unseen = 0;   // in no view's image
+    double behind = 0;   // behind every camera
   };
 
   Split train, test;
@@ -31,16 +39,19 @@ struct Inspection {
   int box_factor = 1;
   int64_t resampled_views = 0;  // with distortion or skew
   double largest_zoom = 1;
+  int64_t decoded_bytes = 0;                   // of all views, as they are kept
   Vec3<double> camera_low{0}, camera_high{0};  // box of the training cameras, scene units
   double camera_turn_degrees = 0;              // largest angle between the axes of two training cameras
   double field_of_view_degrees = 0;            // horizontal, of the first training camera
   Vec3<double> points_low{0}, points_high{0};
+  Sight sight;
   Pixels pixels;
-  std::vector<std::string> missing;   // what the capture could have and does not
-  std::vector<std::string> warnings;  // the capture's, and what its pixels show
+  std::vector<std::string> missing;  // what the capture could have and does not
+  std::vector<Finding> findings;     // loading's, and those of all checks; problems first
 };
 
-// Decodes up to `views_to_decode` views of each split; files that cannot be read become warnings.
-Inspection inspect(const Capture& capture, int64_t views_to_decode = 32);
+// quick: up to 32 views of each split, spread evenly, are decoded instead of all, and not compared with their
+// neighbours in time. Files that cannot be read become findings.
+Inspection inspect(const Capture& capture, bool quick = false);
 
 }  // namespace traceflow

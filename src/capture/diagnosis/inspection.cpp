@@ -1,13 +1,13 @@
-#include "capture/inspect.h"
+#include "capture/diagnosis/inspection.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <set>
 
-#include "base/error.h"
 #include "base/parallel.h"
+#include "capture/diagnosis/checks.h"
+#include "capture/diagnosis/robust.h"
 #include "capture/image_cache.h"
 
 namespace traceflow {
@@ -15,6 +15,7 @@ namespace traceflow {
 namespace {
 
 constexpr double degrees = 180 / std::numbers::pi;
+constexpr int64_t quick_views = 32;
 
 Inspection::Split inspect_split(const Capture& capture, const std::vector<View>& views) {
   Inspection::Split split;
@@ -36,18 +37,22 @@ Inspection::Split inspect_split(const Capture& capture, const std::vector<View>&
   return split;
 }
 
-void inspect_cameras(const Capture& capture, Inspection& result) {
+void inspect_images(const Capture& capture, Inspection& result) {
   for (const auto* split : {&capture.train, &capture.test}) {
     for (const View& view : *split) {
       const ViewSource& source = capture.images->source(view.id);
       ++result.sizes[{view.camera.width, view.camera.height}];
       result.resampled_views += source.lens.is_pinhole() ? 0 : 1;
       result.largest_zoom = std::max(result.largest_zoom, source.zoom);
+      result.decoded_bytes += capture.images->bytes_of(view.id);
     }
   }
   const ViewSource& first = capture.images->source(capture.train.front().id);
   result.image_folder = std::filesystem::path(first.image.path).parent_path().string();
   result.box_factor = first.factor;
+}
+
+void inspect_cameras(const Capture& capture, Inspection& result) {
   const Camera<float>& camera = capture.train.front().camera;
   const double left = camera.centre_x / camera.focal_x;
   const double right = (static_cast<double>(camera.width) - camera.centre_x) / camera.focal_x;
@@ -82,7 +87,13 @@ void list_missing(const Capture& capture, Inspection& result) {
   if (!capture.has_normal_priors) result.missing.emplace_back("normal priors (the loss on them is left out)");
   if (capture.test.empty()) result.missing.emplace_back("test views (nothing to evaluate on)");
   if (!capture.has_truth) result.missing.emplace_back("truth for normals and depth (no figures for them)");
-  if (!(capture.far_plane > 0)) result.missing.emplace_back("near and far in scene.json");
+  if (!(capture.far_plane > 0)) result.missing.emplace_back("near and far planes");
+}
+
+// What stands in the list of what is missing needs no second line.
+void take_warnings(const Capture& capture, Findings& findings) {
+  std::copy_if(capture.warnings.begin(), capture.warnings.end(), std::back_inserter(findings),
+               [](const Finding& f) { return f.kind != "no-points" && f.kind != "no-test"; });
 }
 
 std::vector<const View*> spread(const std::vector<View>& views, int64_t count) {
@@ -94,103 +105,77 @@ std::vector<const View*> spread(const std::vector<View>& views, int64_t count) {
   return chosen;
 }
 
-// What one view's pixels show.
-struct ViewPixels {
-  double mean_colour = 0;
-  bool is_uniform = true;
-  std::optional<double> masked, with_prior;
-  std::string broken;
-};
-
-ViewPixels inspect_view(const Capture& capture, const View& view) {
-  ViewPixels result;
-  try {
-    const auto images = load_images(capture, view);
-    double sum = 0;
-    for (const float v : images->colour.values()) {
-      sum += v;
-      result.is_uniform &= v == images->colour[0];
-    }
-    result.mean_colour = sum / static_cast<double>(images->colour.size());
-    if (!images->mask.empty()) {
-      const auto on = std::count(images->mask.data(), images->mask.data() + images->mask.size(), uint8_t{1});
-      result.masked = static_cast<double>(on) / static_cast<double>(images->mask.size());
-    }
-    if (!images->normal_prior.empty()) {
-      int64_t known = 0;
-      for (int64_t i = 0; i < images->normal_prior.size(); i += 3) {
-        known += load3<float>(&images->normal_prior[i]) != Vec3<float>(0) ? 1 : 0;
-      }
-      result.with_prior = 3 * static_cast<double>(known) / static_cast<double>(images->normal_prior.size());
-    }
-    load_truth(capture, view);
-  } catch (const InputError& error) {
-    result.broken = error.what();
+std::vector<ViewFacts> measure_views(const Capture& capture, bool quick) {
+  std::vector<const View*> views;
+  for (const auto* split : {&capture.train, &capture.test}) {
+    const auto chosen = spread(*split, quick ? quick_views : static_cast<int64_t>(split->size()));
+    views.insert(views.end(), chosen.begin(), chosen.end());
   }
-  return result;
-}
-
-// Mean of the values that exist, 0 where none does.
-template <class F>
-double mean_of(const std::vector<ViewPixels>& views, F&& value) {
-  double sum = 0;
-  int64_t count = 0;
-  for (const ViewPixels& view : views) {
-    const std::optional<double> v = view.broken.empty() ? value(view) : std::nullopt;
-    if (!v) continue;
-    sum += *v;
-    ++count;
-  }
-  return count > 0 ? sum / static_cast<double>(count) : 0;
-}
-
-void inspect_pixels(const Capture& capture, int64_t count, Inspection& result) {
-  std::vector<const View*> views = spread(capture.train, count);
-  for (const View* view : spread(capture.test, count)) views.push_back(view);
-  std::vector<ViewPixels> pixels(views.size());
+  const SurfacePoints surface(capture.has_normal_priors ? capture.points : Tensor<float>());
+  std::vector<ViewFacts> facts(views.size());
   parallel_for(
       "inspect: views", static_cast<int64_t>(views.size()),
-      [&](int64_t i) {
-        pixels[static_cast<size_t>(i)] = inspect_view(capture, *views[static_cast<size_t>(i)]);
+      [&](int64_t n) {
+        const auto i = static_cast<size_t>(n);
+        facts[i] = measure_view(capture, *views[i], surface);
       },
       1);
+  return facts;
+}
 
-  int64_t uniform = 0;
-  for (const ViewPixels& view : pixels) {
-    if (!view.broken.empty()) result.warnings.push_back(view.broken);
-    uniform += view.broken.empty() && view.is_uniform ? 1 : 0;
-    result.pixels.views += view.broken.empty() ? 1 : 0;
+// The values that exist, of views that could be read.
+template <class F>
+std::vector<double> values_of(const std::vector<ViewFacts>& facts, F&& value) {
+  std::vector<double> values;
+  for (const ViewFacts& view : facts) {
+    const std::optional<double> v = view.broken.empty() ? value(view) : std::nullopt;
+    if (v) values.push_back(*v);
   }
-  result.pixels.mean_colour =
-      mean_of(pixels, [](const ViewPixels& v) { return std::optional(v.mean_colour); });
-  result.pixels.masked = mean_of(pixels, [](const ViewPixels& v) { return v.masked; });
-  result.pixels.with_prior = mean_of(pixels, [](const ViewPixels& v) { return v.with_prior; });
-  if (uniform > 0)
-    result.warnings.push_back(std::to_string(uniform) + " of the decoded views are of one colour");
-  if (capture.has_masks && result.pixels.masked > 0.6) {
-    result.warnings.emplace_back(
-        "the masks cover most of the image: mask/ has the object white, resized_mask/ black; are they the "
-        "other way round?");
-  }
-  if (capture.has_masks && result.pixels.views > 0 && result.pixels.masked == 0) {
-    result.warnings.emplace_back("the masks are empty");
-  }
-  if (capture.has_normal_priors && result.pixels.with_prior < 0.1) {
-    result.warnings.emplace_back("the normal priors are almost empty");
-  }
+  return values;
+}
+
+double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return values.empty() ? 0 : sum / static_cast<double>(values.size());
+}
+
+Inspection::Pixels sum_up(const std::vector<ViewFacts>& facts) {
+  const auto colours = values_of(facts, [](const ViewFacts& v) { return std::optional(v.mean_colour); });
+  Inspection::Pixels pixels;
+  pixels.views = static_cast<int64_t>(colours.size());
+  pixels.mean_colour = mean(colours);
+  pixels.masked = mean(values_of(facts, [](const ViewFacts& v) { return v.masked; }));
+  pixels.with_prior = mean(values_of(facts, [](const ViewFacts& v) { return v.with_prior; }));
+  pixels.prior_angle = median(values_of(facts, [](const ViewFacts& v) { return v.prior_angle; }));
+  return pixels;
 }
 
 }  // namespace
 
-Inspection inspect(const Capture& capture, int64_t views_to_decode) {
+Inspection inspect(const Capture& capture, bool quick) {
   Inspection result;
-  result.warnings = capture.warnings;
+  take_warnings(capture, result.findings);
   result.train = inspect_split(capture, capture.train);
   result.test = inspect_split(capture, capture.test);
+  inspect_images(capture, result);
   inspect_cameras(capture, result);
   inspect_points(capture, result);
   list_missing(capture, result);
-  inspect_pixels(capture, views_to_decode, result);
+
+  check_positions(capture, result.findings);
+  check_directions(capture, result.findings);
+  check_times(capture, result.findings);
+  result.sight = check_points(capture, result.findings);
+
+  const std::vector<ViewFacts> facts = measure_views(capture, quick);
+  result.pixels = sum_up(facts);
+  check_pictures(facts, result.findings);
+  if (!quick) check_neighbours(capture, facts, result.findings);
+  check_masks(facts, result.findings);
+  check_priors(facts, result.findings);
+  std::stable_sort(result.findings.begin(), result.findings.end(),
+                   [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
   return result;
 }
 

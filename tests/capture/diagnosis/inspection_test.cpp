@@ -1,8 +1,8 @@
-#include "capture/inspect.h"
+#include "capture/diagnosis/inspection.h"
 
 #include <gtest/gtest.h>
 
-#include "fake_capture.h"
+#include "../fake_capture.h"
 #include "files/npy.h"
 
 namespace traceflow {
@@ -11,6 +11,10 @@ namespace {
 bool names(const std::vector<std::string>& texts, const std::string& part) {
   return std::any_of(texts.begin(), texts.end(),
                      [&](const std::string& text) { return text.find(part) != std::string::npos; });
+}
+bool names(const std::vector<Finding>& findings, const std::string& part) {
+  return std::any_of(findings.begin(), findings.end(),
+                     [&](const Finding& f) { return f.text.find(part) != std::string::npos; });
 }
 
 TEST(Inspect, counts_what_is_there) {
@@ -65,16 +69,16 @@ TEST(Inspect, tells_what_is_missing_and_what_looks_wrong) {
   fake.write_image("mask/1x/000000.png.png", mask);
   fake.save();
   const Inspection found = inspect(load_capture(fake.path(), {}));
-  EXPECT_TRUE(names(found.missing, "points ("));
+  EXPECT_TRUE(names(found.missing, "points"));
   EXPECT_TRUE(names(found.missing, "normal priors"));
   EXPECT_TRUE(names(found.missing, "test views"));
   EXPECT_TRUE(names(found.missing, "near and far"));
-  EXPECT_TRUE(names(found.warnings, "of one colour"));
-  EXPECT_TRUE(names(found.warnings, "the other way round"));
-  EXPECT_TRUE(names(found.warnings, "cannot move"));
+  EXPECT_TRUE(names(found.findings, "of one colour"));
+  EXPECT_TRUE(names(found.findings, "the other way round"));
+  EXPECT_TRUE(names(found.findings, "cannot move"));
 }
 
-TEST(Inspect, broken_images_become_warnings) {
+TEST(Inspect, broken_images_become_findings) {
   NerfDsCapture fake;
   fake.save();
   const Capture capture = load_capture(fake.path(), {});
@@ -82,7 +86,7 @@ TEST(Inspect, broken_images_become_warnings) {
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
   const Inspection found = inspect(capture);
   EXPECT_EQ(found.pixels.views, 7);
-  EXPECT_TRUE(names(found.warnings, "000002_left.png"));
+  EXPECT_TRUE(names(found.findings, "000002_left.png"));
 }
 
 }  // namespace

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "capture/formats/found_capture.h"
+
+namespace traceflow {
+
+// Paths of images that lie beside those of the views and belong to no id that the capture lists. An image
+// named like a listed one with something behind ("r_0_depth_0001.png" to r_0) counts as belonging to it.
+std::vector<std::string> unregistered_images(const FileTree& tree, const FoundCapture& found);
+
+}  // namespace traceflow

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "show/capture_picture/palette.h"
+
+namespace traceflow::show {
+
+// From where a map is seen: world directions that point to the right and up in it.
+struct MapAxes {
+  Vec3<double> right, up;
+};
+// From above, the cameras' mean way of looking pointing up; and from the side, it pointing right. Up is the
+// mean of what the cameras have up.
+struct MapViews {
+  MapAxes top, side;
+};
+MapViews map_views(const Capture& capture);
+
+// Cameras as dots with the direction that they look in, and points, without perspective, size pixels. Marked
+// cameras have a red ring, test ones a white square. The picture holds the cameras that are not marked and
+// nine tenths of the points; who is outside stands at its border.
+Tensor<uint8_t> camera_map(const Capture& capture, const Marks& marks, const MapAxes& axes,
+                           const std::string& title, const Pixel& size);
+
+}  // namespace traceflow::show

@@ -1,0 +1,117 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "capture/synth/synth.h"
+#include "cli/program.h"
+#include "cli/terminal/error_boundary.h"
+#include "files/png.h"
+#include "support/temp_folder.h"
+
+// `inspect` on a capture that lacks a picture and a mask, and what `train` says of them.
+namespace traceflow::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using Json = nlohmann::json;
+
+struct Result {
+  int code;
+  std::string out, error;
+};
+Result run_verb(std::vector<std::string> words) {
+  words.insert(words.begin(), "traceflow");
+  std::vector<const char*> arguments;
+  arguments.reserve(words.size());
+  for (const std::string& word : words) arguments.push_back(word.c_str());
+  testing::internal::CaptureStderr();
+  testing::internal::CaptureStdout();
+  const int code = run(static_cast<int>(arguments.size()), arguments.data());
+  return {code, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
+}
+
+class InspectVerb : public testing::Test {
+ protected:
+  InspectVerb() {
+    SynthOptions options;
+    options.frames = 5;
+    options.width = 40;
+    options.height = 24;
+    options.samples = 2;
+    options.points = 200;
+    options.test_every = 2;
+    write_synthetic_capture(options, folder_ / "capture");
+    std::filesystem::remove(folder_ / "capture/rgb/1x/000001_left.png");
+    std::filesystem::remove(folder_ / "capture/mask/1x/000002_left.png.png");
+  }
+  std::string capture() const { return (folder_ / "capture").string(); }
+
+  TempFolder folder_;
+};
+
+const Json& finding(const Json& report, const std::string& kind) {
+  static const Json none;
+  for (const Json& f : report["findings"]) {
+    if (f["kind"] == kind) return f;
+  }
+  return none;
+}
+
+TEST_F(InspectVerb, says_each_problem_in_a_line_with_its_paths) {
+  const Result told = run_verb({"inspect", "-d", capture()});
+  EXPECT_EQ(told.code, exit_done) << told.error;
+  EXPECT_THAT(told.out,
+              HasSubstr("\nproblem         1 of 5 training views have no image (000001_left): left out\n"
+                        "                rgb/1x/000001_left.png\n"));
+  EXPECT_THAT(told.out, HasSubstr("\nproblem         1 of 4 training views have no mask (000002_left)\n"));
+  EXPECT_THAT(told.out, HasSubstr("\nmemory "));
+}
+
+TEST_F(InspectVerb, says_them_for_programs) {
+  const Result told = run_verb({"inspect", "-d", capture(), "--json", "--preset", "demo"});
+  ASSERT_EQ(told.code, exit_done) << told.error;
+  const Json report = Json::parse(told.out);
+  EXPECT_EQ(finding(report, "missing-image")["severity"], "problem");
+  EXPECT_EQ(finding(report, "missing-image")["files"], Json({"rgb/1x/000001_left.png"}));
+  EXPECT_EQ(finding(report, "missing-mask")["views"], Json({"000002_left"}));
+  EXPECT_EQ(finding(report, "missing-mask")["value"], nullptr);
+  EXPECT_GT(report["memory"]["training_cpu_bytes"], report["memory"]["decoded_bytes"]);
+
+  // Fewer surfels take less memory; the preset is the one that was asked for.
+  const Json small = Json::parse(
+      run_verb({"inspect", "-d", capture(), "--json", "--preset", "demo", "--set", "density.max_surfels=100"})
+          .out);
+  const Json paper = Json::parse(run_verb({"inspect", "-d", capture(), "--json", "--quick"}).out);
+  EXPECT_LT(small["memory"]["training_cpu_bytes"], report["memory"]["training_cpu_bytes"]);
+  EXPECT_GT(paper["memory"]["training_cuda_bytes"], report["memory"]["training_cuda_bytes"]);
+}
+
+TEST_F(InspectVerb, draws_a_picture) {
+  const std::string picture = (folder_ / "picture.png").string();
+  ASSERT_EQ(run_verb({"inspect", "-d", capture(), "--picture", picture}).code, exit_done);
+  EXPECT_EQ(read_png_size(picture).width, 1200);
+}
+
+TEST_F(InspectVerb, training_says_and_logs_what_loading_found) {
+  const std::string run = (folder_ / "run").string();
+  const Result trained = run_verb(
+      {"train", "-d", capture(), "-o", run, "--preset", "demo", "-i", "1", "--set", "deform.network.width=16",
+       "--set", "deform.environment_network.width=16", "--set", "initial.environment_cells=4"});
+  ASSERT_EQ(trained.code, exit_done) << trained.error;
+  EXPECT_THAT(trained.error, HasSubstr("warning: 1 of 5 training views have no image (000001_left)"));
+  EXPECT_THAT(trained.error, HasSubstr("warning: 1 of 4 training views have no mask (000002_left)"));
+  std::ifstream log(folder_ / "run/log.jsonl");
+  std::vector<std::string> warnings;
+  for (std::string line; std::getline(log, line);) {
+    const Json event = Json::parse(line);
+    if (event["event"] == "warning") warnings.push_back(event["text"]);
+  }
+  EXPECT_THAT(warnings, testing::Contains(HasSubstr("no image (000001_left)")));
+  EXPECT_THAT(warnings, testing::Contains(HasSubstr("no mask (000002_left)")));
+}
+
+}  // namespace
+}  // namespace traceflow::cli

@@ -1,0 +1,63 @@
+#include "show/capture_picture/camera_map.h"
+
+#include <gtest/gtest.h>
+
+namespace traceflow::show {
+namespace {
+
+// A camera at `from` that looks along world y, z being up.
+View view(const std::string& id, float time, const Vec3<float>& from) {
+  Camera<float> camera;
+  camera.width = 40;
+  camera.height = 30;
+  camera.focal_x = camera.focal_y = 40;
+  camera.camera_from_world =
+      transpose(Mat3<float>(Vec3<float>(1, 0, 0), Vec3<float>(0, 0, -1), Vec3<float>(0, 1, 0)));
+  camera.position = from;
+  return {id, time, camera};
+}
+
+bool has(const Tensor<uint8_t>& picture, const Ink& ink, int64_t left, int64_t right) {
+  for (int64_t y = 40; y < picture.dim(0) - 30; ++y) {
+    for (int64_t x = left; x < right; ++x) {
+      const uint8_t* p = &picture(y, x, 0);
+      if (p[0] == ink.red && p[1] == ink.green && p[2] == ink.blue) return true;
+    }
+  }
+  return false;
+}
+
+TEST(CameraMap, knows_up_and_ahead_from_the_cameras) {
+  Capture capture;
+  capture.train = {view("a", 0, {-1, 0, 0}), view("b", 1, {1, 0, 0})};
+  const MapViews views = map_views(capture);
+  EXPECT_NEAR(distance(views.top.right, Vec3<double>(1, 0, 0)), 0, 1e-6);
+  EXPECT_NEAR(distance(views.top.up, Vec3<double>(0, 1, 0)), 0, 1e-6);
+  EXPECT_NEAR(distance(views.side.right, Vec3<double>(0, 1, 0)), 0, 1e-6);
+  EXPECT_NEAR(distance(views.side.up, Vec3<double>(0, 0, 1)), 0, 1e-6);
+}
+
+TEST(CameraMap, shows_cameras_in_their_times_colours_and_marked_ones_ringed_at_the_border) {
+  Capture capture;
+  capture.train = {view("a", 0, {-1, 0, 0}), view("b", 1, {1, 0, 0}), view("far", 0.5F, {900, 0, 0})};
+  capture.test = {view("t", 0.5F, {0, 0, 0})};
+  const Marks marks{{"far", "camera-apart"}};
+  const Tensor<uint8_t> map = camera_map(capture, marks, map_views(capture).top, "top", {300, 200});
+  EXPECT_TRUE(has(map, time_ink(0), 0, 60));
+  EXPECT_FALSE(has(map, time_ink(0), 60, 300));
+  EXPECT_TRUE(has(map, time_ink(1), 240, 300));
+  EXPECT_TRUE(has(map, test_ink, 130, 170)) << "the test camera's square";
+  EXPECT_TRUE(has(map, alarm_ink, 270, 300)) << "who is outside stands at the border";
+  EXPECT_FALSE(has(map, alarm_ink, 0, 270));
+}
+
+TEST(CameraMap, of_one_camera_and_of_none_that_is_not_marked) {
+  Capture capture;
+  capture.train = {view("a", 0, {5, 5, 5})};
+  EXPECT_EQ(camera_map(capture, {}, map_views(capture).top, "", {50, 40}).shape(), (Shape{40, 50, 3}));
+  EXPECT_EQ(camera_map(capture, {{"a", "x"}}, map_views(capture).side, "", {50, 40}).shape(),
+            (Shape{40, 50, 3}));
+}
+
+}  // namespace
+}  // namespace traceflow::show
