@@ -45,26 +45,8 @@ Tensor<float> normals_on_view_grid(const ViewSource& view, Tensor<float> normals
   return normals;
 }
 
-// From numbers v, `full` being 1, as 2v - 1.
-template <class T>
-Tensor<float> normals_of(const Tensor<T>& pixels, float full) {
-  // A unit vector never comes near such a length: black and white say "no value".
-  constexpr float longest = 1.5F;
-  Tensor<float> normals({pixels.dim(0), pixels.dim(1), 3});
-  for (int64_t i = 0; i < normals.size() / 3; ++i) {
-    const Vec3<float> n = 2.0F * load3<float>(&pixels[i * pixels.dim(2)]) / full - 1.0F;
-    store3(&normals[3 * i], glm::length(n) < longest ? n : Vec3<float>(0));
-  }
-  return normals;
-}
-
-Tensor<float> read_normal_image(const TreeFile& tree_file) {
-  const InputFile file = tree_file.open();
-  const ImageSize size = read_image_size(file);
-  if (size.channels < 3) {
-    throw InputError(tree_file.name(), "channels", std::to_string(size.channels), "3 (normals as 2v - 1)");
-  }
-  return size.bits > 8 ? normals_of(read_image16(file), 65535) : normals_of(read_image(file), 255);
+Tensor<float> read_normal_image(const TreeFile& file) {
+  return normals_of_picture(read_image16(file.open()), file.name());
 }
 
 Tensor<float> read_depth(const TreeFile& file) {
@@ -114,6 +96,19 @@ Tensor<uint8_t> over(uint8_t background, const Tensor<uint8_t>& pixels) {
 }
 
 }  // namespace
+
+Tensor<float> normals_of_picture(const Tensor<uint16_t>& picture, const std::string& name) {
+  // A unit vector never comes near such a length: black and white say "no value".
+  constexpr float longest = 1.5F, full = 65535;
+  const int64_t channels = picture.dim(2);
+  if (channels < 3) throw InputError(name, "channels", std::to_string(channels), "3 (normals as 2v - 1)");
+  Tensor<float> normals({picture.dim(0), picture.dim(1), 3});
+  for (int64_t i = 0; i < normals.size() / 3; ++i) {
+    const Vec3<float> n = 2.0F * load3<float>(&picture[i * channels]) / full - 1.0F;
+    store3(&normals[3 * i], glm::length(n) < longest ? n : Vec3<float>(0));
+  }
+  return normals;
+}
 
 Tensor<uint8_t> decode_colour(const ViewSource& view) {
   const Tensor<uint8_t> pixels = read_image(view.image.open());

@@ -14,6 +14,10 @@ Tensor<uint8_t> decode_mask(const ViewSource& view);    // H×W of 0 and 1
 Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture);
 ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture);
 
+// The normals 2v − 1 of a picture H×W×C (C ≥ 3) with values v, zero where it says "none": H×W×3, not yet
+// unit. Throws InputError naming the picture where it has too few channels.
+Tensor<float> normals_of_picture(const Tensor<uint16_t>& picture, const std::string& name);
+
 // Turns unit or zero normals from the prior's axes to world.
 void turn_to_world(Tensor<float>& normals, const ViewSource& view, const Vec3<double>& signs);
 

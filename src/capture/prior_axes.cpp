@@ -43,14 +43,6 @@ std::string signs_text(const Vec3<double>& correlation) {
   return text;
 }
 
-bool agrees(PriorAxes axes, const Vec3<double>& correlation) {
-  const Vec3<double> signs = prior_axis_signs(axes);
-  for (int axis = 0; axis < 3; ++axis) {
-    if (std::abs(correlation[axis]) >= clear && correlation[axis] * signs[axis] < 0) return false;
-  }
-  return true;
-}
-
 }  // namespace
 
 Vec3<double> prior_axis_signs(PriorAxes axes) {
@@ -66,6 +58,15 @@ Vec3<double> prior_axis_signs(PriorAxes axes) {
 
 std::string prior_axes_name(PriorAxes axes) {
   return std::string(enum_names(axes)[static_cast<size_t>(axes)]);
+}
+
+bool agrees(PriorAxes axes, const AxisEvidence& evidence) {
+  const Vec3<double> signs = prior_axis_signs(axes);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double correlation = evidence.correlation[axis];
+    if (std::abs(correlation) >= clear && correlation * signs[axis] < 0) return false;
+  }
+  return true;
 }
 
 AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<PriorView>& views) {
@@ -92,9 +93,9 @@ AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<P
 
 AxisChoice choose_prior_axes(PriorAxes asked, const AxisEvidence& evidence) {
   const PriorAxes preferred = asked == PriorAxes::automatic ? PriorAxes::opengl : asked;
-  if (agrees(preferred, evidence.correlation)) return {preferred, ""};
+  if (agrees(preferred, evidence)) return {preferred, ""};
   const auto better = std::find_if(named_axes.begin(), named_axes.end(),
-                                   [&](PriorAxes axes) { return agrees(axes, evidence.correlation); });
+                                   [&](PriorAxes axes) { return agrees(axes, evidence); });
   const std::string disagrees = "normal priors: the axes " + prior_axes_name(preferred) +
                                 " disagree with the geometry, which reads " +
                                 signs_text(evidence.correlation) + " against x right, y down, z forward";

@@ -30,6 +30,9 @@ struct AxisEvidence {
 // nearer one hides. Without points only z is known: what is seen faces the camera.
 AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<PriorView>& views);
 
+// Whether no axis that the evidence decides points the other way in these axes, of any but `automatic`.
+bool agrees(PriorAxes axes, const AxisEvidence& evidence);
+
 // The axes to use for what was asked, and a warning where the evidence speaks against them (empty: none).
 struct AxisChoice {
   PriorAxes axes = PriorAxes::opengl;

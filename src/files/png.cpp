@@ -40,20 +40,22 @@ void write_bytes(png_structp png, png_bytep bytes, size_t count) {
   if (!ok) png_error(png, "out of memory");
 }
 
-bool encode(png_structp png, png_infop info, png_uint_32 width, png_uint_32 height, int colour_type,
+bool encode(png_structp png, png_infop info, png_uint_32 width, png_uint_32 height, int bits, int colour_type,
             png_bytepp rows) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_user_limits(png, max_side, max_side);
-  png_set_IHDR(png, info, width, height, 8, colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+  png_set_IHDR(png, info, width, height, bits, colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
+  if (bits == 16) png_set_swap(png);  // a PNG has the high byte first
   png_write_image(png, rows);
   png_write_end(png, info);
   return true;
 }
 
 // where: for errors.
-std::string encoded(const std::string& where, const Tensor<uint8_t>& pixels) {
+template <class T>
+std::string encoded(const std::string& where, const Tensor<T>& pixels) {
   const int rank = pixels.shape().rank();
   require(rank == 2 || (rank == 3 && pixels.dim(2) >= 1 && pixels.dim(2) <= 4),
           "an image is H×W or H×W×C, C ≤ 4", pixels.shape().to_string());
@@ -63,7 +65,7 @@ std::string encoded(const std::string& where, const Tensor<uint8_t>& pixels) {
   const int64_t channels = rank == 2 ? 1 : pixels.dim(2);
   std::vector<png_bytep> rows(static_cast<size_t>(pixels.dim(0)));
   for (size_t y = 0; y < rows.size(); ++y) {
-    rows[y] = const_cast<png_bytep>(pixels.row(static_cast<int64_t>(y)));
+    rows[y] = reinterpret_cast<png_bytep>(const_cast<T*>(pixels.row(static_cast<int64_t>(y))));
   }
 
   PngSink sink;
@@ -74,8 +76,9 @@ std::string encoded(const std::string& where, const Tensor<uint8_t>& pixels) {
     throw std::bad_alloc();
   }
   png_set_write_fn(png, &sink, write_bytes, nullptr);
-  const bool ok = encode(png, info, static_cast<png_uint_32>(pixels.dim(1)),
-                         static_cast<png_uint_32>(pixels.dim(0)), colour_types[channels - 1], rows.data());
+  const bool ok =
+      encode(png, info, static_cast<png_uint_32>(pixels.dim(1)), static_cast<png_uint_32>(pixels.dim(0)),
+             8 * static_cast<int>(sizeof(T)), colour_types[channels - 1], rows.data());
   png_destroy_write_struct(&png, &info);
   if (!ok) throw InputError(where, "", sink.error, "an image of at most 32,768 pixels a side");
   return std::move(sink.bytes);
@@ -84,6 +87,10 @@ std::string encoded(const std::string& where, const Tensor<uint8_t>& pixels) {
 }  // namespace
 
 void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels) {
+  write_atomically(path, std::string_view(encoded(path.string(), pixels)));
+}
+
+void write_png(const std::filesystem::path& path, const Tensor<uint16_t>& pixels) {
   write_atomically(path, std::string_view(encoded(path.string(), pixels)));
 }
 

@@ -23,8 +23,9 @@ struct PngSize {
 };
 PngSize read_png_size(const InputFile& file);
 PngSize read_png_size(const std::filesystem::path& path);
-// pixels: H×W (grey) or H×W×C. Written atomically.
+// pixels: H×W (grey) or H×W×C, of 8 or 16 bits. Written atomically.
 void write_png(const std::filesystem::path& path, const Tensor<uint8_t>& pixels);
+void write_png(const std::filesystem::path& path, const Tensor<uint16_t>& pixels);
 // The file's bytes. Throws InputError for more than 32,768 pixels a side.
 std::string png_bytes(const Tensor<uint8_t>& pixels);
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <sys/types.h>
-
 #include <filesystem>
+#include <optional>
 
+#include "base/process.h"
 #include "base/tensor.h"
 
 namespace traceflow::show {
@@ -33,8 +33,8 @@ class Video {
   std::filesystem::path path_;
   double frames_per_second_;
   Shape size_;
-  pid_t process_ = -1;
-  int pipe_ = -1;
+  std::optional<Process> process_;
+  Descriptor pipe_;
 };
 
 }  // namespace traceflow::show

@@ -6,6 +6,7 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/option_fields.h"
+#include "capture/formats/nerfies_writer.h"
 #include "capture/synth/synth.h"
 #include "files/npy.h"
 #include "files/png.h"
@@ -58,21 +59,6 @@ json as_json(const SynthOptions& options) {
 
 void write_json(const fs::path& path, const json& value) { write_atomically(path, value.dump(1) + "\n"); }
 
-json as_json(const Vec3<double>& v) { return {v.x, v.y, v.z}; }
-
-json as_json(const Camera<double>& camera) {
-  const Mat3<double> rows = glm::transpose(camera.camera_from_world);
-  return {{"orientation", {as_json(rows[0]), as_json(rows[1]), as_json(rows[2])}},
-          {"position", as_json(camera.position)},
-          {"focal_length", camera.focal_x},
-          {"principal_point", {camera.centre_x, camera.centre_y}},
-          {"skew", 0.0},
-          {"pixel_aspect_ratio", 1.0},
-          {"radial_distortion", {0.0, 0.0, 0.0}},
-          {"tangential_distortion", {0.0, 0.0}},
-          {"image_size", {camera.width, camera.height}}};
-}
-
 // Unit vectors as 8-bit pictures: v = (n + 1) / 2.
 Tensor<uint8_t> normal_picture(const Tensor<float>& normal) {
   Tensor<float> values = normal;
@@ -95,7 +81,6 @@ void write_truth(const fs::path& folder, const std::string& id, const SynthImage
 
 void write_view(const SynthOptions& options, const SynthView& view, const fs::path& folder) {
   const SynthImages images = synth_images(options, view);
-  write_json(folder / "camera" / (view.id + ".json"), as_json(view.camera));
   write_png(folder / "rgb/1x" / (view.id + ".png"), to_8bit(images.colour));
   write_png(folder / "mask/1x" / (view.id + ".png.png"), mask_picture(images.mask));
   if (view.is_test) {
@@ -106,39 +91,12 @@ void write_view(const SynthOptions& options, const SynthView& view, const fs::pa
   }
 }
 
-json scene_json() {
-  const SceneNormalisation normalisation = synth_normalisation();
-  return {{"scale", normalisation.scale},
-          {"center", as_json(normalisation.centre)},
-          {"bbox", {{-1.7, -1.7, 0.0}, {1.7, 1.7, 2.3}}},
-          {"near", synth_near},
-          {"far", synth_far}};
-}
-
-json metadata_json(const std::vector<SynthView>& views) {
-  json metadata = json::object();
+std::vector<NerfiesView> layout_of(const std::vector<SynthView>& views) {
+  std::vector<NerfiesView> layout;
   for (const SynthView& view : views) {
-    metadata[view.id] = {{"time_id", view.frame},
-                         {"warp_id", view.frame},
-                         {"appearance_id", view.frame},
-                         {"camera_id", view.is_test ? 1 : 0}};
+    layout.push_back({view.id, view.camera, view.frame, view.frame, view.is_test ? 1 : 0, view.is_test});
   }
-  return metadata;
-}
-
-json dataset_json(const std::vector<SynthView>& views) {
-  json ids = json::array();
-  json train_ids = json::array();
-  json val_ids = json::array();
-  for (const SynthView& view : views) {
-    ids.push_back(view.id);
-    (view.is_test ? val_ids : train_ids).push_back(view.id);
-  }
-  return {{"count", views.size()},
-          {"num_exemplars", train_ids.size()},
-          {"ids", ids},
-          {"train_ids", train_ids},
-          {"val_ids", val_ids}};
+  return layout;
 }
 
 }  // namespace
@@ -151,9 +109,7 @@ void write_synthetic_capture(const SynthOptions& options, const fs::path& folder
   const std::vector<SynthView> views = synth_views(options);
   for (const SynthView& view : views) write_view(options, view, folder);
   write_npy(folder / "points.npy", synth_points(options));
-  write_json(folder / "scene.json", scene_json());
-  write_json(folder / "metadata.json", metadata_json(views));
-  write_json(folder / "dataset.json", dataset_json(views));
+  write_nerfies_layout(folder, layout_of(views), {synth_normalisation(), synth_near, synth_far});
 }
 
 }  // namespace traceflow

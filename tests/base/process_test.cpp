@@ -1,0 +1,85 @@
+#include "base/process.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+#include <thread>
+
+#include "base/error.h"
+#include "support/temp_folder.h"
+
+namespace traceflow {
+namespace {
+
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Process, TellsWhetherTheProgramEndedWell) {
+  EXPECT_TRUE(Process({"sh", "-c", "exit 0"}, {}).wait());
+  EXPECT_FALSE(Process({"sh", "-c", "exit 3"}, {}).wait());
+  EXPECT_FALSE(Process({"sh", "-c", "kill -9 $$"}, {}).wait());
+}
+
+TEST(Process, ConnectsTheStreamsAndAddsToTheEnvironment) {
+  const TempFolder folder;
+  Pipe input = make_pipe();
+  const Descriptor out = open_log(folder / "out"), error = open_log(folder / "error");
+  Process process({"sh", "-c", "read line; echo \"$line $WORD\"; echo bad >&2"},
+                  {input.reading.number(), out.number(), error.number(), {"WORD=there"}});
+  ASSERT_EQ(::write(input.writing.number(), "hello\n", 6), 6);
+  EXPECT_TRUE(process.wait());
+  EXPECT_EQ(text_of(folder / "out"), "hello there\n");
+  EXPECT_EQ(text_of(folder / "error"), "bad\n");
+}
+
+TEST(Process, ArgumentsAreNoShellWords) {
+  const TempFolder folder;
+  const Descriptor out = open_log(folder / "out");
+  EXPECT_TRUE(Process({"echo", "$HOME; ls *", "a  b"}, {.output = out.number()}).wait());
+  EXPECT_EQ(text_of(folder / "out"), "$HOME; ls * a  b\n");
+}
+
+TEST(Process, AProgramThatIsNotThereIsNamed) {
+  EXPECT_TRUE(is_in_path("sh"));
+  EXPECT_FALSE(is_in_path("no-such-program-here"));
+  try {
+    Process({"no-such-program-here"}, {});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("no-such-program-here"));
+  }
+}
+
+TEST(Process, AStopEndsTheProgramAndWhatItHasStarted) {
+  const TempFolder folder;
+  const Descriptor out = open_log(folder / "out");
+  Process process({"sh", "-c", "sleep 1000 & echo $!; wait"}, {.output = out.number()});
+  while (text_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
+  const std::atomic<bool> stop = true;
+  EXPECT_FALSE(process.wait(stop));
+  const pid_t child = std::stoi(text_of(folder / "out"));
+  // Init may take a moment to bury it.
+  while (::kill(child, 0) == 0 &&
+         text_of("/proc/" + std::to_string(child) + "/stat").find(" Z ") == std::string::npos) {
+    std::this_thread::yield();
+  }
+}
+
+TEST(Process, WhatIsLeftIsEnded) {
+  pid_t id = 0;
+  {
+    const TempFolder folder;
+    const Descriptor out = open_log(folder / "out");
+    Process process({"sh", "-c", "echo $$; exec sleep 1000"}, {.output = out.number()});
+    while (text_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
+    id = std::stoi(text_of(folder / "out"));
+  }
+  EXPECT_NE(::kill(id, 0), 0);
+}
+
+}  // namespace
+}  // namespace traceflow
