@@ -1,16 +1,22 @@
 #include "base/error.h"
 
+#include "base/printable.h"
+
 namespace traceflow {
 
 namespace {
 
+// What is said of a value; a path is said whole.
+constexpr size_t longest_words = 300;
+constexpr size_t longest_path = 8192;
+
 std::string message(const std::string& where, const std::string& field, const std::string& found,
                     const std::string& expected, const std::string& remedy) {
-  std::string text = where;
-  if (!field.empty()) text += ": " + field;
-  if (!found.empty()) text += ": found " + found;
-  if (!expected.empty()) text += ", expected " + expected;
-  if (!remedy.empty()) text += "; " + remedy;
+  std::string text = printable(where, longest_path);
+  if (!field.empty()) text += ": " + printable(field, longest_words);
+  if (!found.empty()) text += ": found " + printable(found, longest_words);
+  if (!expected.empty()) text += ", expected " + printable(expected, longest_words);
+  if (!remedy.empty()) text += "; " + printable(remedy, longest_path);
   return text;
 }
 

@@ -6,7 +6,7 @@
 namespace traceflow {
 
 // Input that cannot be used: a file, an option, a capture. The program prints what() as its one line and
-// exits 2.
+// exits 2. One line that can be shown, whatever stands in the parts.
 class InputError : public std::runtime_error {
  public:
   // where: the file or option; field: the place inside it, may be empty; found, expected: values in words;

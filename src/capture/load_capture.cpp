@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/printable.h"
 #include "capture/capture.h"
 #include "capture/decode.h"
 #include "capture/extent.h"
@@ -55,6 +56,8 @@ class Assembly {
     find_priors();
     find_truth();
     choose_axes();
+    // They quote names from files.
+    for (std::string& warning : capture_.warnings) warning = printable(warning, 1000);
     capture_.images = std::make_shared<ImageCache>(std::move(sources_), std::move(shared_),
                                                    options_.cache_mebibytes * (int64_t{1} << 20));
     return std::move(capture_);

@@ -13,6 +13,8 @@ namespace {
 
 constexpr int64_t max_bytes = int64_t{64} << 20;
 constexpr int max_depth = 64;
+// A place that knows its name takes a hundred times the two bytes that an element of a list may have.
+constexpr size_t max_elements = 1'000'000;
 
 // Of brackets outside strings.
 bool nests_too_deep(std::string_view text) {
@@ -155,6 +157,8 @@ std::vector<std::string> JsonField::strings() const {
 
 std::vector<JsonField> JsonField::elements() const {
   if (!value_->is_array()) expect("a list");
+  if (value_->size() > max_elements)
+    fail(fmt::format("{} elements", value_->size()), fmt::format("{} at most", max_elements));
   std::vector<JsonField> result;
   for (size_t i = 0; i < value_->size(); ++i) result.push_back(element(i));
   return result;

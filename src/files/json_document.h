@@ -40,7 +40,7 @@ class JsonField {
   Mat3<double> rotation() const;
   // Strings; whole numbers are taken for their digits.
   std::vector<std::string> strings() const;
-  // The elements of an array, in the second case of `count`.
+  // The elements of an array, a million at most, in the second case `count`.
   std::vector<JsonField> elements() const;
   std::vector<JsonField> elements(size_t count) const;
 

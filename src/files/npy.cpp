@@ -128,6 +128,7 @@ Tensor<float> transpose(const Tensor<float>& fortran) {
   for (int r = 0; r < rank; ++r) dims[4 - rank + r] = fortran.dim(r);
   Tensor<float> result;
   result.resize(fortran.shape());
+  if (result.empty()) return result;  // of any number of empty rows
   int64_t to = 0;
   for (int64_t a = 0; a < dims[0]; ++a)
     for (int64_t b = 0; b < dims[1]; ++b)
@@ -195,14 +196,12 @@ void NpyFile::read_header(int64_t begin, int64_t end) {
   fortran_order_ = value_of(header, path(), "fortran_order").starts_with("True");
   shape_ = parse_shape(value_of(header, path(), "shape"), path());
 
-  int64_t left = (end - data_offset_) / width_;
-  bool is_empty = false;
-  for (int r = 0; r < shape_.rank(); ++r) is_empty |= shape_[r] == 0;
-  for (int r = 0; r < shape_.rank() && !is_empty; ++r) {
-    left /= shape_[r];
-    if (left == 0)
-      fail(path(), "shape", shape_.to_string(), "an array that the file holds",
-           "the file is cut short or broken");
+  int64_t elements = 1;
+  bool overflows = false;
+  for (int r = 0; r < shape_.rank(); ++r) overflows |= __builtin_mul_overflow(elements, shape_[r], &elements);
+  if (overflows || elements > (end - data_offset_) / width_) {
+    fail(path(), "shape", shape_.to_string(), "an array that the file holds",
+         "the file is cut short or broken");
   }
 }
 

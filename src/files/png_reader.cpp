@@ -95,6 +95,8 @@ class PngReader {
     png_set_user_limits(png_, max_side, max_side);
     png_set_chunk_cache_max(png_, 128);
     png_set_chunk_malloc_max(png_, 8U << 20);
+    // Text, profiles and the like are not wanted, and each may unpack to those 8 MiB.
+    png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_read_info(png_, info_);
     stored_row_bytes_ = static_cast<int64_t>(png_get_rowbytes(png_, info_));
     stored_bits_ = png_get_bit_depth(png_, info_);

@@ -30,6 +30,8 @@ class Safetensors {
   // Atomically (base/atomic_file.h). Equal contents give equal bytes.
   void write(const std::filesystem::path& path) const;
 
+  // The file that this was read from, for errors.
+  const std::string& origin() const { return origin_; }
   bool has(const std::string& name) const;
   std::vector<std::string> names() const;
   // T is float, double, int32_t, int64_t or uint8_t. Throws InputError naming the file and the tensor when it

@@ -20,12 +20,14 @@ constexpr uint32_t end64_locator_signature = 0x07064b50;
 constexpr uint32_t end64_signature = 0x06064b50;
 constexpr uint32_t directory_signature = 0x02014b50;
 constexpr uint32_t local_signature = 0x04034b50;
+// Deflate cannot grow data by more than this.
+constexpr int64_t max_inflation = 1032;
 constexpr uint32_t in_zip64_16 = 0xffff;
 constexpr uint32_t in_zip64_32 = 0xffffffff;
 
 [[noreturn]] void fail(const InputFile& file, const std::string& found) {
-  throw InputError(file.path().string(), "", found, "a zip archive as numpy.savez writes it",
-                   "save the array again");
+  throw InputError(file.path().string(), "", found, "a whole zip archive, stored or deflated",
+                   "pack or save it again");
 }
 
 // Little-endian numbers out of bytes that were read; reading past the end is a broken archive.
@@ -104,6 +106,16 @@ void apply_zip64(const Bytes& bytes, int64_t extra, int64_t extra_end, ZipMember
   }
 }
 
+void refuse_overlaps(const InputFile& file, std::vector<ZipMember> members) {
+  std::sort(members.begin(), members.end(),
+            [](const ZipMember& a, const ZipMember& b) { return a.offset < b.offset; });
+  for (size_t i = 1; i < members.size(); ++i) {
+    const ZipMember& before = members[i - 1];
+    if (members[i].offset < before.offset + std::max<int64_t>(before.stored_size, 1))
+      fail(file, "zip members on top of one another");
+  }
+}
+
 }  // namespace
 
 std::vector<ZipMember> list_zip(const InputFile& file) {
@@ -115,7 +127,8 @@ std::vector<ZipMember> list_zip(const InputFile& file) {
   for (int64_t at = 0; at + 46 <= bytes.size();) {
     if (bytes.u32(at) != directory_signature) fail(file, "a broken zip directory");
     const int64_t name = bytes.u16(at + 28), extra = bytes.u16(at + 30), comment = bytes.u16(at + 32);
-    ZipMember member{bytes.text(at + 46, name), false, 0, bytes.u32(at + 20), bytes.u32(at + 24)};
+    ZipMember member{bytes.text(at + 46, name), false, 0, bytes.u32(at + 20), bytes.u32(at + 24),
+                     bytes.u32(at + 16)};
     int64_t header = bytes.u32(at + 42);
     apply_zip64(bytes, at + 46 + name, at + 46 + name + extra, member, header);
     const uint32_t method = bytes.u16(at + 10);
@@ -129,9 +142,14 @@ std::vector<ZipMember> list_zip(const InputFile& file) {
         (!member.deflated && member.size != member.stored_size)) {
       fail(file, "a zip member outside the file");
     }
+    if (member.deflated && member.size / max_inflation > member.stored_size) {
+      fail(file, "a zip member of " + std::to_string(member.stored_size) + " bytes that unpacks to " +
+                     std::to_string(member.size));
+    }
     members.push_back(member);
     at += 46 + name + extra + comment;
   }
+  refuse_overlaps(file, members);
   return members;
 }
 
@@ -149,15 +167,28 @@ struct Inflater {
   Inflater& operator=(const Inflater&) = delete;
 };
 
+void require_room(const InputFile& file, const ZipMember& member) {
+  std::error_code error;
+  const auto folder = std::filesystem::temp_directory_path(error);
+  const auto room = std::filesystem::space(folder, error);
+  if (error || static_cast<uintmax_t>(member.size) <= room.available) return;
+  throw InputError(
+      file.path().string(), member.name, std::to_string(member.size) + " bytes to unpack",
+      "no more than the " + std::to_string(room.available) + " that " + folder.string() + " has room for",
+      "set TMPDIR to a folder with space");
+}
+
 }  // namespace
 
 InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
   constexpr size_t piece = size_t{1} << 18;
+  require_room(file, member);
   std::vector<std::byte> input(piece), output(piece);
   InputFile scratch = InputFile::scratch(file.path());
   Inflater inflater;
   z_stream& stream = inflater.stream;
   int64_t consumed = 0;
+  uLong checksum = crc32(0, nullptr, 0);
   for (int status = Z_OK; status != Z_STREAM_END;) {
     if (stream.avail_in == 0) {
       const auto count =
@@ -177,7 +208,10 @@ InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
     if (scratch.size() + static_cast<int64_t>(made) > member.size)
       fail(file, "more data than the zip directory says");
     scratch.append(std::span(output).first(made));
+    checksum = crc32(checksum, reinterpret_cast<const Bytef*>(output.data()), static_cast<uInt>(made));
   }
+  if (scratch.size() != member.size || checksum != member.checksum)
+    fail(file, "a zip member that is not what its checksum says");
   return scratch;
 }
 

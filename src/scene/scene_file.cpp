@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "files/json_document.h"
+
 namespace traceflow {
 
 namespace {
@@ -19,10 +21,9 @@ struct ToJson {
   }
 };
 struct FromJson {
-  const Json& json;
-  template <class T>
-  void field(const char* name, T& value, const char*, const char*) {
-    value = json.at(name).get<T>();
+  const JsonField& json;
+  void field(const char* name, int& value, const char*, const char*) {
+    value = static_cast<int>(json[name].whole(0, 1 << 20));
   }
 };
 
@@ -35,22 +36,32 @@ void put_field(const Field& field, const std::string& prefix, Safetensors& file,
       [&](const std::string& name, const Tensor<float>& tensor) { file.add(prefix + name, tensor); });
 }
 
-void read_into(Tensor<float>& tensor, const std::string& name, const Safetensors& file) {
+// A tensor that must have this shape: no memory is taken for more than the file has.
+Tensor<float> take(const Safetensors& file, const std::string& name, const Shape& shape) {
   Tensor<float> stored = file.tensor<float>(name);
-  if (stored.shape() != tensor.shape()) {
-    throw InputError("checkpoint", name, "shape " + stored.shape().to_string(), tensor.shape().to_string());
-  }
-  tensor = std::move(stored);
+  if (stored.shape() != shape)
+    throw InputError(file.origin(), name, "shape " + stored.shape().to_string(), shape.to_string());
+  return stored;
 }
 
-Field get_field(const Json& json, const std::string& prefix, const Safetensors& file) {
-  NetworkOptions shape;
+Field get_field(const JsonField& json, int outputs, const std::string& prefix, const Safetensors& file) {
+  Field field;
   FromJson visitor{json};
-  shape.visit(visitor);
-  Random unused(0);
-  Field field = make_field(shape, json.at("outputs").get<int>(), unused);
-  field.for_each(
-      [&](const std::string& name, Tensor<float>& tensor) { read_into(tensor, prefix + name, file); });
+  field.shape.visit(visitor);
+  try {
+    field.shape.validate();
+  } catch (const InputError& error) {
+    json.fail(error.what(), "the shape of a network");
+  }
+  if (json["outputs"].json() != outputs) json["outputs"].expect(std::to_string(outputs));
+  for (int layer = 0; layer < field.shape.depth; ++layer) {
+    const std::string number = std::to_string(layer);
+    field.weight.push_back(
+        take(file, prefix + "weight" + number, {field.shape.width, field.shape.layer_inputs(layer)}));
+    field.bias.push_back(take(file, prefix + "bias" + number, {field.shape.width}));
+  }
+  field.head_weight = take(file, prefix + "head_weight", {outputs, field.shape.width});
+  field.head_bias = take(file, prefix + "head_bias", {outputs});
   return field;
 }
 
@@ -60,52 +71,57 @@ Surfels get_surfels(const std::string& prefix, const Safetensors& file) {
   const int64_t n = surfels.position.shape().rank() == 2 ? surfels.position.dim(0) : -1;
   surfels.sh = file.tensor<float>(prefix + "sh");
   const int64_t k = surfels.sh.shape().rank() == 3 ? surfels.sh.dim(1) : -1;
-  if (n < 0 || k < 1 || surfels.position.shape() != Shape{n, 3} || surfels.sh.shape() != Shape{n, k, 3}) {
+  const bool has_degree = k == 1 || k == 4 || k == 9 || k == 16;
+  if (n < 0 || !has_degree || surfels.position.shape() != Shape{n, 3} ||
+      surfels.sh.shape() != Shape{n, k, 3}) {
     throw InputError(
-        "checkpoint", prefix,
+        file.origin(), prefix,
         "shapes " + surfels.position.shape().to_string() + " and " + surfels.sh.shape().to_string(),
-        "N×3 positions and N×K×3 harmonics");
+        "N×3 positions and N×K×3 harmonics, K of 1, 4, 9 or 16");
   }
-  surfels.log_scale = Tensor<float>(Shape{n, 2});
-  surfels.rotation = Tensor<float>(Shape{n, 4});
-  surfels.opacity_logit = Tensor<float>(Shape{n});
-  read_into(surfels.log_scale, prefix + "log_scale", file);
-  read_into(surfels.rotation, prefix + "rotation", file);
-  read_into(surfels.opacity_logit, prefix + "opacity_logit", file);
-  if (file.has(prefix + "tint_logit")) {
-    surfels.tint_logit = Tensor<float>(Shape{n});
-    read_into(surfels.tint_logit, prefix + "tint_logit", file);
-  }
+  surfels.log_scale = take(file, prefix + "log_scale", {n, 2});
+  surfels.rotation = take(file, prefix + "rotation", {n, 4});
+  surfels.opacity_logit = take(file, prefix + "opacity_logit", {n});
+  if (file.has(prefix + "tint_logit")) surfels.tint_logit = take(file, prefix + "tint_logit", {n});
   return surfels;
 }
 
-Specular specular_from(const std::string& name) {
-  for (int i = 0; i < 3; ++i) {
-    if (name == specular_names[i]) return static_cast<Specular>(i);
+EnvironmentMap get_map(const JsonField& json, const Safetensors& file) {
+  EnvironmentMap map;
+  map.logit = file.tensor<float>("scene/map/logit");
+  const int64_t side = map.logit.shape().rank() == 3 ? map.logit.dim(1) : 0;
+  if (side < 1 || map.logit.shape() != Shape{6 * side, side, 3}) {
+    throw InputError(file.origin(), "scene/map/logit", "shape " + map.logit.shape().to_string(),
+                     "six square faces of three colours");
   }
-  throw InputError("checkpoint", "scene.specular", name, "none, environment-gaussians or environment-map");
+  if (json.has("map_field")) map.field = get_field(json["map_field"], 3, "scene/map/field/", file);
+  return map;
 }
 
-Scene scene_from(const Json& json, const Safetensors& file) {
+Specular specular_from(const JsonField& name) {
+  for (int i = 0; i < 3; ++i) {
+    if (name.text() == specular_names[i]) return static_cast<Specular>(i);
+  }
+  name.expect("none, environment-gaussians or environment-map");
+}
+
+Scene scene_from(const JsonField& json, const Safetensors& file) {
+  // Lengths on either side of these are held by single precision.
+  constexpr double largest = 1e12, smallest = 1e-12;
   Scene scene;
-  scene.specular = specular_from(json.at("specular").get<std::string>());
-  const auto centre = json.at("centre").get<std::array<double, 3>>();
-  scene.normalisation = {{centre[0], centre[1], centre[2]}, json.at("scale").get<double>()};
-  scene.extent = json.at("extent").get<float>();
-  scene.main_reach[0] = json.at("main_reach").get<float>();
+  scene.specular = specular_from(json["specular"]);
+  scene.normalisation = {json["centre"].vector(), json["scale"].number(smallest, largest)};
+  scene.extent = static_cast<float>(json["extent"].number(smallest, largest));
+  scene.main_reach[0] = static_cast<float>(json["main_reach"].number(0, largest));
   scene.main = get_surfels("scene/main/", file);
-  if (json.at("environment").get<bool>()) scene.environment = get_surfels("scene/environment/", file);
-  if (json.contains("main_field"))
-    scene.main_field = get_field(json["main_field"], "scene/main_field/", file);
-  if (json.contains("environment_field")) {
-    scene.environment_field = get_field(json["environment_field"], "scene/environment_field/", file);
+  if (json["environment"].yes()) scene.environment = get_surfels("scene/environment/", file);
+  if (json.has("main_field"))
+    scene.main_field = get_field(json["main_field"], residual::main_outputs, "scene/main_field/", file);
+  if (json.has("environment_field")) {
+    scene.environment_field =
+        get_field(json["environment_field"], residual::environment_outputs, "scene/environment_field/", file);
   }
-  if (json.at("map").get<bool>()) {
-    scene.environment_map.emplace();
-    scene.environment_map->logit = file.tensor<float>("scene/map/logit");
-    if (json.contains("map_field"))
-      scene.environment_map->field = get_field(json["map_field"], "scene/map/field/", file);
-  }
+  if (json["map"].yes()) scene.environment_map = get_map(json, file);
   return scene;
 }
 
@@ -138,13 +154,9 @@ void put_scene(const Scene& scene, Safetensors& file) {
 Scene get_scene(const Safetensors& file) {
   const auto found = file.metadata.find("scene");
   if (found == file.metadata.end()) {
-    throw InputError("checkpoint", "scene", "no such metadata", "a checkpoint written by traceflow train");
+    throw InputError(file.origin(), "scene", "no such metadata", "a checkpoint written by traceflow train");
   }
-  try {
-    return scene_from(Json::parse(found->second), file);
-  } catch (const Json::exception& error) {
-    throw InputError("checkpoint", "scene", error.what(), "the metadata that traceflow train writes");
-  }
+  return scene_from(JsonDocument(file.origin() + ": scene", found->second), file);
 }
 
 }  // namespace traceflow

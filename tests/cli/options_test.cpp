@@ -84,10 +84,35 @@ TEST(OptionToml, RefusalsNameFileAndLine) {
   EXPECT_THAT(toml_refusal("iterations = 5\n[loss]\nnromal = 0\n"), HasSubstr("did you mean loss.normal?"));
   EXPECT_EQ(toml_refusal("\niterations = 1.5\n"), "FILE:2: iterations: found 1.5, expected a whole number");
   EXPECT_EQ(toml_refusal("iterations = 2000-01-01\n"),
-            "FILE:1: iterations: found a value of another type, expected a whole number");
+            "FILE:1: iterations: found a value of type date, expected a whole number");
   EXPECT_EQ(toml_refusal("loss = 3\n").substr(0, 52), "FILE:1: loss: found a group of options, expected one");
   EXPECT_THAT(toml_refusal("a = 1\nb = \n"), HasSubstr("FILE:2"));
   EXPECT_THAT(refusal([] { options_from_toml("/nowhere.toml", {}); }), HasSubstr("/nowhere.toml"));
+}
+
+// The parser walks tables in tables by recursion, and asserts what a table's name begins with.
+TEST(OptionToml, RefusesWhatItsParserCannotBear) {
+  const auto repeated = [](const std::string& part, int times) {
+    std::string text;
+    for (int i = 0; i < times; ++i) text += part;
+    return text;
+  };
+  EXPECT_EQ(toml_refusal("a = 1\n" + repeated("a.", 200000) + "a = 1\n"),
+            "FILE:2: found more than 64 dots, expected options");
+  EXPECT_EQ(toml_refusal("a = " + repeated("[\n", 1000)),
+            "FILE:65: found more than 64 open brackets, expected options");
+  EXPECT_THAT(toml_refusal("iterations = 1\n[:]\n"), HasSubstr("FILE:2: found Error while parsing key"));
+  EXPECT_THAT(toml_refusal(std::string("[[\0a]]\n", 7)), HasSubstr("FILE:1: found Error"));
+  EXPECT_EQ(toml_refusal(repeated("# words\n", 200000)),
+            "FILE: found 1600000 bytes, expected a TOML file of options, of at most 1048576");
+  EXPECT_EQ(toml_refusal("\xc3\xa9 = 1\n"),
+            "FILE:1: found a letter beyond ASCII, expected such letters in quotes");
+  EXPECT_EQ(toml_refusal("a = \"\"\"\n"),
+            "FILE:1: found three quotes, expected strings that end in their line");
+  EXPECT_EQ(toml_refusal("\xef\xbb\xbf# " + repeated("a sentence\xe2\x80\xa6. ", 80) +
+                         "\n"
+                         "specular = 'none'  # [[[ \xc3\xa9\n"),
+            "accepted");
 }
 
 TEST(OptionArguments, FlagsReachFieldsOutsideGroupsAndInPromotedOnes) {

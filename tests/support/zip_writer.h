@@ -42,8 +42,10 @@ inline std::string zip_archive(const std::vector<std::pair<std::string, std::str
                                     : "";
     const std::string sizes = zip64 ? little_endian(0xffffffff, 4) + little_endian(0xffffffff, 4)
                                     : little_endian(stored.size(), 4) + little_endian(data.size(), 4);
+    const auto checksum =
+        crc32(0, reinterpret_cast<const Bytef*>(data.data()), static_cast<uInt>(data.size()));
     const std::string common = little_endian(20, 2) + little_endian(0, 2) + method + little_endian(0, 4) +
-                               little_endian(0, 4) + sizes + little_endian(name.size(), 2) +
+                               little_endian(checksum, 4) + sizes + little_endian(name.size(), 2) +
                                little_endian(extra.size(), 2);
     directory += "PK\1\2" + little_endian(20, 2) + common + little_endian(0, 2) + little_endian(0, 2) +
                  little_endian(0, 2) + little_endian(0, 4) + little_endian(body.size(), 4) + name + extra;

@@ -6,6 +6,25 @@
 
 namespace traceflow {
 
+namespace {
+
+// Of pixels, and of what multiplies them: numbers that single precision holds after some arithmetic.
+constexpr double largest = 1e9;
+constexpr double smallest = 1e-6;
+
+double length_in_pixels(const JsonField& field) {
+  field.positive();
+  return field.number(smallest, largest);
+}
+
+std::vector<double> bounded(const JsonField& field, size_t count) {
+  std::vector<double> result;
+  for (const JsonField& number : field.elements(count)) result.push_back(number.number(-largest, largest));
+  return result;
+}
+
+}  // namespace
+
 CapturedCamera read_nerfies_camera(const InputFile& input) {
   const JsonFile file(input);
   CapturedCamera camera;
@@ -13,18 +32,19 @@ CapturedCamera read_nerfies_camera(const InputFile& input) {
   camera.position = file["position"].vector();
   Lens& lens = camera.lens;
   const std::vector<JsonField> size = file["image_size"].elements(2);
-  lens.width = size[0].positive();
-  lens.height = size[1].positive();
-  const double aspect = file.has("pixel_aspect_ratio") ? file["pixel_aspect_ratio"].positive() : 1;
-  const double focal = file["focal_length"].positive();
+  lens.width = length_in_pixels(size[0]);
+  lens.height = length_in_pixels(size[1]);
+  const double aspect = file.has("pixel_aspect_ratio") ? length_in_pixels(file["pixel_aspect_ratio"]) : 1;
+  const double focal = length_in_pixels(file["focal_length"]);
   lens.focal = {focal, focal * aspect};
-  const std::vector<double> centre = file["principal_point"].numbers(2);
+  const std::vector<double> centre = bounded(file["principal_point"], 2);
   lens.centre = {centre[0], centre[1]};
-  if (file.has("skew")) lens.skew = file["skew"].number();
-  if (file.has("radial_distortion")) lens.radial = load3<double>(file["radial_distortion"].numbers(3).data());
+  if (file.has("skew")) lens.skew = file["skew"].number(-largest, largest);
+  if (file.has("radial_distortion"))
+    lens.radial = load3<double>(bounded(file["radial_distortion"], 3).data());
   const char* tangential = file.has("tangential") ? "tangential" : "tangential_distortion";
   if (file.has(tangential)) {
-    const std::vector<double> p = file[tangential].numbers(2);
+    const std::vector<double> p = bounded(file[tangential], 2);
     lens.tangential = {p[0], p[1]};
   }
   return camera;

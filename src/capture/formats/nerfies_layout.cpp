@@ -4,6 +4,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "capture/formats/found_capture.h"
 #include "files/json_document.h"
 
@@ -119,8 +120,9 @@ void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
 }  // namespace
 
 void check_capture_id(const JsonField& field, const std::string& id) {
-  if (id.empty() || id.find('/') != std::string::npos || id.find('\0') != std::string::npos || id == "." ||
-      id == "..") {
+  constexpr size_t longest = 200;
+  if (id.empty() || id.find('/') != std::string::npos || id == "." || id == ".." ||
+      printable(id, longest) != id) {
     field.fail("the id \"" + id + "\"", "ids that can name a file");
   }
 }
@@ -128,9 +130,12 @@ void check_capture_id(const JsonField& field, const std::string& id) {
 void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout) {
   const JsonFile scene(tree.open_file("scene.json"));
   layout.normalisation.centre = scene["center"].vector();
-  layout.normalisation.scale = scene["scale"].positive();
-  if (scene.has("near")) layout.near_plane = scene["near"].number();
-  if (scene.has("far")) layout.far_plane = scene["far"].number();
+  // So that lengths on either side of it are held by single precision.
+  constexpr double largest = 1e12;
+  scene["scale"].positive();
+  layout.normalisation.scale = scene["scale"].number(1 / largest, largest);
+  if (scene.has("near")) layout.near_plane = scene["near"].number(-largest, largest);
+  if (scene.has("far")) layout.far_plane = scene["far"].number(-largest, largest);
   if (scene.has("near") && scene.has("far") && !(layout.far_plane > layout.near_plane)) {
     scene["far"].fail(std::to_string(layout.far_plane),
                       "more than near (" + std::to_string(layout.near_plane) + ")");

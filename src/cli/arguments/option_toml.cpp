@@ -1,15 +1,87 @@
 #include "cli/arguments/option_toml.h"
 
-#include <toml++/toml.h>
-#include <fstream>
+#include <fmt/format.h>
+
 #include <optional>
 #include <sstream>
 
 #include "base/error.h"
+#include "files/input_file.h"
+
+// The parser asserts of a table's name, "[:]", what it checks in the next line and refuses. In a debug build
+// that would end the program; clang, where NDEBUG is defined, is told to take it for granted.
+#undef NDEBUG
+#define TOML_ASSERT(expression) static_assert(true)
+#include <toml++/toml.h>
 
 namespace traceflow::cli {
 
 namespace {
+
+constexpr int64_t most_bytes = int64_t{1} << 20;
+constexpr int deepest = 64;
+
+// Goes ahead of the parser, which walks tables in tables by recursion, and of a letter beyond ASCII that
+// stands outside strings and comments knows only that it should not be there.
+class Guard {
+ public:
+  explicit Guard(const std::filesystem::path& path) : path_(path.string()) {}
+
+  void check(std::string_view text) {
+    if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
+    for (size_t i = 0; i < text.size(); ++i) {
+      if (text.substr(i, 3) == "\"\"\"" || text.substr(i, 3) == "'''")
+        fail("three quotes", "strings that end in their line");
+      i += quote_ == '"' && text[i] == '\\' ? 1 : 0;
+      if (i < text.size()) take(text[i]);
+    }
+  }
+
+ private:
+  void take(char c) {
+    if (c == '\n') {
+      ++line_;
+      dots_ = 0;
+      quote_ = 0;
+    } else if (quote_ != 0) {
+      quote_ = c == quote_ ? '\0' : quote_;
+    } else if (c == '"' || c == '\'' || c == '#') {
+      quote_ = c == '#' ? '\n' : c;
+    } else {
+      brackets_ += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+      dots_ += c == '.' ? 1 : 0;
+      if (brackets_ > deepest) fail(fmt::format("more than {} open brackets", deepest), "options");
+      if (dots_ > deepest) fail(fmt::format("more than {} dots", deepest), "options");
+      if (static_cast<unsigned char>(c) > 127) fail("a letter beyond ASCII", "such letters in quotes");
+    }
+  }
+  [[noreturn]] void fail(const std::string& found, const std::string& expected) const {
+    throw InputError(fmt::format("{}:{}", path_, line_), "", found, expected);
+  }
+
+  std::string path_;
+  int line_ = 1, brackets_ = 0, dots_ = 0;
+  char quote_ = '\0';  // what ends the string or, '\n', the comment that this is in
+};
+
+std::string read_settings(const std::filesystem::path& path) {
+  const InputFile file(path);
+  if (file.size() > most_bytes) {
+    throw InputError(path.string(), "", fmt::format("{} bytes", file.size()),
+                     fmt::format("a TOML file of options, of at most {}", most_bytes));
+  }
+  std::string text(static_cast<size_t>(file.size()), '\0');
+  file.read_at(0, std::as_writable_bytes(std::span(text)));
+  Guard(path).check(text);
+  return text;
+}
+
+// What stands there, in a word.
+std::string kind_of(const toml::node& node) {
+  std::ostringstream text;
+  text << node.type();
+  return "a value of type " + text.str();
+}
 
 std::string place(const std::filesystem::path& path, const toml::source_region& source) {
   return path.string() + ":" + std::to_string(source.begin.line);
@@ -42,7 +114,7 @@ void read_table(const toml::table& table, const std::string& prefix, const std::
     const std::string where = place(path, node.source());
     const OptionField& field = find_option(fields, name, where);
     const auto value = option_value(node);
-    if (!value) throw InputError(where, name, "a value of another type", field.expected());
+    if (!value) throw InputError(where, name, kind_of(node), field.expected());
     set_option(field, *value, where);
   }
 }
@@ -50,17 +122,11 @@ void read_table(const toml::table& table, const std::string& prefix, const std::
 }  // namespace
 
 void options_from_toml(const std::filesystem::path& path, const std::vector<OptionField>& fields) {
-  std::error_code error;
-  std::ifstream file(path, std::ios::binary);
-  if (!std::filesystem::is_regular_file(path, error) || !file) {
-    throw InputError(path.string(), "", "no file that can be read", "a TOML file of options");
-  }
-  std::ostringstream text;
-  text << file.rdbuf();
+  const std::string text = read_settings(path);
   try {
-    read_table(toml::parse(text.str(), path.string()), "", path, fields);
+    read_table(toml::parse(text, path.string()), "", path, fields);
   } catch (const toml::parse_error& e) {
-    throw InputError(place(path, e.source()), std::string(e.description()), "", "");
+    throw InputError(place(path, e.source()), "", std::string(e.description()), "TOML");
   }
 }
 
