@@ -57,7 +57,7 @@ class Assembly {
     find_truth();
     choose_axes();
     // They quote names from files.
-    for (std::string& warning : capture_.warnings) warning = printable(warning, 1000);
+    for (Finding& warning : capture_.warnings) warning.text = printable(warning.text, 1000);
     capture_.images = std::make_shared<ImageCache>(std::move(sources_), std::move(shared_),
                                                    options_.cache_mebibytes * (int64_t{1} << 20));
     return std::move(capture_);
@@ -120,7 +120,9 @@ class Assembly {
     std::erase(turned, "");
     if (!turned.empty()) {
       warn("viewers turn the images of " + ids_text(turned) +
-           " (EXIF orientation): taken as stored, to which cameras refer");
+               " (EXIF orientation): taken as stored, to which cameras refer",
+           "turned-image", Severity::notice)
+          .views = turned;
     }
     for (size_t i = 0; i < found.size(); ++i) sources_.emplace(found[i].id, std::move(sources[i]));
     return views;

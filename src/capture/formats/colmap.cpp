@@ -150,7 +150,8 @@ class Reader {
             tree_->name_of(model_.cameras_file) + ": camera " + std::to_string(image.camera_id),
             image.camera_from_world,
             image.position,
-            time};
+            time,
+            ""};
   }
 
   const std::shared_ptr<const FileTree> tree_;

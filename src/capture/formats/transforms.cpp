@@ -200,7 +200,8 @@ class Reader {
                    tree_->name_of(origin_) + ": " + frame.path,
                    frame.pose.camera_from_world,
                    frame.pose.position,
-                   times_[i]};
+                   times_[i],
+                   ""};
     ImageSize size{0, 0, 0};
     if (!frame.lens.width || !frame.lens.height) size = read_image_size(view.image.open());
     const int stored = found_.images.stored;
