@@ -35,7 +35,7 @@ TEST(ErrorBoundary, InputErrorsAreOneLineAndCode2) {
   const Outcome o =
       outcome([]() -> int { throw InputError("a.json", "scale", "x\ny", "a number", "mend it"); });
   EXPECT_EQ(o.code, 2);
-  EXPECT_EQ(o.line, "traceflow: a.json: scale: found x y, expected a number; mend it\n");
+  EXPECT_EQ(o.line, "traceflow: a.json: scale: found x?y, expected a number; mend it\n");
 }
 
 TEST(ErrorBoundary, StreamsAndThreadsThatTheSystemRefusesAreNoBugs) {

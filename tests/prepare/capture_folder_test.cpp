@@ -73,7 +73,7 @@ TEST(WriteCapture, IsReadBackAsItWasPosed) {
   EXPECT_THAT(found, HasSubstr("8 training and 3 test views of 48×32, 500 points"));
 
   const Capture capture = load_capture(p.folder / "out", {});
-  EXPECT_TRUE(capture.warnings.empty()) << capture.warnings.front();
+  EXPECT_TRUE(capture.warnings.empty()) << capture.warnings.front().text;
   ASSERT_EQ(capture.train.size(), 8U);
   ASSERT_EQ(capture.test.size(), 3U);
   EXPECT_TRUE(capture.has_masks);

@@ -198,7 +198,7 @@ TEST_F(PrepareTest, MakesACaptureWithTheKnownCameras) {
   EXPECT_THAT(lines_[4],
               HasSubstr("14 of 14 frames registered, 300 points, reprojection error 0.50 px, lens PINHOLE"));
   const Capture made = load_capture(capture(), {});
-  EXPECT_TRUE(made.warnings.empty()) << made.warnings.front();
+  EXPECT_TRUE(made.warnings.empty()) << made.warnings.front().text;
   ASSERT_EQ(made.train.size(), 11U);
   ASSERT_EQ(made.test.size(), 3U);
   for (const View& view : made.train) {
