@@ -133,9 +133,11 @@ TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
   fake.write_text("transforms.json", "{}");
   fake.model.save_text(fake.path() / "sparse/1");
   const Capture capture = load_capture(fake.path(), {});
+  // What is left is split.
+  EXPECT_THAT(ids(capture.test), ElementsAre("frame_0", "frame_9"));
   EXPECT_EQ(capture.train.size(), 7U);
   EXPECT_THAT(capture.warnings,
-              Contains(HasSubstr("1 of 8 training views have no image (frame_3): left out")));
+              Contains(HasSubstr("1 of 10 registered views have no image (frame_3): left out")));
   EXPECT_THAT(capture.warnings,
               Contains(HasSubstr("1 photographs are not in the model (images/blurred.png)")));
   EXPECT_THAT(capture.warnings, Contains(HasSubstr("sparse/0 is read, sparse/1 not")));

@@ -121,26 +121,19 @@ class Reader {
   }
 
   void split() {
-    const std::vector<std::string> ids = image_ids(names_, tree_->name_of(model_.images_file));
+    found_.all_ids = image_ids(names_, tree_->name_of(model_.images_file));
     const std::vector<double> times = times_by_names(names_);
     std::map<std::string, size_t> place;
-    std::vector<std::string> test_ids;
-    for (size_t i = 0; i < ids.size(); ++i) {
-      place.emplace(ids[i], i);
-      found_.all_ids.push_back(ids[i]);
-      (tests(i, options_.test_every) ? test_ids : found_.train_ids).push_back(ids[i]);
+    for (size_t i = 0; i < names_.size(); ++i) place.emplace(found_.all_ids[i], i);
+    const auto exists = [&](const std::string& id) { return !path_of(names_[place.at(id)]).empty(); };
+    const auto whole = keep_whole(found_.all_ids, "registered", "image", exists, found_.warnings);
+    for (size_t n = 0; n < whole.size(); ++n) {
+      const size_t i = place.at(whole[n]);
+      const double time = options_.times == CaptureTimes::none ? 0 : times[i];
+      const bool is_test = tests(n, options_.test_every);
+      (is_test ? found_.test : found_.train).push_back(view_of(model_.images[i], whole[n], time));
+      if (!is_test) found_.train_ids.push_back(whole[n]);
     }
-    const auto views_of = [&](const std::vector<std::string>& wanted, const std::string& name) {
-      std::vector<FoundView> views;
-      const auto exists = [&](const std::string& id) { return !path_of(names_[place.at(id)]).empty(); };
-      for (const std::string& id : keep_whole(wanted, name, "image", exists, found_.warnings)) {
-        const size_t i = place.at(id);
-        views.push_back(view_of(model_.images[i], id, options_.times == CaptureTimes::none ? 0 : times[i]));
-      }
-      return views;
-    };
-    found_.train = views_of(found_.train_ids, "training");
-    found_.test = views_of(test_ids, "test");
   }
 
   FoundView view_of(const ColmapImage& image, const std::string& id, double time) const {

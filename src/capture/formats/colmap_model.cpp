@@ -56,7 +56,7 @@ class Builder {
   // .bin, else .txt, else nothing.
   std::string path_of(const std::string& name) const {
     for (const char* extension : {".bin", ".txt"}) {
-      const std::string path = (std::filesystem::path(folder_) / (name + extension)).string();
+      std::string path = (std::filesystem::path(folder_) / (name + extension)).string();
       if (tree_.has(path)) return path;
     }
     return "";

@@ -84,10 +84,9 @@ class Reader {
       }
     }
     take(std::move(file));
-    for (size_t i = 0; i < frames_.size(); ++i) {
-      is_test_.push_back(train.empty() ? tests(i, options_.test_every)
-                                       : test.contains(frames_[i].path) && !train.contains(frames_[i].path));
-    }
+    if (train.empty()) return;
+    for (const TransformsFrame& frame : frames_)
+      is_test_.push_back(test.contains(frame.path) && !train.contains(frame.path));
   }
 
   void take(TransformsFile file) {
@@ -167,29 +166,26 @@ class Reader {
   }
 
   void make_views() {
-    std::vector<std::string> paths, test_ids;
+    std::vector<std::string> paths;
     for (const TransformsFrame& frame : frames_) paths.push_back(frame.path);
     found_.all_ids = image_ids(paths, tree_->name_of(origin_));
     std::map<std::string, size_t> place;
-    for (size_t i = 0; i < found_.all_ids.size(); ++i) {
-      place.emplace(found_.all_ids[i], i);
-      (is_test_[i] ? test_ids : found_.train_ids).push_back(found_.all_ids[i]);
+    for (size_t i = 0; i < paths.size(); ++i) place.emplace(found_.all_ids[i], i);
+    const auto exists = [&](const std::string& id) { return !image_of(frames_[place.at(id)]).empty(); };
+    const auto whole = keep_whole(found_.all_ids, "listed", "image", exists, found_.warnings);
+    std::vector<FoundView> views(whole.size());
+    parallel_for(
+        "capture: frames", static_cast<int64_t>(whole.size()),
+        [&](int64_t n) {
+          const auto i = static_cast<size_t>(n);
+          views[i] = view_of(whole[i], place.at(whole[i]));
+        },
+        1);
+    for (size_t n = 0; n < whole.size(); ++n) {
+      const bool is_test = is_test_.empty() ? tests(n, options_.test_every) : is_test_[place.at(whole[n])];
+      if (!is_test) found_.train_ids.push_back(whole[n]);
+      (is_test ? found_.test : found_.train).push_back(std::move(views[n]));
     }
-    const auto views_of = [&](const std::vector<std::string>& wanted, const std::string& split) {
-      const auto exists = [&](const std::string& id) { return !image_of(frames_[place.at(id)]).empty(); };
-      const auto ids = keep_whole(wanted, split, "image", exists, found_.warnings);
-      std::vector<FoundView> views(ids.size());
-      parallel_for(
-          "capture: frames", static_cast<int64_t>(ids.size()),
-          [&](int64_t n) {
-            const auto i = static_cast<size_t>(n);
-            views[i] = view_of(ids[i], place.at(ids[i]));
-          },
-          1);
-      return views;
-    };
-    found_.train = views_of(found_.train_ids, "training");
-    found_.test = views_of(test_ids, "test");
   }
 
   FoundView view_of(const std::string& id, size_t i) const {
@@ -224,7 +220,7 @@ class Reader {
   std::string origin_;  // the file to name in errors
   std::vector<std::shared_ptr<const JsonFile>> documents_;
   std::vector<TransformsFrame> frames_;
-  std::vector<bool> is_test_;
+  std::vector<bool> is_test_;  // of frames_; empty where nobody says
   std::vector<double> times_;
   std::set<std::string> seen_;
   std::string points_path_;

@@ -39,8 +39,9 @@ bool is_fisheye_model(const JsonField& field) {
 void TransformsLens::take(const JsonField& field) {
   take_positive(field, "w", width);
   take_positive(field, "h", height);
-  take_positive(field, "fl_x", focal_x);
-  take_positive(field, "fl_y", focal_y);
+  for (const auto& [key, focal] :
+       {std::pair{"fl_x", &focal_x}, {"fl_y", &focal_y}, {"fx", &focal_x}, {"fy", &focal_y}})
+    take_positive(field, key, *focal);
   for (const auto& [key, angle] : {std::pair{"camera_angle_x", &angle_x}, {"camera_angle_y", &angle_y}}) {
     take_positive(field, key, *angle);
     if (field.has(key) && !(**angle < pi)) field[key].expect("an angle below π");

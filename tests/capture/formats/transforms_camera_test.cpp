@@ -52,6 +52,7 @@ TEST(TransformsLens, fisheyes_and_matrices) {
   EXPECT_EQ(fisheye.tangential, Vec2<double>(0));
   EXPECT_EQ(lens_of(R"({"fl_x": 50, "is_fisheye": true})").projection, Projection::equidistant);
   EXPECT_TRUE(lens_of(R"({"fl_x": 50, "camera_model": "OPENCV"})").is_pinhole());
+  EXPECT_EQ(lens_of(R"({"fx": 50, "fy": 60})").focal, Vec2<double>(50, 60));
   const Lens k = lens_of("{}", R"({"K": [[50, 0.5, 41], [0, 52, 31], [0, 0, 1]]})");
   EXPECT_EQ(k.focal, Vec2<double>(50, 52));
   EXPECT_EQ(k.centre, Vec2<double>(41, 31));
