@@ -75,6 +75,7 @@ std::optional<Vec3<double>> common_sight(const std::vector<FoundView>& views) {
 
 SceneNormalisation normalise(const std::vector<FoundView>& views, const std::vector<Vec3<double>>& points) {
   std::vector<Vec3<double>> cameras;
+  cameras.reserve(views.size());
   for (const FoundView& view : views) cameras.push_back(view.position);
   Box box;
   take_inner(box, cameras);
