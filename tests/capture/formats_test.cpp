@@ -142,7 +142,7 @@ TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
   EXPECT_THAT(capture.warnings,
               Contains(Says("1 of 10 registered views have no image (frame_3): left out")));
   EXPECT_THAT(capture.warnings,
-              Contains(Says("1 photographs are not in the model (images/blurred.png)")));
+              Contains(Says("1 image has no camera (images/blurred.png)")));
   EXPECT_THAT(capture.warnings, Contains(Says("sparse/0 is read, sparse/1 not")));
   EXPECT_THAT(capture.warnings, Contains(Says("--format transforms")));
 }

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <set>
 
 #include "base/error.h"
 #include "capture/formats/colmap_model.h"
 #include "capture/formats/image_names.h"
 #include "capture/formats/normalise.h"
-#include "files/image.h"
 
 namespace traceflow {
 
@@ -46,7 +44,6 @@ class Reader {
     found_.format = "colmap";
     warn_about_models();
     choose_images();
-    warn_about_unregistered();
     split();
     for (const ColmapPoint& point : model_.points) found_.points.push_back(point.position);
     if (!found_.points.empty()) found_.points_file = model_.points_file;
@@ -97,27 +94,6 @@ class Reader {
   }
   std::string path_of(const std::string& name) const {
     return find_image(*tree_, in_folder(found_.images.folder, name));
-  }
-
-  // Photographs beside those of the model that the model does not know.
-  void warn_about_unregistered() {
-    std::set<std::string> known, folders;
-    for (const std::string& name : names_) {
-      known.insert(path_of(name));
-      folders.insert(
-          std::filesystem::path(in_folder(found_.images.folder, name)).parent_path().generic_string());
-    }
-    std::vector<std::string> strangers;
-    for (const std::string& folder : folders) {
-      for (const std::string& name : tree_->files_in(folder)) {
-        const std::string path = in_folder(folder, name);
-        if (has_image_name(name) && !known.contains(path)) strangers.push_back(path);
-      }
-    }
-    if (strangers.empty()) return;
-    std::sort(strangers.begin(), strangers.end(), natural_less);
-    found_.warnings.push_back(std::to_string(strangers.size()) + " photographs are not in the model (" +
-                              ids_text(strangers) + "): COLMAP found no pose for them");
   }
 
   void split() {
