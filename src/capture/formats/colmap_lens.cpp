@@ -95,7 +95,7 @@ Lens colmap_lens(const ColmapLensModel& model, std::span<const double> parameter
     throw InputError(where, field + ".params", std::to_string(parameters.size()) + " numbers",
                      std::to_string(model.parameters) + " (" + name + ")");
   }
-  constexpr double largest = 1e9;
+  constexpr double largest = 1e9, smallest = 1e-6;
   check(width > 0 && width < largest, width, "width", "a number of pixels above zero");
   check(height > 0 && height < largest, height, "height", "a number of pixels above zero");
   for (size_t i = 0; i < parameters.size(); ++i) {
@@ -104,7 +104,8 @@ Lens colmap_lens(const ColmapLensModel& model, std::span<const double> parameter
   }
   const size_t focals = has_one_focal(name) ? 1 : 2;
   for (size_t i = 0; i < focals; ++i) {
-    check(parameters[i] > 0, parameters[i], "params[" + std::to_string(i) + "]", "a focal length above zero");
+    check(parameters[i] > smallest, parameters[i], "params[" + std::to_string(i) + "]",
+          "a focal length above zero");
   }
   Lens lens;
   lens.width = width;

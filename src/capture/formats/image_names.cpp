@@ -7,6 +7,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/printable.h"
 
 namespace traceflow {
 
@@ -88,8 +89,9 @@ std::vector<std::string> image_ids(const std::vector<std::string>& paths, const 
   for (const std::string& path : paths) {
     std::string id = without_extension(path).substr(shared);
     std::replace(id.begin(), id.end(), '/', '_');
-    if (id.empty() || id == "." || id == ".." || id.find('\0') != std::string::npos) {
-      throw InputError(where, "image names", "\"" + path + "\"", "names that can name a file");
+    constexpr size_t longest = 200;
+    if (id.empty() || id == "." || id == ".." || printable(id, longest) != id) {
+      throw InputError(where, "image names", "\"" + printable(path, 60) + "\"", "names that can name a file");
     }
     const auto [other, is_new] = path_of.emplace(id, path);
     if (!is_new) {

@@ -92,6 +92,7 @@ std::string format_of(const FileTree& tree, const NerfiesLayout& layout, bool ha
 
 void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding>& warnings) {
   const JsonFile metadata(tree.open_file("metadata.json"));
+  if (!metadata.json().is_object()) metadata.expect("an object");
   bool has_time_ids = false;
   std::set<std::string> ids(layout.train_ids.begin(), layout.train_ids.end());
   ids.insert(layout.test_ids.begin(), layout.test_ids.end());
@@ -101,7 +102,7 @@ void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
     const JsonField entry = metadata[id];
     const bool has_time = entry.has("time_id");
     const JsonField field = has_time ? entry["time_id"] : entry["warp_id"];
-    if (field.number() < 0) field.fail(std::to_string(field.number()), "a number of at least zero");
+    if (field.number() < 0) field.expect("a number of at least zero");
     layout.time_id[id] = field.number();
     if (entry.has("camera_id") && entry["camera_id"].json().is_primitive())
       layout.rig_camera[id] = entry["camera_id"].json().dump();
@@ -123,7 +124,7 @@ void check_capture_id(const JsonField& field, const std::string& id) {
   constexpr size_t longest = 200;
   if (id.empty() || id.find('/') != std::string::npos || id == "." || id == ".." ||
       printable(id, longest) != id) {
-    field.fail("the id \"" + id + "\"", "ids that can name a file");
+    field.fail("the id \"" + printable(id, 60) + "\"", "ids that can name a file");
   }
 }
 
@@ -137,8 +138,7 @@ void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout) {
   if (scene.has("near")) layout.near_plane = scene["near"].number(-largest, largest);
   if (scene.has("far")) layout.far_plane = scene["far"].number(-largest, largest);
   if (scene.has("near") && scene.has("far") && !(layout.far_plane > layout.near_plane)) {
-    scene["far"].fail(std::to_string(layout.far_plane),
-                      "more than near (" + std::to_string(layout.near_plane) + ")");
+    scene["far"].expect("more than near (" + scene["near"].json().dump() + ")");
   }
 }
 

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 constexpr double largest = 1e9;
+constexpr double smallest = 1e-6;
 
 void take_number(const JsonField& field, const char* key, double& value) {
   if (field.has(key)) value = field[key].number(-largest, largest);
@@ -17,8 +18,8 @@ void take_number(const JsonField& field, const char* key, double& value) {
 
 void take_positive(const JsonField& field, const char* key, std::optional<double>& value) {
   if (!field.has(key)) return;
-  value = field[key].positive();
-  if (!(*value < largest)) field[key].expect("less than 1e9");
+  field[key].positive();
+  value = field[key].number(smallest, largest);
 }
 
 // The names of nerfstudio, and those of COLMAP that mean the same with its k1 to k4, p1 and p2.
@@ -58,8 +59,11 @@ void TransformsLens::take(const JsonField& field) {
   if (field.has("K")) {
     const std::vector<JsonField> rows = field["K"].elements(3);
     const std::vector<double> x = rows[0].numbers(3), y = rows[1].numbers(3);
-    if (!(x[0] > 0 && x[0] < largest && y[1] > 0 && y[1] < largest && std::abs(x[1]) < largest))
+    if (!(x[0] > smallest && x[0] < largest && y[1] > smallest && y[1] < largest && std::abs(x[1]) < largest))
       field["K"].expect("focal lengths above zero");
+    for (const double place : {x[2], y[2]}) {
+      if (!(std::abs(place) < largest)) field["K"].expect("a principal point near the image");
+    }
     focal_x = x[0];
     focal_y = y[1];
     centre_x = x[2];
