@@ -62,6 +62,7 @@ Vec3<double> place_looked_at(const std::vector<View>& views) {
     }
     place = inverse(matrix + trifle * total * Mat3<double>(1)) * (right + trifle * total * middle);
     std::vector<double> distances;
+    distances.reserve(views.size());
     for (const View& view : views)
       distances.push_back(length(cross(axis_of(view), place - Vec3<double>(view.camera.position))));
     const double floor = std::max(1e-12, 0.1 * median(distances));

@@ -70,7 +70,7 @@ std::string extent_text(const Capture& capture, const std::vector<std::string>& 
       rest.emplace_back(view.camera.position);
   }
   if (rest.size() == capture.train.size()) return "";
-  return fmt::format("; without {} the scene's extent were {:.3g} instead of {:.3g}",
+  return fmt::format("; without {} the scene's extent would be {:.3g} instead of {:.3g}",
                      apart.size() == 1 ? "it" : "them", camera_extent(rest), capture.extent);
 }
 

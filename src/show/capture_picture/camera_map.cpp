@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/symmetric_eigen.h"
+
 namespace traceflow::show {
 
 namespace {
 
-constexpr double margin = 24;       // pixels around what the map holds
-constexpr double look_length = 16;  // pixels
-constexpr int64_t most_points = 200000;
+constexpr double margin = 24;          // pixels around what the map holds
+constexpr double look_length = 16;     // pixels
+constexpr int64_t most_points = 4000;  // that the window is chosen by
 
 Vec3<double> axis_of(const View& view, const Vec3<float>& in_camera) {
   return Vec3<double>(in_camera * view.camera.camera_from_world);
@@ -26,6 +28,42 @@ Vec3<double> across(const Vec3<double>& v) {
 Vec3<double> unit_or(const Vec3<double>& v, const Vec3<double>& otherwise) {
   constexpr double shortest = 1e-3;
   return length(v) > shortest ? normalize(v) : otherwise;
+}
+
+// What all cameras' x axes are level against, as far as they turn enough to tell, and else what the cameras
+// have up.
+Vec3<double> up_of(const Capture& capture) {
+  constexpr double trust = 0.005;  // in the cameras' own up: less than a turn of some degrees brings
+  Vec3<double> mean(0);
+  Mat3<double> spread(0);
+  for (const View& view : capture.train) {
+    const Vec3<double> right = axis_of(view, {1, 0, 0});
+    spread += outerProduct(right, right);
+    mean += axis_of(view, {0, -1, 0});
+  }
+  const auto count = static_cast<double>(capture.train.size());
+  mean = unit_or(mean / count, {0, 0, 1});
+  const Vec3<double> up = symmetric_eigen(spread / count - trust * outerProduct(mean, mean)).vectors[0];
+  return dot(up, mean) < 0 ? -up : up;
+}
+
+// The points that a quarter of the training views have in their images; all where there are none.
+std::vector<Vec3<double>> subject_of(const Capture& capture) {
+  const int64_t step = 1 + capture.points.size() / 3 / most_points;
+  std::vector<Vec3<double>> all, seen;
+  for (int64_t i = 0; i < capture.points.size() / 3; i += step) {
+    const Vec3<float> point = load3<float>(capture.points.row(i));
+    all.emplace_back(point);
+    const auto views = std::count_if(capture.train.begin(), capture.train.end(), [&](const View& view) {
+      const Camera<float>& camera = view.camera;
+      const Vec3<float> x = camera.point_in_camera(point);
+      const Vec2<float> at = camera.project(x);
+      return x.z > 0 && at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
+             at.y < static_cast<float>(camera.height);
+    });
+    if (4 * views >= static_cast<std::ptrdiff_t>(capture.train.size())) seen.push_back(all.back());
+  }
+  return seen.empty() ? all : seen;
 }
 
 class Map {
@@ -51,9 +89,8 @@ class Map {
 
   void choose_window() {
     std::vector<double> along[2];
-    const int64_t step = 1 + capture_.points.size() / 3 / most_points;
-    for (int64_t i = 0; i < capture_.points.size() / 3; i += step) {
-      const Vec2<double> at = flat(load3<double>(capture_.points.row(i)));
+    for (const Vec3<double>& point : subject_of(capture_)) {
+      const Vec2<double> at = flat(point);
       for (int k = 0; k < 2; ++k) along[k].push_back(at[k]);
     }
     low_ = Vec2<double>(HUGE_VAL), high_ = Vec2<double>(-HUGE_VAL);
@@ -103,7 +140,7 @@ class Map {
   }
 
   void draw_camera(const View& view, bool is_test) {
-    const Vec2<double> border(10);
+    const Vec2<double> border(12, 28);  // below the title
     const Vec2<double> size(static_cast<double>(picture_.dim(1)), static_cast<double>(picture_.dim(0)));
     const Vec2<double> at = clamp(place(Vec3<double>(view.camera.position)), border, size - border);
     const Vec2<double> look = flat(axis_of(view, {0, 0, 1}));
@@ -136,12 +173,9 @@ class Map {
 }  // namespace
 
 MapViews map_views(const Capture& capture) {
-  Vec3<double> up(0), ahead(0);
-  for (const View& view : capture.train) {
-    up += axis_of(view, {0, -1, 0});
-    ahead += axis_of(view, {0, 0, 1});
-  }
-  up = unit_or(up / static_cast<double>(capture.train.size()), {0, 0, 1});
+  const Vec3<double> up = up_of(capture);
+  Vec3<double> ahead(0);
+  for (const View& view : capture.train) ahead += axis_of(view, {0, 0, 1});
   ahead /= static_cast<double>(capture.train.size());
   const Vec3<double> level = unit_or(ahead - dot(ahead, up) * up, across(up));
   return {{cross(level, up), level}, {level, up}};
