@@ -47,6 +47,7 @@ void lead(int stream, const char* path) {
     const rlimit limit{static_cast<rlim_t>(world.file_bytes), static_cast<rlim_t>(world.file_bytes)};
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(99);
   }
+  for (const int number : {SIGHUP, SIGPIPE, SIGXFSZ}) ::signal(number, SIG_DFL);
   lead(STDOUT_FILENO, output);
   lead(STDERR_FILENO, error);
   if (world.output_closed) ::close(STDOUT_FILENO);
