@@ -9,11 +9,11 @@ namespace traceflow::trace {
 namespace {
 
 template <class T>
-void grow_tensor(Tensor<T>& tensor, size_t capacity, size_t used) {
-  Tensor<T> larger;
-  larger.resize({static_cast<int64_t>(capacity)});
-  std::copy_n(tensor.data(), used, larger.data());
-  tensor = std::move(larger);
+Tensor<T> larger(const Tensor<T>& tensor, size_t capacity, size_t used) {
+  Tensor<T> result;
+  result.resize({static_cast<int64_t>(capacity)});
+  std::copy_n(tensor.data(), used, result.data());
+  return result;
 }
 
 uint32_t name(const Hits& hits, size_t i, const uint32_t* names) {
@@ -23,11 +23,14 @@ uint32_t name(const Hits& hits, size_t i, const uint32_t* names) {
 }  // namespace
 
 void Hits::grow(size_t wanted) {
-  const size_t used = count;
-  capacity_ = std::max(wanted, 2 * capacity_);
-  grow_tensor(distances_, capacity_, used);
-  grow_tensor(alphas_, capacity_, used);
-  grow_tensor(surfels_, capacity_, used);
+  // All is made before anything is replaced: hits outlive a ray for which there was no memory.
+  const size_t capacity = std::max(wanted, 2 * capacity_);
+  Tensor<float> larger_distances = larger(distances_, capacity, count),
+                larger_alphas = larger(alphas_, capacity, count);
+  surfels_ = larger(surfels_, capacity, count);
+  distances_ = std::move(larger_distances);
+  alphas_ = std::move(larger_alphas);
+  capacity_ = capacity;
   distance = distances_.data();
   alpha = alphas_.data();
   surfel = surfels_.data();

@@ -27,7 +27,7 @@ bool all_from_there = false;
 bool clock_jumps = false;
 
 int64_t number(const char* name) {
-  const char* text = std::getenv(name);
+  const char* text = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): before there are threads
   return text == nullptr ? 0 : std::atoll(text);
 }
 
@@ -89,6 +89,13 @@ void arm() {
   armed = true;
 }
 
+NoMemory::NoMemory() {
+  first_failing = 0;
+  all_from_there = true;
+  armed = true;
+}
+NoMemory::~NoMemory() { armed = false; }
+
 }  // namespace traceflow::faults
 
 void* operator new(std::size_t size) { return taken_or_thrown(size, 0); }
@@ -114,6 +121,8 @@ void operator delete[](void* memory, const std::nothrow_t&) noexcept { std::free
 
 extern "C" {
 
+// The C library's names of parameters are none that we may use.
+// NOLINTBEGIN(readability-inconsistent-declaration-parameter-name)
 int clock_gettime(clockid_t clock, timespec* time) noexcept {
   const long result = ::syscall(SYS_clock_gettime, clock, time);
   if (result == 0 && clock == CLOCK_REALTIME) time->tv_sec += jump();
@@ -133,5 +142,6 @@ int gettimeofday(timeval* into, void*) noexcept {
   *into = {now.tv_sec, now.tv_nsec / 1000};
   return 0;
 }
+// NOLINTEND(readability-inconsistent-declaration-parameter-name)
 
 }  // extern "C"

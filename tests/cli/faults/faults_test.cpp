@@ -203,7 +203,7 @@ TEST_F(Faults, ADamagedCheckpointIsNamedByItsSectionAndTheOneBeforeServes) {
   // With no other to go back to, all say one line.
   fs::remove(damaged.previous_checkpoint());
   std::ofstream(damaged.checkpoint(), std::ios::binary) << bytes;
-  for (std::vector<std::string> words : readers) expect_one_line(run(words), 2);
+  for (const std::vector<std::string>& words : readers) expect_one_line(run(words), 2);
   expect_one_line(run(resuming("damaged")), 2);
 }
 

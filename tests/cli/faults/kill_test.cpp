@@ -5,7 +5,6 @@
 #include <array>
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -21,10 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-int kills_wanted() {
-  const char* wanted = std::getenv("TRACEFLOW_KILLS");
-  return wanted == nullptr ? 6 : std::atoi(wanted);
-}
+int kills_wanted() { return number_from_environment("TRACEFLOW_KILLS", 6); }
 
 bool is_half_written(const RunFolder& run) {
   return fs::exists(run.folder / "checkpoint.new.safetensors.partial") ||

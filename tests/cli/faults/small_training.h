@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -20,6 +21,12 @@ namespace fs = std::filesystem;
 inline std::string text_of(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// How often the long version of a test is to try.
+inline int number_from_environment(const char* name, int usual) {
+  const char* const wanted = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): there is one thread
+  return wanted == nullptr ? usual : std::atoi(wanted);
 }
 
 inline int lines(const std::string& text) {
@@ -42,9 +49,9 @@ class Faults : public testing::Test {
   static constexpr int iterations = 24;
 
   static void SetUpTestSuite() {
-    if (folder_ != nullptr) return;
+    if (shared_folder != nullptr) return;
     static const TempFolder folder;
-    folder_ = &folder;
+    shared_folder = &folder;
     fs::permissions(folder.path(), fs::perms::all);
     ASSERT_EQ(run({"synth", path("capture"), "--frames", "5", "--width", "40", "--height", "24", "--samples",
                    "2", "--points", "200", "--test-every", "2"})
@@ -54,8 +61,8 @@ class Faults : public testing::Test {
     ASSERT_EQ(whole.code, 0) << whole.error;
   }
 
-  static std::string path(const std::string& name) { return (*folder_ / name).string(); }
-  static RunFolder run_in(const std::string& name) { return RunFolder{*folder_ / name}; }
+  static std::string path(const std::string& name) { return (*shared_folder / name).string(); }
+  static RunFolder run_in(const std::string& name) { return RunFolder{*shared_folder / name}; }
   static std::vector<std::string> training(const std::string& name,
                                            const std::vector<std::string>& more = {}) {
     std::vector<std::string> words{"train",
@@ -105,7 +112,7 @@ class Faults : public testing::Test {
   }
 
  private:
-  static inline const TempFolder* folder_ = nullptr;
+  static inline const TempFolder* shared_folder = nullptr;
 };
 
 }  // namespace traceflow::faults

@@ -50,6 +50,14 @@ Outcome run(const std::vector<std::string>& words, const World& world = {});
 
 // In the process that runs as the program: lets happen what the world of its parent says.
 void arm();
+// While one stands, this process is refused all memory.
+struct NoMemory {
+  NoMemory();
+  ~NoMemory();
+  NoMemory(const NoMemory&) = delete;
+  NoMemory& operator=(const NoMemory&) = delete;
+};
+
 // How many allocations a program made to its end, as its World wished: with failing_allocation = count_only.
 inline constexpr int64_t count_only = -1;
 int64_t allocations_said(const std::string& error);
