@@ -18,6 +18,8 @@ void add_trace(CLI::App& program);
 void add_export(CLI::App& program);
 void add_synth(CLI::App& program);
 void add_inspect(CLI::App& program);
+void add_prepare(CLI::App& program);
+void add_attach_priors(CLI::App& program);
 void add_view(CLI::App& program);
 
 // All verbs that are there, in alphabetical order.

@@ -1,0 +1,112 @@
+#include "prepare/film.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <fstream>
+
+#include "base/error.h"
+#include "base/process.h"
+#include "prepare/netpbm.h"
+#include "prepare/programs.h"
+
+namespace traceflow::prepare {
+
+namespace {
+
+std::string filters(const Film& film) {
+  std::string chain;
+  if (film.longest_side > 0) {
+    const std::string shrink = fmt::format("min(1,{}/max(iw*sar,ih))", film.longest_side);
+    chain = fmt::format("scale=w='max(1,round(iw*sar*{0}))':h='max(1,round(ih*{0}))':flags=area,", shrink);
+  } else {
+    chain = "scale=w='round(iw*sar)':h=ih:flags=area,";
+  }
+  return chain + "showinfo=checksum=0";
+}
+
+// Of the pictures that showinfo has told of.
+std::vector<double> read_times(const std::filesystem::path& log) {
+  const std::string key = " pts_time:";
+  std::vector<double> times;
+  std::ifstream file(log);
+  for (std::string line; std::getline(file, line);) {
+    const size_t at = line.find(key);
+    if (at == std::string::npos || line.find("showinfo") == std::string::npos) continue;
+    const size_t begin = line.find_first_not_of(' ', at + key.size());
+    double time = 0;
+    if (begin == std::string::npos ||
+        std::from_chars(line.data() + begin, line.data() + line.size(), time).ec != std::errc()) {
+      throw InputError(log.string(), "pts_time", line.substr(at, 40), "a time stamp for every picture",
+                       "write the film anew with ffmpeg");
+    }
+    times.push_back(time);
+  }
+  return times;
+}
+
+}  // namespace
+
+std::vector<double> decode_film(const Film& film, const std::filesystem::path& log,
+                                const std::atomic<bool>& stop,
+                                const std::function<bool(int64_t index, Tensor<uint8_t>&& picture)>& take) {
+  const Descriptor told = open_log(log);
+  Pipe pipe = make_pipe();
+  // "file:" keeps names from being taken for options and protocols.
+  Process process({"ffmpeg",
+                   "-nostdin",
+                   "-hide_banner",
+                   "-nostats",
+                   "-loglevel",
+                   "info",
+                   "-i",
+                   "file:" + std::filesystem::absolute(film.path).string(),
+                   "-map",
+                   "0:v:0",
+                   "-vf",
+                   filters(film),
+                   "-fps_mode",
+                   "passthrough",
+                   "-f",
+                   "image2pipe",
+                   "-c:v",
+                   film.grey ? "pgm" : "ppm",
+                   "-pix_fmt",
+                   film.grey ? "gray" : "rgb24",
+                   "-"},
+                  {.output = pipe.writing.number(), .error = told.number()});
+  pipe.writing.close();
+  NetpbmStream pictures(std::move(pipe.reading), film.path.string());
+  int64_t count = 0;
+  bool wanted = true;
+  while (wanted) {
+    if (stop) throw Stopped{};
+    std::optional<Tensor<uint8_t>> picture = pictures.next();
+    if (!picture) break;
+    wanted = take(count++, std::move(*picture));
+  }
+  if (!wanted) process.end();
+  if ((wanted && !process.wait()) || count == 0) {
+    throw InputError(film.path.string(), "", "what ffmpeg cannot read: " + last_line(log),
+                     "a film or picture", "see " + log.string());
+  }
+  std::vector<double> times = read_times(log);
+  if (times.size() < static_cast<size_t>(count)) {
+    throw InputError(film.path.string(), "time stamps", std::to_string(times.size()),
+                     std::to_string(count) + ", one for each picture", "write the film anew with ffmpeg");
+  }
+  times.resize(static_cast<size_t>(count));
+  return times;
+}
+
+Tensor<uint8_t> decode_picture(const Film& film, const std::filesystem::path& log,
+                               const std::atomic<bool>& stop) {
+  Tensor<uint8_t> first;
+  decode_film(film, log, stop, [&](int64_t, Tensor<uint8_t>&& picture) {
+    first = std::move(picture);
+    return false;
+  });
+  return first;
+}
+
+}  // namespace traceflow::prepare

@@ -1,0 +1,162 @@
+#include "prepare/frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "files/json_document.h"
+#include "files/png.h"
+#include "prepare/picture_source.h"
+#include "prepare/sharpness.h"
+
+namespace traceflow::prepare {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// Times and sharpness of all.
+std::vector<Candidate> look_at(const PictureSource& source) {
+  std::vector<Candidate> found;
+  const std::vector<double> times = source.take_all(true, [&](int64_t, Tensor<uint8_t>&& picture) {
+    found.push_back({0, sharpness(picture)});
+  });
+  for (size_t i = 0; i < found.size(); ++i) found[i].time = times[i];
+  return found;
+}
+
+void check_enough(const fs::path& input, size_t found) {
+  constexpr size_t fewest = 3;
+  if (found >= fewest) return;
+  throw InputError(input.string(), "pictures", std::to_string(found), "at least 3 between --start and --end");
+}
+
+// Every n-th of the first camera's times, and what the second camera saw then.
+void add_test_camera(const PrepareOptions& options, std::vector<Candidate> second, double first_time,
+                     Frames& frames) {
+  std::vector<double> times;
+  double gap = 0;
+  for (size_t i = 0; i < frames.frames.size(); ++i) {
+    if (i > 0) gap = std::max(gap, frames.frames[i].time - frames.frames[i - 1].time);
+    if (static_cast<int>(i) % options.test_every == options.test_every / 2)
+      times.push_back(frames.frames[i].time + first_time);
+  }
+  for (Candidate& c : second) c.time += options.test_offset;
+  const std::vector<int64_t> nearest = nearest_frames(second, times, gap / 2);
+  for (size_t i = 0; i < times.size(); ++i) {
+    if (nearest[i] < 0) continue;
+    const Candidate& c = second[static_cast<size_t>(nearest[i])];
+    const size_t beside =
+        i * static_cast<size_t>(options.test_every) + static_cast<size_t>(options.test_every / 2);
+    frames.frames.push_back({fmt::format("{:06}_right", beside), 1, "", nearest[i],
+                             std::max(0.0, c.time - first_time), c.sharpness});
+  }
+  if (frames.frames.back().camera == 0) {
+    throw InputError(options.test_video, "time stamps", "none at the first film's times",
+                     "films that run at the same time",
+                     "say with --test-offset how much later it was started");
+  }
+}
+
+void write_pictures(const PictureSource& source, int camera, const fs::path& folder, Frames& frames) {
+  std::vector<Frame*> mine;
+  std::vector<int64_t> indices;
+  for (Frame& frame : frames.frames) {
+    if (frame.camera != camera) continue;
+    mine.push_back(&frame);
+    indices.push_back(frame.index);
+  }
+  const std::vector<std::string> names = source.names();
+  source.take_some(false, indices, [&](int64_t place, Tensor<uint8_t>&& picture) {
+    Frame& frame = *mine[static_cast<size_t>(place)];
+    frame.width = picture.dim(1);
+    frame.height = picture.dim(0);
+    if (!names.empty()) frame.source = names[static_cast<size_t>(frame.index)];
+    if (frame.width != mine.front()->width || frame.height != mine.front()->height) {
+      throw InputError(frame.source, "size", fmt::format("{}×{}", frame.width, frame.height),
+                       fmt::format("{}×{} as the first", mine.front()->width, mine.front()->height),
+                       "pictures of one camera, none of them turned");
+    }
+    write_png(folder / (frame.id + ".png"), picture);
+  });
+}
+
+}  // namespace
+
+Frames take_frames(const fs::path& input, const PrepareOptions& options, const fs::path& folder,
+                   const fs::path& log, const std::atomic<bool>& stop) {
+  const PictureSource first(input, options.size, log, stop);
+  if (first.is_folder() && (options.rate > 0 || !options.test_video.empty())) {
+    throw InputError(input.string(), "", "pictures without times", "a film for --rate and --test-video",
+                     "use --frames");
+  }
+  const std::vector<Candidate> candidates = look_at(first);
+  const std::vector<int64_t> chosen = choose_frames(candidates, options);
+  check_enough(input, chosen.size());
+  Frames frames;
+  frames.source_frames.push_back(static_cast<int64_t>(candidates.size()));
+  const double first_time = candidates[static_cast<size_t>(chosen.front())].time;
+  const char* side = options.test_video.empty() ? "" : "_left";
+  for (const int64_t i : chosen) {
+    const Candidate& c = candidates[static_cast<size_t>(i)];
+    frames.frames.push_back(
+        {fmt::format("{:06}{}", frames.frames.size(), side), 0, "", i, c.time - first_time, c.sharpness});
+  }
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  if (!options.test_video.empty()) {
+    const PictureSource second(options.test_video, options.size, log, stop);
+    const std::vector<Candidate> others = look_at(second);
+    frames.source_frames.push_back(static_cast<int64_t>(others.size()));
+    add_test_camera(options, others, first_time, frames);
+    write_pictures(second, 1, folder, frames);
+  }
+  write_pictures(first, 0, folder, frames);
+  return frames;
+}
+
+void write_frames(const fs::path& file, const Frames& frames) {
+  json list = json::array();
+  for (const Frame& f : frames.frames) {
+    list.push_back({{"id", f.id},
+                    {"camera", f.camera},
+                    {"source", f.source},
+                    {"index", f.index},
+                    {"time", f.time},
+                    {"sharpness", f.sharpness},
+                    {"width", f.width},
+                    {"height", f.height}});
+  }
+  write_atomically(file, json{{"source_frames", frames.source_frames}, {"frames", list}}.dump(1) + "\n");
+}
+
+Frames read_frames(const fs::path& path) {
+  constexpr int64_t many = int64_t{1} << 40;
+  const JsonFile file(path);
+  Frames frames;
+  for (const JsonField& count : file["source_frames"].elements())
+    frames.source_frames.push_back(count.whole(0, many));
+  for (const JsonField& f : file["frames"].elements()) {
+    frames.frames.push_back({f["id"].text(), static_cast<int>(f["camera"].whole(0, 1)), f["source"].text(),
+                             f["index"].whole(0, many), f["time"].number(), f["sharpness"].number(),
+                             f["width"].whole(1, 16384), f["height"].whole(1, 16384)});
+  }
+  return frames;
+}
+
+Tensor<uint8_t> grey_of(const Tensor<uint8_t>& colour) {
+  const int64_t channels = colour.dim(2);
+  if (channels < 3) return colour;
+  Tensor<uint8_t> grey({colour.dim(0), colour.dim(1), 1});
+  for (int64_t i = 0; i < grey.size(); ++i) {
+    const uint8_t* c = colour.data() + i * channels;
+    grey[i] = static_cast<uint8_t>((77 * c[0] + 150 * c[1] + 29 * c[2] + 128) >> 8);
+  }
+  return grey;
+}
+
+}  // namespace traceflow::prepare

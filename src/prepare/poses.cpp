@@ -1,0 +1,209 @@
+#include "prepare/poses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "base/parallel.h"
+#include "files/json_document.h"
+#include "files/png.h"
+#include "prepare/masks.h"
+#include "prepare/programs.h"
+
+namespace traceflow::prepare {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Words = std::vector<std::string>;
+
+constexpr size_t exhaustive_up_to = 80;  // frames
+constexpr int64_t fewest_registered = 10;
+
+std::string colmap_name(CameraModel model) {
+  switch (model) {
+    case CameraModel::simple_pinhole:
+      return "SIMPLE_PINHOLE";
+    case CameraModel::pinhole:
+      return "PINHOLE";
+    case CameraModel::simple_radial:
+      return "SIMPLE_RADIAL";
+    case CameraModel::radial:
+      return "RADIAL";
+    case CameraModel::opencv:
+      return "OPENCV";
+  }
+  return "";
+}
+
+bool compares_all(const PrepareOptions& options, const Frames& frames) {
+  if (options.matcher == Matcher::automatic) return frames.frames.size() <= exhaustive_up_to;
+  return options.matcher == Matcher::exhaustive;
+}
+
+// COLMAP looks for ID.png.png, and takes features where it is not black.
+void write_feature_masks(const Frames& frames, const fs::path& masks, const fs::path& feature_masks) {
+  fs::remove_all(feature_masks);
+  fs::create_directories(feature_masks);
+  for (const Frame& frame : frames.frames) {
+    const fs::path mask = masks / (frame.id + ".png");
+    if (!fs::exists(mask)) continue;
+    Tensor<uint8_t> still = as_mask(read_png(mask));
+    for (uint8_t& value : still.values()) value = value != 0 ? 0 : 1;
+    write_mask(feature_masks / (frame.id + ".png.png"), still);
+  }
+}
+
+std::string frame_list(const Frames& frames, int camera) {
+  std::string list;
+  for (const Frame& frame : frames.frames) {
+    if (frame.camera == camera) list += frame.id + ".png\n";
+  }
+  return list;
+}
+
+void remove_database(const fs::path& database) {
+  for (const char* ending : {"", "-shm", "-wal", "-journal"}) fs::remove(database.string() + ending);
+}
+
+// What may help, of what has not been tried.
+std::string advice(const PrepareOptions& options, const Frames& frames) {
+  std::string text = "try more frames (--frames, --rate)";
+  if (options.masks == "none") text += ", masks of what moves (--masks estimate, or your own)";
+  if (options.masks == "estimate") text += ", your own masks or none (--masks)";
+  if (!compares_all(options, frames)) text += ", --matcher exhaustive";
+  text += options.camera_model == CameraModel::opencv ? ", --camera-model simple-radial"
+                                                      : ", --camera-model opencv";
+  return text + ", or film again with a camera that moves sideways around the scene";
+}
+
+struct Registered {
+  fs::path model;
+  int64_t frames = 0;
+};
+
+// Whether the mapper failed for want of anything to register, as its versions call it.
+bool found_nothing(const PoseFolder& folder) {
+  const std::string said = last_line(folder.top / "mapper.log");
+  return fs::is_empty(folder.models()) && (said.find("No good initial image pair") != std::string::npos ||
+                                           said.find("failed to create sparse model") != std::string::npos);
+}
+
+Registered largest_model(const fs::path& models) {
+  Registered best;
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(models)) {
+    if (entry.is_directory()) folders.push_back(entry.path());
+  }
+  std::sort(folders.begin(), folders.end());
+  for (const fs::path& folder : folders) {
+    const auto count = static_cast<int64_t>(read_colmap_model(*FileTree::open(folder), "").images.size());
+    if (count > best.frames) best = {folder, count};
+  }
+  return best;
+}
+
+}  // namespace
+
+std::string extract_features(const PrepareOptions& options, const Frames& frames, const fs::path& pictures,
+                             const fs::path& masks, const PoseFolder& folder, const std::atomic<bool>& stop) {
+  fs::create_directories(folder.top);
+  remove_database(folder.features());
+  const bool masked = wants_masks(options);
+  if (masked) write_feature_masks(frames, masks, folder.masks());
+  for (size_t camera = 0; camera < frames.source_frames.size(); ++camera) {
+    const fs::path list = folder.top / fmt::format("camera_{}.txt", camera);
+    write_atomically(list, frame_list(frames, static_cast<int>(camera)));
+    // One call for each camera: what a call reads has one lens.
+    Words words{"colmap",
+                "feature_extractor",
+                "--database_path",
+                folder.features().string(),
+                "--image_path",
+                pictures.string(),
+                "--image_list_path",
+                list.string(),
+                "--ImageReader.single_camera",
+                "1",
+                "--ImageReader.camera_model",
+                colmap_name(options.camera_model),
+                "--SiftExtraction.use_gpu",
+                "0",
+                "--SiftExtraction.max_num_features",
+                std::to_string(options.features),
+                "--SiftExtraction.num_threads",
+                std::to_string(thread_count())};
+    if (masked) words.insert(words.end(), {"--ImageReader.mask_path", folder.masks().string()});
+    run_program(words, folder.top / fmt::format("features_{}.log", camera), stop);
+  }
+  return fmt::format("up to {} of each of {} frames{}", options.features, frames.frames.size(),
+                     masked ? ", none where something moves" : "");
+}
+
+std::string match_features(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder,
+                           const std::atomic<bool>& stop) {
+  remove_database(folder.matches());
+  fs::copy_file(folder.features(), folder.matches());
+  const bool all = compares_all(options, frames);
+  Words words{"colmap",
+              all ? "exhaustive_matcher" : "sequential_matcher",
+              "--database_path",
+              folder.matches().string(),
+              "--SiftMatching.use_gpu",
+              "0",
+              "--SiftMatching.num_threads",
+              std::to_string(thread_count())};
+  if (!all) words.insert(words.end(), {"--SequentialMatching.overlap", std::to_string(options.overlap)});
+  run_program(words, folder.top / "matches.log", stop);
+  return all ? "every frame with every other"
+             : fmt::format("every frame with the next {} and some farther ones", options.overlap);
+}
+
+std::string find_poses(const PrepareOptions& options, const Frames& frames, const fs::path& pictures,
+                       const PoseFolder& folder, const std::atomic<bool>& stop) {
+  fs::remove_all(folder.models());
+  fs::create_directories(folder.models());
+  try {
+    run_program(
+        {"colmap", "mapper", "--database_path", folder.matches().string(), "--image_path", pictures.string(),
+         "--output_path", folder.models().string(), "--Mapper.num_threads", std::to_string(thread_count())},
+        folder.top / "mapper.log", stop);
+  } catch (const InputError&) {
+    if (!found_nothing(folder)) throw;
+  }
+  const Registered best = largest_model(folder.models());
+  const auto all = static_cast<int64_t>(frames.frames.size());
+  if (best.frames < fewest_registered ||
+      static_cast<double>(best.frames) < options.least_registered * static_cast<double>(all)) {
+    throw InputError(folder.models().string(), "poses",
+                     fmt::format("{} of {} frames registered", best.frames, all),
+                     fmt::format("at least {} and {:g}% (--least-registered)", fewest_registered,
+                                 100 * options.least_registered),
+                     advice(options, frames));
+  }
+  write_atomically(folder.chosen(), best.model.filename().string());
+  const ColmapModel model = read_chosen_model(folder);
+  const Lens& lens = model.cameras.front().lens;
+  return fmt::format(
+      "{} of {} frames registered, {} points, reprojection error {:.2f} px, lens {} with a focal length of "
+      "{:.0f} px for {:.0f}×{:.0f}",
+      best.frames, all, model.points.size(), mean_error(model), model.cameras.front().model, lens.focal.x,
+      lens.width, lens.height);
+}
+
+ColmapModel read_chosen_model(const PoseFolder& folder) {
+  return read_colmap_model(*FileTree::open(folder.models() / read_text(folder.chosen())), "");
+}
+
+double mean_error(const ColmapModel& model) {
+  double sum = 0, count = 0;
+  for (const ColmapPoint& point : model.points) {
+    sum += point.error * static_cast<double>(point.track_length);
+    count += static_cast<double>(point.track_length);
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+}  // namespace traceflow::prepare

@@ -1,0 +1,188 @@
+#include "prepare/choose_frames.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "base/error.h"
+#include "base/process.h"
+#include "base/random.h"
+#include "prepare/frames.h"
+#include "prepare/masks.h"
+#include "prepare/netpbm.h"
+#include "prepare/picture_source.h"
+#include "prepare/sharpness.h"
+#include "support/temp_folder.h"
+
+namespace traceflow::prepare {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::vector<Candidate> film(int count, double rate, const std::function<double(int)>& sharp) {
+  std::vector<Candidate> candidates;
+  for (int i = 0; i < count; ++i) candidates.push_back({i / rate, sharp(i)});
+  return candidates;
+}
+
+TEST(Sharpness, FallsWhenAPictureIsBlurred) {
+  Random random(7);
+  Tensor<uint8_t> picture({24, 32, 1});
+  for (uint8_t& value : picture.values()) value = static_cast<uint8_t>(random.below(256));
+  Tensor<uint8_t> blurred = picture;
+  for (int64_t y = 1; y < 23; ++y) {
+    for (int64_t x = 1; x < 31; ++x) {
+      int sum = 0;
+      for (int64_t j = -1; j <= 1; ++j) {
+        for (int64_t i = -1; i <= 1; ++i) sum += picture(y + j, x + i, 0);
+      }
+      blurred(y, x, 0) = static_cast<uint8_t>(sum / 9);
+    }
+  }
+  EXPECT_GT(sharpness(picture), 5 * sharpness(blurred));
+}
+
+TEST(Sharpness, IsTheVarianceOfTheLaplacian) {
+  Tensor<uint8_t> picture({3, 4, 1});
+  picture.fill(10);
+  EXPECT_EQ(sharpness(picture), 0);
+  picture(1, 1, 0) = 12;  // Laplacians −8 and 2: mean −3, variance 25
+  EXPECT_DOUBLE_EQ(sharpness(picture), 25);
+  EXPECT_EQ(sharpness(Tensor<uint8_t>({2, 9, 1})), 0);
+}
+
+TEST(ChooseFrames, TakesTheSharpestOfEachInterval) {
+  PrepareOptions options;
+  options.frames = 10;
+  const auto candidates = film(30, 30, [](int i) { return i % 3 == i / 10 ? 2.0 : 1.0; });
+  EXPECT_THAT(choose_frames(candidates, options), ElementsAre(0, 3, 6, 9 + 0, 13, 16, 19, 23, 26, 29));
+}
+
+TEST(ChooseFrames, TakesAllWhereThereAreNoMore) {
+  PrepareOptions options;
+  options.frames = 10;
+  EXPECT_EQ(choose_frames(film(10, 5, [](int) { return 1.0; }), options).size(), 10U);
+  EXPECT_TRUE(choose_frames({}, options).empty());
+}
+
+TEST(ChooseFrames, ARateCountsSecondsNotPictures) {
+  PrepareOptions options;
+  options.rate = 2;
+  // A frame rate that changes: 10 pictures in the first second, 3 in the second, none in the third, 1 in the
+  // fourth.
+  std::vector<Candidate> candidates = film(10, 10, [](int) { return 1.0; });
+  for (const double time : {1.0, 1.4, 1.6, 3.2}) candidates.push_back({time, 1});
+  EXPECT_THAT(choose_frames(candidates, options), ElementsAre(0, 5, 10, 12, 13));
+}
+
+TEST(ChooseFrames, StartAndEndLeaveTheRestOut) {
+  PrepareOptions options;
+  options.start = 1;
+  options.end = 2;
+  EXPECT_THAT(choose_frames(film(40, 10, [](int) { return 1.0; }), options), testing::SizeIs(11));
+}
+
+RC_GTEST_PROP(ChooseFrames, RisesAndGivesAboutAsManyAsAsked, ()) {
+  PrepareOptions options;
+  options.frames = *rc::gen::inRange(10, 60);
+  const auto gaps = *rc::gen::container<std::vector<int>>(200, rc::gen::inRange(1, 4));
+  std::vector<Candidate> candidates;
+  double time = 5;
+  for (const int gap : gaps) candidates.push_back({time += gap * 0.01, static_cast<double>(gap)});
+  const std::vector<int64_t> chosen = choose_frames(candidates, options);
+  RC_ASSERT(std::adjacent_find(chosen.begin(), chosen.end(), std::greater_equal<>()) == chosen.end());
+  RC_ASSERT(static_cast<int>(chosen.size()) <= options.frames);
+  RC_ASSERT(static_cast<int>(chosen.size()) >= options.frames - 1);
+}
+
+TEST(NearestFrames, AreWithinTheTolerance) {
+  const std::vector<Candidate> candidates{{0.0, 0}, {0.5, 0}, {1.1, 0}};
+  EXPECT_THAT(nearest_frames(candidates, {0.1, 0.45, 0.8, 1.0, 9.0}, 0.2), ElementsAre(0, 1, -1, 2, -1));
+  EXPECT_THAT(nearest_frames({}, {1.0}, 5), ElementsAre(-1));
+}
+
+TEST(PicturesIn, CountAsPeopleDo) {
+  const TempFolder folder;
+  for (const char* name : {"f10.png", "f9.JPG", "f09b.png", "f1.tiff", "notes.txt", "g.png"})
+    std::ofstream(folder / name) << "x";
+  std::vector<std::string> names;
+  for (const auto& path : pictures_in(folder.path())) names.push_back(path.filename().string());
+  EXPECT_THAT(names, ElementsAre("f1.tiff", "f9.JPG", "f09b.png", "f10.png", "g.png"));
+}
+
+NetpbmStream stream_of(const std::string& bytes) {
+  Pipe pipe = make_pipe();
+  EXPECT_EQ(::write(pipe.writing.number(), bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
+  pipe.writing.close();
+  return {std::move(pipe.reading), "film"};
+}
+
+TEST(Netpbm, ReadsPicturesOneAfterTheOther) {
+  NetpbmStream stream = stream_of("P5\n2 1\n255\nabP6\n1 2\n255\nabcdef");
+  const auto grey = stream.next(), colour = stream.next();
+  ASSERT_TRUE(grey && colour);
+  EXPECT_EQ(grey->shape(), (Shape{1, 2, 1}));
+  EXPECT_EQ((*grey)[1], 'b');
+  EXPECT_EQ(colour->shape(), (Shape{2, 1, 3}));
+  EXPECT_EQ((*colour)[5], 'f');
+  EXPECT_FALSE(stream.next());
+}
+
+TEST(Netpbm, RefusesWhatIsCutShortOrElse) {
+  for (const std::string& bytes :
+       {std::string("P5\n2 1\n255\na"), std::string("P5\n2 1\n65535\nabcd"),
+        std::string("P5\n99999 1\n255\n"), std::string("P5\n0 1\n255\n"), std::string("P5\nx"),
+        std::string("P3\n1 1\n255\n1"), std::string("hello"), std::string("P")}) {
+    NetpbmStream stream = stream_of(bytes);
+    EXPECT_THROW(stream.next(), InputError) << bytes;
+  }
+}
+
+Frames some_frames() {
+  Frames frames;
+  frames.source_frames = {7};
+  for (const int64_t i : {1, 3, 6}) {
+    frames.frames.push_back({"00000" + std::to_string(frames.frames.size()), 0,
+                             "photo" + std::to_string(i) + ".jpg", i, 0.25 * static_cast<double>(i), 9.5, 8,
+                             6});
+  }
+  return frames;
+}
+
+TEST(Frames, AreReadAsTheyWereWritten) {
+  const TempFolder folder;
+  write_frames(folder / "list.json", some_frames());
+  const Frames frames = read_frames(folder / "list.json");
+  EXPECT_THAT(frames.source_frames, ElementsAre(7));
+  ASSERT_EQ(frames.frames.size(), 3U);
+  EXPECT_EQ(frames.frames[2].id, "000002");
+  EXPECT_EQ(frames.frames[2].source, "photo6.jpg");
+  EXPECT_EQ(frames.frames[2].index, 6);
+  EXPECT_EQ(frames.frames[2].time, 1.5);
+  EXPECT_EQ(frames.frames[2].height, 6);
+}
+
+TEST(MatchMasks, ByFrameBySourceOrByOrder) {
+  const Frames frames = some_frames();
+  using Matched = std::vector<std::optional<int64_t>>;
+  EXPECT_EQ(match_masks("m", {"000000.png", "000001.png", "000002.png"}, 3, frames), (Matched{0, 1, 2}));
+  EXPECT_EQ(match_masks("m", {"other.png", "photo1.png", "photo3.png.png", "photo6.jpg"}, 4, frames),
+            (Matched{1, 2, 3}));
+  EXPECT_EQ(match_masks("m", {"a", "b", "c"}, 3, frames), (Matched{0, 1, 2}));
+  EXPECT_EQ(match_masks("m", {}, 7, frames), (Matched{1, 3, 6}));
+  try {
+    match_masks("m", {"000000.png", "b"}, 2, frames);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(
+        error.what(),
+        HasSubstr("m: masks: found 2, of which 1 have a frame's name, expected one for each of 3 frames"));
+  }
+}
+
+}  // namespace
+}  // namespace traceflow::prepare

@@ -1,0 +1,326 @@
+#include "prepare/prepare.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <glm/gtc/quaternion.hpp>
+#include <iomanip>
+#include <sstream>
+#include <thread>
+
+#include "base/error.h"
+#include "capture/capture.h"
+#include "capture/synth/synth.h"
+#include "files/eight_bit.h"
+#include "files/png.h"
+#include "support/temp_folder.h"
+
+// The whole of `prepare`, with small scripts in the place of ffmpeg and colmap that give out what was
+// recorded.
+namespace traceflow::prepare {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+// For a film F it writes F.ppm or F.pgm, a row of pictures, and says F.times.
+constexpr const char* fake_ffmpeg = R"sh(#!/bin/sh
+kind=ppm
+while [ $# -gt 0 ]; do
+  case "$1" in
+    -i) film=${2#file:} ;;
+    pgm) kind=pgm ;;
+  esac
+  shift
+done
+echo "ffmpeg $kind" >> "$CALLS"
+[ -e "$film.$kind" ] || { echo "$film: Invalid data found when processing input" >&2; exit 1; }
+cat "$film.times" >&2
+cat "$film.$kind"
+)sh";
+
+// Writes what COLMAP would have left where its arguments say; the model is $MODEL.
+constexpr const char* fake_colmap = R"sh(#!/bin/sh
+echo "colmap $*" >> "$CALLS"
+verb=$1
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --database_path) database=$2 ;;
+    --output_path) output=$2 ;;
+  esac
+  shift
+done
+case $verb in
+  feature_extractor) [ "$FAIL" != features ] || { echo "Check failed: no memory" >&2; exit 1; }; echo features > "$database" ;;
+  *_matcher) [ "$(cat "$database")" = features ] || exit 1; echo matches > "$database" ;;
+  mapper)
+    [ "$(cat "$database")" = matches ] || exit 1
+    [ "$FAIL" != mapper ] || { echo "No good initial image pair found." >&2; exit 1; }
+    [ "$FAIL" != slow ] || sleep 1000
+    mkdir "$output/0" "$output/1"
+    cp "$MODEL"/* "$output/1/"
+    cp "$MODEL"/cameras.txt "$output/0/"
+    grep -v 000003 "$MODEL"/images.txt > "$output/0/images.txt"
+    cp "$MODEL"/points3D.txt "$output/0/" ;;
+esac
+)sh";
+
+class PrepareTest : public testing::Test {
+ protected:
+  static constexpr int frames = 14;
+
+  PrepareTest() : path_(std::getenv("PATH")) {
+    fs::create_directories(folder_ / "bin");
+    fs::create_directories(folder_ / "model");
+    write_program("ffmpeg", fake_ffmpeg);
+    write_program("colmap", fake_colmap);
+    ::setenv("PATH", ((folder_ / "bin").string() + ":" + path_).c_str(), 1);
+    ::setenv("CALLS", (folder_ / "calls").c_str(), 1);
+    ::setenv("MODEL", (folder_ / "model").c_str(), 1);
+    ::unsetenv("FAIL");
+    SynthOptions options;
+    options.frames = frames;
+    options.width = 64;
+    options.height = 40;
+    options.samples = 1;
+    options.points = 300;
+    options.test_every = frames;
+    for (const SynthView& view : synth_views(options)) {
+      if (!view.is_test) views_.push_back(view);
+    }
+    write_film(options);
+    write_model(options);
+  }
+  ~PrepareTest() override { ::setenv("PATH", path_.c_str(), 1); }
+
+  void write_program(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / "bin" / name) << text;
+    fs::permissions(folder_ / "bin" / name, fs::perms::owner_all);
+  }
+
+  // Every picture twice, the second time sharper; a quarter of a second apart.
+  void write_film(const SynthOptions& options) const {
+    std::ofstream colour(film() + ".ppm", std::ios::binary), grey(film() + ".pgm", std::ios::binary),
+        times(film() + ".times");
+    std::ofstream(film()) << "a film";
+    for (const SynthView& view : views_) {
+      const Tensor<uint8_t> sharp = to_8bit(synth_images(options, view).colour);
+      Tensor<uint8_t> blurred = sharp;
+      blurred.fill(90);
+      const Tensor<uint8_t>& flat = blurred;
+      for (const Tensor<uint8_t>* picture : {&flat, &sharp}) {
+        colour << "P6\n64 40\n255\n";
+        grey << "P5\n64 40\n255\n";
+        colour.write(reinterpret_cast<const char*>(picture->data()), picture->size());
+        for (int64_t i = 0; i < picture->size(); i += 3) grey.put(static_cast<char>((*picture)[i + 1]));
+        times << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:      0 pts_time:"
+              << 1 + 0.5 * view.frame + (picture == &sharp ? 0.25 : 0) << "       fmt:rgb24\n";
+      }
+    }
+  }
+
+  void write_model(const SynthOptions& options) const {
+    std::ofstream cameras(folder_ / "model/cameras.txt"), images(folder_ / "model/images.txt"),
+        points(folder_ / "model/points3D.txt");
+    for (std::ofstream* file : {&cameras, &images, &points}) *file << std::setprecision(17);
+    const Camera<double>& lens = views_.front().camera;
+    cameras << "1 PINHOLE 64 40 " << lens.focal_x << " " << lens.focal_y << " " << lens.centre_x << " "
+            << lens.centre_y << "\n";
+    for (const SynthView& view : views_) {
+      const glm::dquat q = glm::quat_cast(view.camera.camera_from_world);
+      const Vec3<double> t = -(view.camera.camera_from_world * view.camera.position);
+      std::ostringstream name;
+      name << std::setw(6) << std::setfill('0') << view.frame << ".png";
+      images << view.frame + 1 << " " << q.w << " " << q.x << " " << q.y << " " << q.z << " " << t.x << " "
+             << t.y << " " << t.z << " 1 " << name.str() << "\n\n";
+    }
+    const Tensor<float> cloud = synth_points(options);
+    for (int64_t i = 0; i < cloud.dim(0); ++i) {
+      points << i + 1 << " " << cloud(i, 0) << " " << cloud(i, 1) << " " << cloud(i, 2)
+             << " 9 9 9 0.5 1 0 2 0 3 0\n";
+    }
+  }
+
+  std::string film() const { return (folder_ / "film.mp4").string(); }
+  fs::path capture() const { return folder_ / "capture"; }
+
+  PrepareOptions options() const {
+    PrepareOptions o;
+    o.frames = frames;
+    o.masks = "none";
+    o.test_every = 4;
+    return o;
+  }
+
+  bool prepare(const PrepareOptions& options) {
+    lines_.clear();
+    fs::remove(folder_ / "calls");
+    return prepare_capture(
+        film(), capture(), options, [this](const std::string& line) { lines_.push_back(line); }, stop_);
+  }
+  std::string refusal(const PrepareOptions& options) {
+    try {
+      prepare(options);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  // Which programs were called: "ffmpeg pgm", "colmap mapper".
+  std::vector<std::string> calls() const {
+    std::vector<std::string> found;
+    std::ifstream file(folder_ / "calls");
+    for (std::string program, verb, rest; file >> program >> verb;) {
+      std::getline(file, rest);
+      found.push_back(program + " " + verb);
+    }
+    return found;
+  }
+
+  std::string path_;
+  TempFolder folder_;
+  std::vector<SynthView> views_;
+  std::vector<std::string> lines_;
+  std::atomic<bool> stop_ = false;
+};
+
+TEST_F(PrepareTest, MakesACaptureWithTheKnownCameras) {
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), ElementsAre("ffmpeg pgm", "ffmpeg ppm", "colmap feature_extractor",
+                                   "colmap exhaustive_matcher", "colmap mapper"));
+  ASSERT_EQ(lines_.size(), 6U);
+  EXPECT_THAT(lines_[0], HasSubstr("14 of 28 pictures, the sharpest of each interval, 64×40, over 6.50 s"));
+  EXPECT_THAT(lines_[4],
+              HasSubstr("14 of 14 frames registered, 300 points, reprojection error 0.50 px, lens PINHOLE"));
+  const Capture made = load_capture(capture(), {});
+  EXPECT_TRUE(made.warnings.empty()) << made.warnings.front();
+  ASSERT_EQ(made.train.size(), 11U);
+  ASSERT_EQ(made.test.size(), 3U);
+  for (const View& view : made.train) {
+    const SynthView& truth = views_[std::stoul(view.id)];
+    EXPECT_LT(
+        length(made.normalisation.in_capture(Vec3<double>(view.camera.position)) - truth.camera.position),
+        1e-5);
+    EXPECT_NEAR(view.camera.focal_x, truth.camera.focal_x, 1e-3);
+    EXPECT_NEAR(view.time, static_cast<float>(truth.frame) / (frames - 1), 1e-6);
+  }
+  // The sharp ones of the film were taken.
+  const Tensor<uint8_t> taken = read_png(capture() / "rgb/1x/000002.png");
+  EXPECT_NE(*std::max_element(taken.data(), taken.data() + taken.size()), 90);
+}
+
+TEST_F(PrepareTest, WhatStandsIsNotDoneAgain) {
+  ASSERT_TRUE(prepare(options()));
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), IsEmpty());
+  EXPECT_THAT(lines_, testing::Each(testing::EndsWith("(stands)")));
+  PrepareOptions changed = options();
+  changed.matcher = Matcher::sequential;
+  ASSERT_TRUE(prepare(changed));
+  EXPECT_THAT(calls(), ElementsAre("colmap sequential_matcher", "colmap mapper"));
+  changed.test_every = 5;
+  ASSERT_TRUE(prepare(changed));
+  EXPECT_THAT(calls(), IsEmpty());
+  EXPECT_EQ(load_capture(capture(), {}).test.size(), 3U);
+  fs::remove_all(capture());
+  ASSERT_TRUE(prepare(changed));
+  EXPECT_TRUE(fs::exists(capture() / "dataset.json"));
+}
+
+TEST_F(PrepareTest, EstimatesMasksAndKeepsFeaturesOffThem) {
+  PrepareOptions estimate = options();
+  estimate.masks = "estimate";
+  ASSERT_TRUE(prepare(estimate));
+  EXPECT_TRUE(load_capture(capture(), {}).has_masks);
+  std::ifstream calls(folder_ / "calls");
+  const std::string text{std::istreambuf_iterator<char>(calls), {}};
+  const fs::path masks = work_folder(capture()) / "colmap/masks";
+  EXPECT_THAT(text, HasSubstr("--ImageReader.mask_path " + masks.string()));
+  EXPECT_EQ(read_png_size(masks / "000000.png.png").width, 64);
+}
+
+TEST_F(PrepareTest, StopsAfterTheStepThatIsAsked) {
+  PrepareOptions some = options();
+  some.until = Step::frames;
+  ASSERT_TRUE(prepare(some));
+  EXPECT_THAT(calls(), ElementsAre("ffmpeg pgm", "ffmpeg ppm"));
+  EXPECT_FALSE(fs::exists(capture()));
+  EXPECT_TRUE(fs::exists(work_folder(capture()) / "frames/000013.png"));
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), ElementsAre("colmap feature_extractor", "colmap exhaustive_matcher", "colmap mapper"));
+}
+
+TEST_F(PrepareTest, PosesThatFailSayHowManyAndWhatToTry) {
+  ::setenv("FAIL", "mapper", 1);
+  EXPECT_THAT(refusal(options()),
+              testing::AllOf(HasSubstr("0 of 14 frames registered"), HasSubstr("try more frames"),
+                             HasSubstr("--masks estimate"), HasSubstr("--camera-model opencv")));
+  ::unsetenv("FAIL");
+  std::ofstream(folder_ / "model/images.txt", std::ios::trunc) << "1 1 0 0 0 0 0 0 1 000000.png\n\n";
+  EXPECT_THAT(refusal(options()), HasSubstr("1 of 14 frames registered"));
+  EXPECT_FALSE(fs::exists(capture()));
+}
+
+TEST_F(PrepareTest, AProgramsFailureIsOneLineWithItsOwnWords) {
+  ::setenv("FAIL", "features", 1);
+  EXPECT_THAT(refusal(options()),
+              testing::AllOf(HasSubstr("colmap feature_extractor"), HasSubstr("Check failed: no memory"),
+                             HasSubstr("features_0.log")));
+  ::unsetenv("FAIL");
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), ElementsAre("colmap feature_extractor", "colmap exhaustive_matcher", "colmap mapper"));
+  fs::remove(film() + ".pgm");
+  std::ofstream(film()) << "another film";
+  EXPECT_THAT(refusal(options()), testing::AllOf(HasSubstr("film.mp4"), HasSubstr("Invalid data found")));
+}
+
+TEST_F(PrepareTest, AStopEndsTheProgramAndTheNextCallGoesOn) {
+  ::setenv("FAIL", "slow", 1);
+  std::thread other([this] {
+    while (calls().empty() || calls().back() != "colmap mapper") std::this_thread::yield();
+    stop_ = true;
+  });
+  const bool ended = prepare(options());
+  other.join();
+  EXPECT_FALSE(ended);
+  EXPECT_FALSE(fs::exists(capture()));
+  ::unsetenv("FAIL");
+  stop_ = false;
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), ElementsAre("colmap mapper"));
+}
+
+TEST_F(PrepareTest, AbsentProgramsAreNamed) {
+  ::setenv("PATH", "/nowhere", 1);
+  EXPECT_THAT(refusal(options()), testing::AllOf(HasSubstr("ffmpeg: found no such program"),
+                                                 HasSubstr("scripts/setup --prepare")));
+  ::setenv("PATH", (folder_ / "bin").c_str(), 1);
+  fs::remove(folder_ / "bin/colmap");
+  EXPECT_THAT(refusal(options()), HasSubstr("colmap: found no such program"));
+}
+
+TEST_F(PrepareTest, ACaptureThatSomethingWasAddedToIsNotReplaced) {
+  ASSERT_TRUE(prepare(options()));
+  fs::create_directory(capture() / "normal");
+  EXPECT_TRUE(prepare(options()));
+  PrepareOptions changed = options();
+  changed.matcher = Matcher::sequential;
+  EXPECT_THAT(refusal(changed), HasSubstr("found normal, which prepare did not write"));
+  EXPECT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), IsEmpty());
+}
+
+TEST_F(PrepareTest, WhatIsInTheWayIsLeftAlone) {
+  fs::create_directories(capture() / "holiday");
+  EXPECT_THAT(refusal(options()), HasSubstr("output folder: found other files in it"));
+  EXPECT_FALSE(fs::exists(work_folder(capture())));
+  EXPECT_TRUE(fs::exists(capture() / "holiday"));
+}
+
+}  // namespace
+}  // namespace traceflow::prepare
