@@ -1,0 +1,232 @@
+#include "prepare/attach_priors.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "capture/decode.h"
+#include "capture/image_cache.h"
+#include "files/json_document.h"
+#include "files/png.h"
+#include "prepare/masks.h"
+#include "prepare/normal_source.h"
+#include "prepare/programs.h"
+
+namespace traceflow::prepare {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Say = std::function<void(const std::string& line)>;
+
+// Everything new lies here, until it is whole.
+class Staging {
+ public:
+  explicit Staging(const fs::path& capture) : capture_(capture), folder_(capture / ".attach-priors") {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~Staging() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+  }
+  Staging(const Staging&) = delete;
+  Staging& operator=(const Staging&) = delete;
+
+  fs::path operator/(const fs::path& name) const { return folder_ / name; }
+  // Puts a folder made here in the place of the capture's.
+  void move_in(const std::string& name) const {
+    const fs::path old = folder_ / ("old " + name);
+    if (fs::exists(capture_ / name)) fs::rename(capture_ / name, old);
+    fs::rename(folder_ / name, capture_ / name);
+  }
+
+ private:
+  fs::path capture_, folder_;
+};
+
+void refuse_to_replace(const fs::path& capture, std::initializer_list<const char*> names,
+                       const AttachOptions& options) {
+  for (const char* name : names) {
+    if (fs::exists(capture / name) && !options.force) {
+      throw InputError((capture / name).string(), "", "something there already", "a capture without",
+                       "add --force to replace it");
+    }
+  }
+}
+
+std::vector<std::string> ids_of(const std::vector<View>& views) {
+  std::vector<std::string> ids;
+  for (const View& view : views) ids.push_back(view.id);
+  return ids;
+}
+
+// Those that are there, in the order of dataset.json.
+std::vector<std::string> all_ids(const Capture& capture) {
+  std::vector<std::string> ids = ids_of(capture.train);
+  const std::vector<std::string> test = ids_of(capture.test);
+  ids.insert(ids.end(), test.begin(), test.end());
+  const JsonFile dataset(capture.folder / "dataset.json");
+  if (!dataset.has("ids")) return ids;
+  std::vector<std::string> ordered = dataset["ids"].strings();
+  std::erase_if(ordered,
+                [&](const std::string& id) { return std::find(ids.begin(), ids.end(), id) == ids.end(); });
+  return ordered.size() == ids.size() ? ordered : ids;
+}
+
+// f(id, what belongs to it), in the order of the source.
+template <class Source, class F>
+void for_each_view(const std::map<std::string, int64_t>& matched, Source&& take, F&& f) {
+  std::map<int64_t, std::string> by_index;
+  for (const auto& [id, index] : matched) by_index.emplace(index, id);
+  std::vector<int64_t> indices;
+  for (const auto& [index, id] : by_index) indices.push_back(index);
+  take(indices,
+       [&](int64_t place, auto&& value) { f(by_index.at(indices[static_cast<size_t>(place)]), value); });
+}
+
+// What the axes are measured on: the training views nearest to time 0, when the points were there.
+AxisEvidence measure(const Capture& capture, const NormalSource& source,
+                     const std::map<std::string, int64_t>& matched, const Staging& staging) {
+  constexpr size_t views_to_check = 6;
+  std::vector<const View*> views;
+  for (const View& view : capture.train) {
+    if (matched.contains(view.id)) views.push_back(&view);
+  }
+  std::stable_sort(views.begin(), views.end(),
+                   [](const View* a, const View* b) { return a->time < b->time; });
+  views.resize(std::min(views.size(), views_to_check));
+  std::map<std::string, int64_t> some;
+  for (const View* view : views) some.emplace(view->id, matched.at(view->id));
+  fs::create_directories(staging / "probe");
+  for_each_view(
+      some, [&](const auto& indices, const auto& f) { source.take(indices, f); },
+      [&](const std::string& id, const Tensor<float>& normals) {
+        write_png(staging / "probe" / (id + ".png"), normal_picture(normals));
+      });
+  const auto tree = FileTree::open(staging / "probe");
+  std::vector<PriorView> priors;
+  for (const View* view : views) {
+    ViewSource with_prior = capture.images->source(view->id);
+    with_prior.prior = {tree, view->id + ".png"};
+    with_prior.prior_slice = -1;
+    priors.push_back({view->camera, decode_prior(with_prior, capture.images->capture())});
+  }
+  return measure_prior_axes(capture.points, priors);
+}
+
+void attach_normals(const Capture& capture, const AttachOptions& options, const Staging& staging,
+                    const Say& say, const std::atomic<bool>& stop) {
+  const NormalSource source(options.normals, staging / "ffmpeg.log", stop);
+  const auto matched =
+      match_views(options.normals, source.names(), source.count(), ids_of(capture.train), all_ids(capture));
+  const FoundAxes axes = find_axes(options.axes, measure(capture, source, matched, staging), options.normals);
+  say(fmt::format("{:<10}{} of {} views", "normals", matched.size(),
+                  capture.train.size() + capture.test.size()));
+  say(fmt::format("{:<10}{}", "axes", axes.text));
+  const Vec3<float> written(axes.signs * prior_axis_signs(PriorAxes::opengl));
+  fs::create_directories(staging / "normal/1x");
+  for_each_view(
+      matched, [&](const auto& indices, const auto& f) { source.take(indices, f); },
+      [&](const std::string& id, Tensor<float>& normals) {
+        if (stop) throw Stopped{};
+        for (int64_t i = 0; i < normals.size(); i += 3)
+          store3(&normals[i], written * load3<float>(&normals[i]));
+        write_png(staging / "normal/1x" / (id + ".png"), normal_picture(normals));
+      });
+}
+
+void attach_masks(const Capture& capture, const AttachOptions& options, const Staging& staging,
+                  const Say& say, const std::atomic<bool>& stop) {
+  const PictureSource source(options.masks, 0, staging / "ffmpeg.log", stop);
+  const std::vector<std::string> names = source.names();
+  auto count = static_cast<int64_t>(names.size());
+  if (!source.is_folder()) source.take_all(true, [&](int64_t, Tensor<uint8_t>&&) { ++count; });
+  const auto matched = match_views(options.masks, names, count, ids_of(capture.train), all_ids(capture));
+  fs::create_directories(staging / "mask/1x");
+  double covered = 0;
+  for_each_view(
+      matched, [&](const auto& indices, const auto& f) { source.take_some(true, indices, f); },
+      [&](const std::string& id, const Tensor<uint8_t>& picture) {
+        const Tensor<uint8_t> mask = as_mask(picture);
+        covered += share_of(mask) / static_cast<double>(matched.size());
+        write_mask(staging / "mask/1x" / (id + ".png.png"), mask);
+      });
+  require_white(options.masks, covered);
+  say(fmt::format("{:<10}{} of {} views, covering {:.1f}% of the pixels", "masks", matched.size(),
+                  capture.train.size() + capture.test.size(), 100 * covered));
+}
+
+}  // namespace
+
+void AttachOptions::validate() const {
+  if (normals.empty() && masks.empty())
+    throw InputError("option", "normals", "nothing", "--normals, --masks or both");
+}
+
+std::map<std::string, int64_t> match_views(const std::string& origin, const std::vector<std::string>& names,
+                                           int64_t count, const std::vector<std::string>& train_ids,
+                                           const std::vector<std::string>& all_ids) {
+  std::map<std::string, int64_t> by_name, matched;
+  for (size_t i = 0; i < names.size(); ++i) by_name.emplace(stem_of(names[i]), static_cast<int64_t>(i));
+  for (const std::string& id : all_ids) {
+    const auto found = by_name.find(id);
+    if (found != by_name.end()) matched.emplace(id, found->second);
+  }
+  const auto training = std::count_if(train_ids.begin(), train_ids.end(),
+                                      [&](const std::string& id) { return matched.contains(id); });
+  if (training == static_cast<std::ptrdiff_t>(train_ids.size())) return matched;
+  const bool of_train = count == static_cast<int64_t>(train_ids.size()),
+             of_all = count == static_cast<int64_t>(all_ids.size());
+  if (!of_train && !of_all) {
+    throw InputError(
+        origin, "count", fmt::format("{}, of which {} have a training view's name", count, training),
+        fmt::format("one for each of {} training views or of all {}", train_ids.size(), all_ids.size()),
+        "make them from the pictures in rgb/1x");
+  }
+  matched.clear();
+  const std::vector<std::string>& ids = of_train ? train_ids : all_ids;
+  for (size_t i = 0; i < ids.size(); ++i) matched.emplace(ids[i], static_cast<int64_t>(i));
+  return matched;
+}
+
+FoundAxes find_axes(PriorAxes asked, const AxisEvidence& evidence, const std::string& origin) {
+  const Vec3<double>& c = evidence.correlation;
+  const std::string measured = fmt::format(
+      "correlation with the geometry x {:+.2f}, y {:+.2f}, z {:+.2f} (against x right, y down, z forward) "
+      "over {} samples",
+      c.x, c.y, c.z, evidence.samples);
+  if (asked != PriorAxes::automatic) {
+    const AxisChoice choice = choose_prior_axes(asked, evidence);
+    return {prior_axis_signs(asked), measured + ": " + prior_axes_name(asked) +
+                                         (choice.warning.empty() ? "" : "; warning: " + choice.warning)};
+  }
+  for (const PriorAxes axes : {PriorAxes::opengl, PriorAxes::opencv, PriorAxes::stable_normal}) {
+    if (agrees(axes, evidence)) return {prior_axis_signs(axes), measured + ": " + prior_axes_name(axes)};
+  }
+  constexpr double clear = 0.3;
+  if (std::min({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) < clear) {
+    throw InputError(origin, "axes", measured, "axes of a known kind", "say which they are with --axes");
+  }
+  return {sign(c), measured + ": no known axes, taken as measured"};
+}
+
+void attach_priors(const fs::path& folder, const AttachOptions& options, const Say& say,
+                   const std::atomic<bool>& stop) {
+  options.validate();
+  if (!fs::is_regular_file(folder / "dataset.json")) {
+    throw InputError(folder.string(), "dataset.json", "no such file", "a folder in the layout of NeRF-DS",
+                     "see docs/captures.md");
+  }
+  if (!options.normals.empty()) refuse_to_replace(folder, {"normal", "normal.npz", "normal.npy"}, options);
+  if (!options.masks.empty()) refuse_to_replace(folder, {"mask", "resized_mask"}, options);
+  const Capture capture = load_capture(folder, {});
+  const Staging staging(folder);
+  if (!options.normals.empty()) attach_normals(capture, options, staging, say, stop);
+  if (!options.masks.empty()) attach_masks(capture, options, staging, say, stop);
+  if (!options.normals.empty()) staging.move_in("normal");
+  if (!options.masks.empty()) staging.move_in("mask");
+}
+
+}  // namespace traceflow::prepare

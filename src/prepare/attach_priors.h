@@ -1,0 +1,54 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "capture/capture.h"
+#include "capture/prior_axes.h"
+
+namespace traceflow::prepare {
+
+struct AttachOptions {
+  std::string normals;
+  std::string masks;
+  PriorAxes axes = PriorAxes::automatic;
+  bool force = false;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("normals", normals, "",
+            "An .npz or .npy array T×H×W×3 of normals, a film of pictures of them, or a folder of such "
+            "pictures.");
+    v.field("masks", masks, "", "A folder or film with the moving object white.");
+    v.field("axes", axes, "", "Axes of the normals; automatic: by agreement with the capture's points.");
+    v.field("force", force, "", "Replaces normals and masks that are there.");
+  }
+  void validate() const;
+};
+
+// Puts normals and masks of other programs into a capture in the layout of NeRF-DS: normal/1x/ID.png with 16
+// bits and the axes that are the default there (x right, y up, z to the viewer), mask/1x/ID.png.png. `say`
+// gets a line for everything found. Throws InputError, with the capture as it was, and Stopped.
+void attach_priors(const std::filesystem::path& capture, const AttachOptions& options,
+                   const std::function<void(const std::string& line)>& say, const std::atomic<bool>& stop);
+
+// Which of `count` pictures belongs to which view: by name, where every training view finds its own; else by
+// order, one for each training view or one for each view. Throws InputError where neither fits.
+std::map<std::string, int64_t> match_views(const std::string& origin, const std::vector<std::string>& names,
+                                           int64_t count, const std::vector<std::string>& train_ids,
+                                           const std::vector<std::string>& all_ids);
+
+// The signs of the axes of normals against the camera's (x right, y down, z forward), and in words how they
+// were found. automatic: those of the known axes that the evidence agrees with, else the evidence's own;
+// InputError where it does not speak clearly.
+struct FoundAxes {
+  Vec3<double> signs{1};
+  std::string text;
+};
+FoundAxes find_axes(PriorAxes asked, const AxisEvidence& evidence, const std::string& origin);
+
+}  // namespace traceflow::prepare

@@ -1,0 +1,213 @@
+#include "prepare/attach_priors.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <numeric>
+
+#include "base/error.h"
+#include "capture/synth/synth.h"
+#include "files/npy.h"
+#include "files/png.h"
+#include "prepare/masks.h"
+#include "prepare/normal_source.h"
+#include "support/temp_folder.h"
+
+namespace traceflow::prepare {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+SynthOptions small() {
+  SynthOptions options;
+  options.frames = 5;
+  options.width = 80;
+  options.height = 48;
+  options.samples = 1;
+  options.points = 4000;
+  options.test_every = 2;
+  options.prior_noise = 0;
+  return options;
+}
+
+// A synthetic capture, its priors taken away and given as another program would have left them.
+class AttachPriors : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    made_ = std::make_unique<TempFolder>();
+    write_synthetic_capture(small(), *made_ / "capture");
+  }
+  static void TearDownTestSuite() { made_.reset(); }
+
+  AttachPriors() {
+    fs::copy(*made_ / "capture", capture(), fs::copy_options::recursive);
+    fs::remove_all(capture() / "normal");
+    truth_ = load_capture(*made_ / "capture", {});
+  }
+
+  fs::path capture() const { return folder_ / "capture"; }
+
+  // The training views' normals on other axes than OpenGL's: element i of the array belongs to view i.
+  Tensor<float> normals_in(const Vec3<double>& signs) const {
+    Tensor<float> array({static_cast<int64_t>(truth_.train.size()), 48, 80, 3});
+    for (size_t i = 0; i < truth_.train.size(); ++i) {
+      const View& view = truth_.train[i];
+      const auto images = load_images(truth_, view);
+      for (int64_t k = 0; k < 48 * 80; ++k) {
+        const Vec3<float> in_camera =
+            view.camera.camera_from_world * load3<float>(&images->normal_prior[3 * k]);
+        store3(array.row(static_cast<int64_t>(i)) + 3 * k, Vec3<float>(signs) * in_camera);
+      }
+    }
+    return array;
+  }
+
+  std::string attach(const AttachOptions& options) {
+    std::string said;
+    attach_priors(
+        capture(), options, [&](const std::string& line) { said += line + "\n"; }, never_);
+    return said;
+  }
+
+  void expect_normals_of_the_truth(double tolerance) const {
+    const Capture attached = load_capture(capture(), {});
+    EXPECT_EQ(attached.prior_axes, PriorAxes::opengl);
+    for (const View& view : attached.train) {
+      const auto found = load_images(attached, view), truth = load_images(truth_, view);
+      ASSERT_FALSE(found->normal_prior.empty());
+      double worst = 0;
+      for (int64_t k = 0; k < found->normal_prior.size(); k += 3) {
+        const Vec3<float> a = load3<float>(&found->normal_prior[k]),
+                          b = load3<float>(&truth->normal_prior[k]);
+        worst = std::max(worst, static_cast<double>(length(a - b)));
+      }
+      EXPECT_LT(worst, tolerance) << view.id;
+    }
+  }
+
+  std::string refusal(const AttachOptions& options) {
+    try {
+      attach(options);
+    } catch (const InputError& error) {
+      EXPECT_FALSE(fs::exists(capture() / ".attach-priors"));
+      return error.what();
+    }
+    return "";
+  }
+
+  static std::unique_ptr<TempFolder> made_;
+  TempFolder folder_;
+  Capture truth_;
+  const std::atomic<bool> never_ = false;
+};
+std::unique_ptr<TempFolder> AttachPriors::made_;
+
+TEST_F(AttachPriors, FindsTheAxesOfEachKind) {
+  const std::vector<std::pair<Vec3<double>, std::string>> kinds = {{{1, -1, -1}, "opengl"},
+                                                                   {{1, 1, 1}, "opencv"},
+                                                                   {{-1, -1, -1}, "stable-normal"},
+                                                                   {{-1, 1, -1}, "taken as measured"}};
+  for (const auto& [signs, name] : kinds) {
+    write_npy(folder_ / "normals.npy", normals_in(signs));
+    AttachOptions options;
+    options.normals = folder_ / "normals.npy";
+    options.force = true;
+    const std::string said = attach(options);
+    EXPECT_THAT(said, HasSubstr(name));
+    EXPECT_THAT(said, HasSubstr("correlation with the geometry x "));
+    expect_normals_of_the_truth(0.012);  // the truth itself has 8 bits
+  }
+}
+
+TEST_F(AttachPriors, TakesAxesThatAreNamed) {
+  write_npy(folder_ / "normals.npy", normals_in({-1, -1, -1}));
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  options.axes = PriorAxes::stable_normal;
+  EXPECT_THAT(attach(options), testing::Not(HasSubstr("warning")));
+  expect_normals_of_the_truth(0.012);
+  options.axes = PriorAxes::opencv;
+  options.force = true;
+  EXPECT_THAT(attach(options), HasSubstr("warning: normal priors: the axes opencv disagree"));
+}
+
+TEST_F(AttachPriors, PicturesOfAFolderGoByName) {
+  const Tensor<float> normals = normals_in({-1, -1, -1});
+  fs::create_directory(folder_ / "pngs");
+  for (size_t i = 0; i < truth_.train.size(); ++i) {
+    Tensor<float> one({48, 80, 3});
+    std::copy_n(normals.row(static_cast<int64_t>(i)), one.size(), one.data());
+    write_png(folder_ / "pngs" / (truth_.train[i].id + ".png"), normal_picture(one));
+  }
+  std::ofstream(folder_ / "pngs/0_not_one.png") << "x";  // a name more: by order it would not fit
+  AttachOptions options;
+  options.normals = folder_ / "pngs";
+  EXPECT_THAT(attach(options), HasSubstr("5 of 7 views"));
+  expect_normals_of_the_truth(0.012);
+}
+
+TEST_F(AttachPriors, NothingIsReplacedUnasked) {
+  write_npy(folder_ / "normals.npy", normals_in({1, 1, 1}));
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  attach(options);
+  EXPECT_THAT(refusal(options), HasSubstr("add --force to replace it"));
+  options = {};
+  options.masks = *made_ / "capture/mask/1x";
+  EXPECT_THAT(refusal(options), HasSubstr("mask: found something there already"));
+  expect_normals_of_the_truth(0.012);
+}
+
+TEST_F(AttachPriors, WhatDoesNotFitIsRefusedAndTheCaptureLeftAsItWas) {
+  AttachOptions options;
+  EXPECT_THAT(refusal(options), HasSubstr("--normals, --masks or both"));
+  options.normals = folder_ / "nowhere.npz";
+  EXPECT_THAT(refusal(options), HasSubstr("nowhere.npz"));
+  Tensor<float> short_array({3, 48, 80, 3});
+  write_npy(folder_ / "short.npy", short_array);
+  options.normals = folder_ / "short.npy";
+  EXPECT_THAT(refusal(options), HasSubstr("short.npy: count: found 3"));
+  write_npy(folder_ / "flat.npy", Tensor<float>({5, 48, 80}));
+  options.normals = folder_ / "flat.npy";
+  EXPECT_THAT(refusal(options), HasSubstr("expected T×H×W×3"));
+  fs::create_directory(folder_ / "empty");
+  options.normals = folder_ / "empty";
+  EXPECT_THAT(refusal(options), HasSubstr("no pictures"));
+  EXPECT_FALSE(fs::exists(capture() / "normal"));
+}
+
+TEST(FindAxes, AMixtureThatIsNotClearIsRefused) {
+  const AxisEvidence mirrored{{0.9, 0.8, -0.7}, 1000}, unclear{{0.1, 0.8, -0.7}, 1000};
+  EXPECT_EQ(find_axes(PriorAxes::automatic, mirrored, "n").signs, Vec3<double>(1, 1, -1));
+  EXPECT_THROW(find_axes(PriorAxes::automatic, unclear, "n"), InputError);
+  EXPECT_EQ(find_axes(PriorAxes::automatic, {{0.1, 0.05, -0.9}, 1000}, "n").signs, Vec3<double>(1, -1, -1));
+}
+
+TEST(MatchViews, ByNameElseByOrder) {
+  using Map = std::map<std::string, int64_t>;
+  const std::vector<std::string> train{"a", "c"}, all{"a", "b", "c"};
+  EXPECT_EQ(match_views("n", {"b.png", "c.png", "a.png"}, 3, train, all),
+            (Map{{"a", 2}, {"b", 0}, {"c", 1}}));
+  EXPECT_EQ(match_views("n", {}, 2, train, all), (Map{{"a", 0}, {"c", 1}}));
+  EXPECT_EQ(match_views("n", {"x", "y", "z"}, 3, train, all), (Map{{"a", 0}, {"b", 1}, {"c", 2}}));
+  EXPECT_THROW(match_views("n", {"a"}, 1, train, all), InputError);
+}
+
+TEST(NormalPicture, HasSixteenBitsAndBlackForNone) {
+  Tensor<float> normals({1, 2, 3});
+  store3(normals.data(), Vec3<float>(0, 0, -3));
+  const Tensor<uint16_t> picture = normal_picture(normals);
+  EXPECT_EQ(picture[0], 32768);
+  EXPECT_EQ(picture[2], 0);
+  EXPECT_EQ(picture[3], 0);
+  const TempFolder folder;
+  write_png(folder / "n.png", picture);
+  const Tensor<uint16_t> back = read_png16(InputFile(folder / "n.png"));
+  ASSERT_EQ(back.shape(), picture.shape());
+  for (int64_t i = 0; i < back.size(); ++i) EXPECT_EQ(back[i], picture[i]);
+}
+
+}  // namespace
+}  // namespace traceflow::prepare
