@@ -30,7 +30,7 @@ class Preparation {
         work_(work_folder(capture_)),
         options_(options),
         stop_(&stop),
-        steps_(work_, say) {}
+        steps_(work_, say, [this] { before_work(); }) {}
 
   void run() {
     for (const Step step :
@@ -47,6 +47,12 @@ class Preparation {
   fs::path masks() const { return work_ / "masks"; }
   fs::path frame_list() const { return work_ / "frames.list.json"; }
   PoseFolder poses() const { return {work_ / "colmap"}; }
+
+  // Before hours go into steps whose capture would find its place taken.
+  void before_work() const {
+    if (options_.until == Step::capture) check_place(capture_);
+    fs::create_directories(work_);
+  }
 
   void run_step(Step step) {
     switch (step) {
@@ -123,7 +129,6 @@ class Preparation {
   }
 
   std::string finish() {
-    check_place(capture_);
     const fs::path made = work_ / "capture";
     std::string found =
         write_capture(options_, {frames_, pictures(), masks(), read_chosen_model(poses())}, made, *stop_);
@@ -158,8 +163,6 @@ bool prepare_capture(const fs::path& input, const fs::path& capture, const Prepa
   if (!fs::exists(input)) throw InputError(input.string(), "", "nothing", "a film or a folder of pictures");
   need_program("ffmpeg");
   if (options.until > Step::masks) need_program("colmap");
-  if (options.until == Step::capture) check_place(capture);
-  fs::create_directories(work_folder(capture));
   try {
     Preparation(input, capture, options, say, stop).run();
   } catch (const Stopped&) {

@@ -48,6 +48,7 @@ void Steps::run(Step step, const json& inputs, const std::function<bool()>& stan
     say_(fmt::format("{:<10}{} (stands)", step_name(step), done.at("found").get<std::string>()));
     return;
   }
+  before_();
   for (size_t later = enum_names(step).size(); later-- > static_cast<size_t>(step);) {
     fs::remove(path_of(static_cast<Step>(later)));
   }

@@ -16,8 +16,11 @@ class Steps {
  public:
   using Say = std::function<void(const std::string& line)>;
 
-  // say: gets one line per step.
-  Steps(std::filesystem::path folder, Say say) : folder_(std::move(folder)), say_(std::move(say)) {}
+  // say: gets one line per step. before: called when a step's work is about to begin; what it throws leaves
+  // all stamps.
+  Steps(
+      std::filesystem::path folder, Say say, std::function<void()> before = [] {})
+      : folder_(std::move(folder)), say_(std::move(say)), before_(std::move(before)) {}
 
   // Does `work`, which tells what it found, unless this step and all before it stand and `stands` finds the
   // results in their place. inputs: what the results depend on, beyond the steps before. From the moment when
@@ -33,6 +36,7 @@ class Steps {
 
   std::filesystem::path folder_;
   Say say_;
+  std::function<void()> before_;
 };
 
 std::string step_name(Step step);

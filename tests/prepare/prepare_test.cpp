@@ -304,6 +304,17 @@ TEST_F(PrepareTest, AbsentProgramsAreNamed) {
   EXPECT_THAT(refusal(options()), HasSubstr("colmap: found no such program"));
 }
 
+TEST_F(PrepareTest, ACaptureThatSomethingWasAddedToIsNotReplaced) {
+  ASSERT_TRUE(prepare(options()));
+  fs::create_directory(capture() / "normal");
+  EXPECT_TRUE(prepare(options()));
+  PrepareOptions changed = options();
+  changed.matcher = Matcher::sequential;
+  EXPECT_THAT(refusal(changed), HasSubstr("found normal, which prepare did not write"));
+  EXPECT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), IsEmpty());
+}
+
 TEST_F(PrepareTest, WhatIsInTheWayIsLeftAlone) {
   fs::create_directories(capture() / "holiday");
   EXPECT_THAT(refusal(options()), HasSubstr("output folder: found other files in it"));
