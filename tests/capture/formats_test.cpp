@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "capture/capture.h"
+#include "capture/image_cache.h"
 #include "fake_formats.h"
 
 namespace traceflow {
@@ -121,6 +122,7 @@ TEST(ColmapCapture, two_cameras_side_by_side_share_their_times) {
   EXPECT_THAT(ids(capture.train), ElementsAre("left_0", "left_1", "left_2", "right_0", "right_1", "right_2"));
   EXPECT_FLOAT_EQ(capture.train[1].time, 0.5F);
   EXPECT_FLOAT_EQ(capture.train[4].time, 0.5F);
+  EXPECT_EQ(capture.images->source("right_1").rig_camera, "right");
   options.times = CaptureTimes::none;
   const Capture still = load_capture(fake.path(), options);
   EXPECT_EQ(still.train[4].time, 0);
@@ -139,10 +141,8 @@ TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
   // What is left is split.
   EXPECT_THAT(ids(capture.test), ElementsAre("frame_0", "frame_9"));
   EXPECT_EQ(capture.train.size(), 7U);
-  EXPECT_THAT(capture.warnings,
-              Contains(Says("1 of 10 registered views have no image (frame_3): left out")));
-  EXPECT_THAT(capture.warnings,
-              Contains(Says("1 image has no camera (images/blurred.png)")));
+  EXPECT_THAT(capture.warnings, Contains(Says("1 of 10 registered views have no image (frame_3): left out")));
+  EXPECT_THAT(capture.warnings, Contains(Says("1 image has no camera (images/blurred.png)")));
   EXPECT_THAT(capture.warnings, Contains(Says("sparse/0 is read, sparse/1 not")));
   EXPECT_THAT(capture.warnings, Contains(Says("--format transforms")));
 }
@@ -328,6 +328,7 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
       Json& split = splits[camera == 0 ? "train" : "val"];
       split["frame_names"].push_back(id);
       split["time_ids"].push_back(t);
+      split["camera_ids"].push_back(camera);
     }
   }
   fake.dataset = {{"ids", {"not looked at"}}};
@@ -343,6 +344,7 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
   EXPECT_THAT(ids(capture.train), ElementsAre("0_00000", "0_00001", "0_00002", "0_00003"));
   EXPECT_THAT(ids(capture.test), ElementsAre("1_00000", "1_00001", "1_00002", "1_00003"));
   EXPECT_FLOAT_EQ(capture.test[2].time, 2.0F / 3);
+  EXPECT_EQ(capture.images->source("1_00002").rig_camera, "1");
   EXPECT_EQ(capture.normalisation.scale, 0.5);
   EXPECT_THAT(capture.warnings, Contains(Says("depth/ is not used")));
 
@@ -399,8 +401,7 @@ TEST(Formats, orientation_is_told) {
       std::string("Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0", 32);
   jpeg.insert(2, "\xff\xe1" + std::string(1, '\0') + static_cast<char>(exif.size() + 2) + exif);
   fake.write_text("images/frame_1.jpg", jpeg);
-  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
-              Contains(Says("viewers turn the images of frame_1")));
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(Says("viewers turn the images of frame_1")));
 }
 
 }  // namespace

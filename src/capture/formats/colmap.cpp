@@ -61,8 +61,8 @@ class Reader {
       if (folder != folder_ && has_colmap_model(*tree_, folder)) others.push_back(folder);
     }
     if (!others.empty()) {
-      found_.warnings.push_back("COLMAP made several models that it could not join: " + folder_ +
-                                " is read, " + ids_text(others) + " not");
+      found_.warnings.emplace_back("COLMAP made several models that it could not join: " + folder_ +
+                                   " is read, " + ids_text(others) + " not");
     }
   }
 
@@ -120,7 +120,7 @@ class Reader {
             image.camera_from_world,
             image.position,
             time,
-            ""};
+            std::filesystem::path(image.name).parent_path().generic_string()};
   }
 
   const std::shared_ptr<const FileTree> tree_;

@@ -17,12 +17,15 @@ std::vector<std::string> read_split(const FileTree& tree, const char* path, Nerf
   const JsonFile split(tree.open_file(path));
   const std::vector<JsonField> names = split["frame_names"].elements();
   const std::vector<JsonField> times = split["time_ids"].elements(names.size());
+  std::vector<JsonField> cameras;
+  if (split.has("camera_ids")) cameras = split["camera_ids"].elements(names.size());
   std::vector<std::string> ids;
   for (size_t i = 0; i < names.size(); ++i) {
     ids.push_back(names[i].text());
     check_capture_id(names[i], ids.back());
     if (!seen.insert(ids.back()).second) names[i].fail(ids.back() + " a second time", "each frame once");
     layout.time_id[ids.back()] = times[i].number(0, 1e12);
+    if (!cameras.empty()) layout.rig_camera[ids.back()] = std::to_string(cameras[i].whole(0, 1000000));
   }
   layout.all_ids.insert(layout.all_ids.end(), ids.begin(), ids.end());
   return ids;

@@ -48,7 +48,7 @@ class Reader {
   }
 
  private:
-  void warn(const std::string& text) { found_.warnings.push_back(text); }
+  void warn(const std::string& text) { found_.warnings.emplace_back(text); }
 
   void read_split_files() {
     found_.background = Background::white;
