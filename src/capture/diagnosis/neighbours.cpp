@@ -14,10 +14,10 @@ namespace traceflow {
 namespace {
 
 constexpr size_t fewest_views = 5;
-constexpr size_t reach = 3;         // neighbours on either side that a picture's sharpness is compared with
-constexpr double blur_share = 0.4;  // of their median sharpness
-constexpr double jump_stops = 0.5;  // from one picture to the next,
-constexpr double jump_steps = 6;    // and in median steps
+constexpr size_t reach = 3;          // neighbours on either side that a picture's sharpness is compared with
+constexpr double blur_share = 0.4;   // of their median sharpness
+constexpr double jump_stops = 0.75;  // from one picture to the next,
+constexpr double jump_steps = 6;     // and in median steps
 constexpr double frozen_share = 0.05;  // of the median difference between one picture and the next
 
 // One camera's views of both splits in the order of time, those that could not be read left out.

@@ -27,7 +27,8 @@ struct Sighting {
 
 Sighting look(const Capture& capture) {
   const int64_t step = std::max<int64_t>(1, capture.points.dim(0) / sample_size);
-  const auto count = static_cast<double>((capture.points.dim(0) + step - 1) / step);
+  const int64_t sampled = (capture.points.dim(0) + step - 1) / step;
+  const auto count = static_cast<double>(sampled);
   Sighting result;
   std::vector<int64_t> hits(capture.train.size(), 0);
   int64_t unseen = 0, behind = 0;

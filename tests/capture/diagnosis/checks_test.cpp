@@ -159,11 +159,11 @@ TEST(Diagnosis, finds_a_blurred_picture) {
 TEST(Diagnosis, finds_a_dark_picture_and_does_not_call_it_blurred) {
   const BrokenCapture capture;
   capture.edit_image(BrokenCapture::image(6), [](auto& pixels) {
-    for (uint8_t& v : pixels.values()) v = static_cast<uint8_t>(v * 0.7);
+    for (uint8_t& v : pixels.values()) v = static_cast<uint8_t>(v * 0.5);
   });
   const Finding found = only(capture, "exposure-jump");
   EXPECT_THAT(found.views, ElementsAre("000006_left"));
-  EXPECT_NEAR(*found.value, -2.2 * std::log2(0.7), 0.25);
+  EXPECT_NEAR(*found.value, -2.2 * std::log2(0.5), 0.25);
 }
 
 TEST(Diagnosis, finds_a_change_of_exposure_that_lasts) {
