@@ -7,10 +7,10 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "capture/sharpness.h"
 #include "files/json_document.h"
 #include "files/png.h"
 #include "prepare/picture_source.h"
-#include "prepare/sharpness.h"
 
 namespace traceflow::prepare {
 

@@ -10,11 +10,11 @@
 #include "base/error.h"
 #include "base/process.h"
 #include "base/random.h"
+#include "capture/sharpness.h"
 #include "prepare/frames.h"
 #include "prepare/masks.h"
 #include "prepare/netpbm.h"
 #include "prepare/picture_source.h"
-#include "prepare/sharpness.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::prepare {
