@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "base/error.h"
@@ -19,11 +20,11 @@ using testing::IsEmpty;
 using testing::Not;
 
 // A finding with this in its text.
-auto Says(const std::string& part) { return testing::Field("text", &Finding::text, HasSubstr(part)); }
+auto says(const std::string& part) { return testing::Field("text", &Finding::text, HasSubstr(part)); }
 
 std::vector<std::string> ids(const std::vector<View>& views) {
-  std::vector<std::string> result;
-  for (const View& view : views) result.push_back(view.id);
+  std::vector<std::string> result(views.size());
+  std::transform(views.begin(), views.end(), result.begin(), [](const View& view) { return view.id; });
   return result;
 }
 
@@ -126,7 +127,7 @@ TEST(ColmapCapture, two_cameras_side_by_side_share_their_times) {
   options.times = CaptureTimes::none;
   const Capture still = load_capture(fake.path(), options);
   EXPECT_EQ(still.train[4].time, 0);
-  EXPECT_THAT(still.warnings, Contains(Says("all views have time 0")));
+  EXPECT_THAT(still.warnings, Contains(says("all views have time 0")));
 }
 
 TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
@@ -141,10 +142,10 @@ TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
   // What is left is split.
   EXPECT_THAT(ids(capture.test), ElementsAre("frame_0", "frame_9"));
   EXPECT_EQ(capture.train.size(), 7U);
-  EXPECT_THAT(capture.warnings, Contains(Says("1 of 10 registered views have no image (frame_3): left out")));
-  EXPECT_THAT(capture.warnings, Contains(Says("1 image has no camera (images/blurred.png)")));
-  EXPECT_THAT(capture.warnings, Contains(Says("sparse/0 is read, sparse/1 not")));
-  EXPECT_THAT(capture.warnings, Contains(Says("--format transforms")));
+  EXPECT_THAT(capture.warnings, Contains(says("1 of 10 registered views have no image (frame_3): left out")));
+  EXPECT_THAT(capture.warnings, Contains(says("1 image has no camera (images/blurred.png)")));
+  EXPECT_THAT(capture.warnings, Contains(says("sparse/0 is read, sparse/1 not")));
+  EXPECT_THAT(capture.warnings, Contains(says("--format transforms")));
 }
 
 TEST(ColmapCapture, no_photographs_at_all_is_refused) {
@@ -201,7 +202,7 @@ TEST(SyntheticCapture, times_make_it_a_moving_one) {
   EXPECT_EQ(capture.format, "d-nerf");
   EXPECT_FLOAT_EQ(capture.train[3].time, 0.6F);
   EXPECT_FLOAT_EQ(capture.test[1].time, 0.2F);
-  EXPECT_THAT(capture.warnings, Not(Contains(Says("time 0"))));
+  EXPECT_THAT(capture.warnings, Not(Contains(says("time 0"))));
   CaptureOptions options;
   options.times = CaptureTimes::none;
   EXPECT_EQ(load_capture(fake.path(), options).train[3].time, 0);
@@ -210,7 +211,7 @@ TEST(SyntheticCapture, times_make_it_a_moving_one) {
     frame["time"] = frame["time"].get<double>() - 3;
   fake.save();
   const Capture shifted = load_capture(fake.path(), {});
-  EXPECT_THAT(shifted.warnings, Contains(Says("without a time (test/r_1)")));
+  EXPECT_THAT(shifted.warnings, Contains(says("without a time (test/r_1)")));
   EXPECT_EQ(shifted.train[0].time, 0);
 }
 
@@ -256,11 +257,11 @@ TEST(NgpCapture, nerfstudio_splits_points_and_frames_with_their_own_lens) {
   EXPECT_EQ(capture.points.dim(0), 2);
   EXPECT_FLOAT_EQ(capture.train[0].camera.focal_x, 10);
   EXPECT_FLOAT_EQ(capture.train[1].camera.focal_x, 20);
-  EXPECT_THAT(capture.warnings, Contains(Says("2 frames are in neither train_filenames nor")));
-  EXPECT_THAT(capture.warnings, Contains(Says("mask_path: not used")));
-  EXPECT_THAT(capture.warnings, Contains(Says("depth images: not used")));
+  EXPECT_THAT(capture.warnings, Contains(says("2 frames are in neither train_filenames nor")));
+  EXPECT_THAT(capture.warnings, Contains(says("mask_path: not used")));
+  EXPECT_THAT(capture.warnings, Contains(says("depth images: not used")));
   fake.write_text("sparse_pc.ply", "broken");
-  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(Says("points not used: ")));
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(says("points not used: ")));
 }
 
 TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
@@ -270,7 +271,7 @@ TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
   fake.save();
   const Capture capture = load_capture(fake.path(), {});
   EXPECT_EQ(capture.train.size(), 5U);
-  EXPECT_THAT(capture.warnings, Contains(Says("lead out of the capture")));
+  EXPECT_THAT(capture.warnings, Contains(says("lead out of the capture")));
   for (Json& frame : fake.json()["frames"]) frame["file_path"] = "../../etc/passwd";
   fake.save();
   EXPECT_THAT(refusal(fake.path()), HasSubstr("none of 1 images"));
@@ -346,7 +347,7 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
   EXPECT_FLOAT_EQ(capture.test[2].time, 2.0F / 3);
   EXPECT_EQ(capture.images->source("1_00002").rig_camera, "1");
   EXPECT_EQ(capture.normalisation.scale, 0.5);
-  EXPECT_THAT(capture.warnings, Contains(Says("depth/ is not used")));
+  EXPECT_THAT(capture.warnings, Contains(says("depth/ is not used")));
 
   const std::pair<std::function<void()>, const char*> cases[] = {
       {[&] { splits["val"]["time_ids"].erase(0); },
@@ -401,7 +402,7 @@ TEST(Formats, orientation_is_told) {
       std::string("Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0", 32);
   jpeg.insert(2, "\xff\xe1" + std::string(1, '\0') + static_cast<char>(exif.size() + 2) + exif);
   fake.write_text("images/frame_1.jpg", jpeg);
-  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(Says("viewers turn the images of frame_1")));
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(says("viewers turn the images of frame_1")));
 }
 
 }  // namespace
