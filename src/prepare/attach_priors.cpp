@@ -58,6 +58,7 @@ void refuse_to_replace(const fs::path& capture, std::initializer_list<const char
 
 std::vector<std::string> ids_of(const std::vector<View>& views) {
   std::vector<std::string> ids;
+  ids.reserve(views.size());
   for (const View& view : views) ids.push_back(view.id);
   return ids;
 }
@@ -81,6 +82,7 @@ void for_each_view(const std::map<std::string, int64_t>& matched, Source&& take,
   std::map<int64_t, std::string> by_index;
   for (const auto& [id, index] : matched) by_index.emplace(index, id);
   std::vector<int64_t> indices;
+  indices.reserve(by_index.size());
   for (const auto& [index, id] : by_index) indices.push_back(index);
   take(indices,
        [&](int64_t place, auto&& value) { f(by_index.at(indices[static_cast<size_t>(place)]), value); });
@@ -212,19 +214,19 @@ FoundAxes find_axes(PriorAxes asked, const AxisEvidence& evidence, const std::st
   return {sign(c), measured + ": no known axes, taken as measured"};
 }
 
-void attach_priors(const fs::path& folder, const AttachOptions& options, const Say& say,
+void attach_priors(const fs::path& capture, const AttachOptions& options, const Say& say,
                    const std::atomic<bool>& stop) {
   options.validate();
-  if (!fs::is_regular_file(folder / "dataset.json")) {
-    throw InputError(folder.string(), "dataset.json", "no such file", "a folder in the layout of NeRF-DS",
+  if (!fs::is_regular_file(capture / "dataset.json")) {
+    throw InputError(capture.string(), "dataset.json", "no such file", "a folder in the layout of NeRF-DS",
                      "see docs/captures.md");
   }
-  if (!options.normals.empty()) refuse_to_replace(folder, {"normal", "normal.npz", "normal.npy"}, options);
-  if (!options.masks.empty()) refuse_to_replace(folder, {"mask", "resized_mask"}, options);
-  const Capture capture = load_capture(folder, {});
-  const Staging staging(folder);
-  if (!options.normals.empty()) attach_normals(capture, options, staging, say, stop);
-  if (!options.masks.empty()) attach_masks(capture, options, staging, say, stop);
+  if (!options.normals.empty()) refuse_to_replace(capture, {"normal", "normal.npz", "normal.npy"}, options);
+  if (!options.masks.empty()) refuse_to_replace(capture, {"mask", "resized_mask"}, options);
+  const Capture loaded = load_capture(capture, {});
+  const Staging staging(capture);
+  if (!options.normals.empty()) attach_normals(loaded, options, staging, say, stop);
+  if (!options.masks.empty()) attach_masks(loaded, options, staging, say, stop);
   if (!options.normals.empty()) staging.move_in("normal");
   if (!options.masks.empty()) staging.move_in("mask");
 }

@@ -225,6 +225,7 @@ std::string write_capture(const PrepareOptions& options, const CaptureParts& par
   }
   write_points(folder / "points.npy", points);
   std::vector<Camera<double>> cameras;
+  cameras.reserve(posed.size());
   for (const PosedFrame& p : posed) cameras.push_back(p.camera);
   const SceneBounds bounds = scene_bounds(points, cameras);
   write_nerfies_layout(folder, views, {bounds.normalisation, bounds.near_plane, bounds.far_plane});

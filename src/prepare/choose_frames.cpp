@@ -22,7 +22,7 @@ std::vector<int64_t> within(const std::vector<Candidate>& candidates, const Prep
 }  // namespace
 
 std::vector<int64_t> choose_frames(const std::vector<Candidate>& candidates, const PrepareOptions& options) {
-  const std::vector<int64_t> usable = within(candidates, options);
+  std::vector<int64_t> usable = within(candidates, options);
   const auto count = static_cast<double>(usable.size());
   if (usable.empty() || (options.rate == 0 && count <= options.frames)) return usable;
   const auto at = [&](int64_t i) -> const Candidate& { return candidates[static_cast<size_t>(i)]; };

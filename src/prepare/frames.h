@@ -35,7 +35,7 @@ Frames take_frames(const std::filesystem::path& input, const PrepareOptions& opt
                    const std::atomic<bool>& stop);
 
 void write_frames(const std::filesystem::path& file, const Frames& frames);
-Frames read_frames(const std::filesystem::path& file);
+Frames read_frames(const std::filesystem::path& path);
 
 // The picture of a file written here, H×W×1: its luminance.
 Tensor<uint8_t> grey_of(const Tensor<uint8_t>& colour);

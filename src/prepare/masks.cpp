@@ -60,6 +60,7 @@ void take_supplied(const PrepareOptions& options, const Frames& frames, const fs
     if (matched[i]) wanted[*matched[i]] = &frames.frames[i];
   }
   std::vector<int64_t> indices;
+  indices.reserve(wanted.size());
   for (const auto& [index, frame] : wanted) indices.push_back(index);
   source.take_some(true, indices, [&](int64_t place, Tensor<uint8_t>&& picture) {
     f(*wanted.at(indices[static_cast<size_t>(place)]), as_mask(picture));

@@ -79,6 +79,7 @@ PictureSource::PictureSource(const fs::path& path, int longest_side, fs::path lo
 
 std::vector<std::string> PictureSource::names() const {
   std::vector<std::string> names;
+  names.reserve(files_.size());
   for (const fs::path& file : files_) names.push_back(file.filename().string());
   return names;
 }

@@ -40,6 +40,7 @@ SceneBounds scene_bounds(const std::vector<Vec3<double>>& points,
   }
   for (int axis = 0; axis < 3 && !points.empty(); ++axis) {
     std::vector<double> values;
+    values.reserve(points.size());
     for (const Vec3<double>& point : points) values.push_back(point[axis]);
     low[axis] = std::min(low[axis], quantile(values, outer));
     high[axis] = std::max(high[axis], quantile(std::move(values), 1 - outer));

@@ -157,6 +157,7 @@ TEST(SceneBounds, HoldCamerasAndMostPoints) {
   }
   cameras[1].position = {1, 0, 0};
   std::vector<Vec3<double>> points;
+  points.reserve(10002);
   for (int i = 0; i <= 10000; ++i) points.emplace_back(0.2, 0, 2 + 0.0002 * i);
   points.emplace_back(0.5, 0, 1e6);
   const SceneBounds bounds = scene_bounds(points, cameras);

@@ -25,6 +25,7 @@ using testing::HasSubstr;
 
 std::vector<Candidate> film(int count, double rate, const std::function<double(int)>& sharp) {
   std::vector<Candidate> candidates;
+  candidates.reserve(static_cast<size_t>(count));
   for (int i = 0; i < count; ++i) candidates.push_back({i / rate, sharp(i)});
   return candidates;
 }
@@ -92,6 +93,7 @@ RC_GTEST_PROP(ChooseFrames, RisesAndGivesAboutAsManyAsAsked, ()) {
   const auto gaps = *rc::gen::container<std::vector<int>>(200, rc::gen::inRange(1, 4));
   std::vector<Candidate> candidates;
   double time = 5;
+  candidates.reserve(gaps.size());
   for (const int gap : gaps) candidates.push_back({time += gap * 0.01, static_cast<double>(gap)});
   const std::vector<int64_t> chosen = choose_frames(candidates, options);
   RC_ASSERT(std::adjacent_find(chosen.begin(), chosen.end(), std::greater_equal<>()) == chosen.end());

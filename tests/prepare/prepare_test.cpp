@@ -70,19 +70,23 @@ case $verb in
 esac
 )sh";
 
+// NOLINTNEXTLINE(concurrency-mt-unsafe): one thread reads and writes the environment
+void set_variable(const char* name, const std::string& value) { ::setenv(name, value.c_str(), 1); }
+
 class PrepareTest : public testing::Test {
  protected:
   static constexpr int frames = 14;
 
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): one thread reads and writes the environment
   PrepareTest() : path_(std::getenv("PATH")) {
     fs::create_directories(folder_ / "bin");
     fs::create_directories(folder_ / "model");
     write_program("ffmpeg", fake_ffmpeg);
     write_program("colmap", fake_colmap);
-    ::setenv("PATH", ((folder_ / "bin").string() + ":" + path_).c_str(), 1);
-    ::setenv("CALLS", (folder_ / "calls").c_str(), 1);
-    ::setenv("MODEL", (folder_ / "model").c_str(), 1);
-    ::unsetenv("FAIL");
+    set_variable("PATH", ((folder_ / "bin").string() + ":" + path_));
+    set_variable("CALLS", (folder_ / "calls"));
+    set_variable("MODEL", (folder_ / "model"));
+    set_variable("FAIL", "");
     SynthOptions options;
     options.frames = frames;
     options.width = 64;
@@ -96,7 +100,7 @@ class PrepareTest : public testing::Test {
     write_film(options);
     write_model(options);
   }
-  ~PrepareTest() override { ::setenv("PATH", path_.c_str(), 1); }
+  ~PrepareTest() override { set_variable("PATH", path_); }
 
   void write_program(const std::string& name, const std::string& text) const {
     std::ofstream(folder_ / "bin" / name) << text;
@@ -256,22 +260,22 @@ TEST_F(PrepareTest, StopsAfterTheStepThatIsAsked) {
 }
 
 TEST_F(PrepareTest, PosesThatFailSayHowManyAndWhatToTry) {
-  ::setenv("FAIL", "mapper", 1);
+  set_variable("FAIL", "mapper");
   EXPECT_THAT(refusal(options()),
               testing::AllOf(HasSubstr("0 of 14 frames registered"), HasSubstr("try more frames"),
                              HasSubstr("--masks estimate"), HasSubstr("--camera-model opencv")));
-  ::unsetenv("FAIL");
+  set_variable("FAIL", "");
   std::ofstream(folder_ / "model/images.txt", std::ios::trunc) << "1 1 0 0 0 0 0 0 1 000000.png\n\n";
   EXPECT_THAT(refusal(options()), HasSubstr("1 of 14 frames registered"));
   EXPECT_FALSE(fs::exists(capture()));
 }
 
 TEST_F(PrepareTest, AProgramsFailureIsOneLineWithItsOwnWords) {
-  ::setenv("FAIL", "features", 1);
+  set_variable("FAIL", "features");
   EXPECT_THAT(refusal(options()),
               testing::AllOf(HasSubstr("colmap feature_extractor"), HasSubstr("Check failed: no memory"),
                              HasSubstr("features_0.log")));
-  ::unsetenv("FAIL");
+  set_variable("FAIL", "");
   ASSERT_TRUE(prepare(options()));
   EXPECT_THAT(calls(), ElementsAre("colmap feature_extractor", "colmap exhaustive_matcher", "colmap mapper"));
   fs::remove(film() + ".pgm");
@@ -280,7 +284,7 @@ TEST_F(PrepareTest, AProgramsFailureIsOneLineWithItsOwnWords) {
 }
 
 TEST_F(PrepareTest, AStopEndsTheProgramAndTheNextCallGoesOn) {
-  ::setenv("FAIL", "slow", 1);
+  set_variable("FAIL", "slow");
   std::thread other([this] {
     while (calls().empty() || calls().back() != "colmap mapper") std::this_thread::yield();
     stop_ = true;
@@ -289,17 +293,17 @@ TEST_F(PrepareTest, AStopEndsTheProgramAndTheNextCallGoesOn) {
   other.join();
   EXPECT_FALSE(ended);
   EXPECT_FALSE(fs::exists(capture()));
-  ::unsetenv("FAIL");
+  set_variable("FAIL", "");
   stop_ = false;
   ASSERT_TRUE(prepare(options()));
   EXPECT_THAT(calls(), ElementsAre("colmap mapper"));
 }
 
 TEST_F(PrepareTest, AbsentProgramsAreNamed) {
-  ::setenv("PATH", "/nowhere", 1);
+  set_variable("PATH", "/nowhere");
   EXPECT_THAT(refusal(options()), testing::AllOf(HasSubstr("ffmpeg: found no such program"),
                                                  HasSubstr("scripts/setup --prepare")));
-  ::setenv("PATH", (folder_ / "bin").c_str(), 1);
+  set_variable("PATH", (folder_ / "bin"));
   fs::remove(folder_ / "bin/colmap");
   EXPECT_THAT(refusal(options()), HasSubstr("colmap: found no such program"));
 }

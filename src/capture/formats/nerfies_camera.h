@@ -13,6 +13,6 @@ struct CapturedCamera {
 };
 
 // Throws InputError for fields that are missing or make no camera.
-CapturedCamera read_nerfies_camera(const InputFile& file);
+CapturedCamera read_nerfies_camera(const InputFile& input);
 
 }  // namespace traceflow

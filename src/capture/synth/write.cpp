@@ -93,6 +93,7 @@ void write_view(const SynthOptions& options, const SynthView& view, const fs::pa
 
 std::vector<NerfiesView> layout_of(const std::vector<SynthView>& views) {
   std::vector<NerfiesView> layout;
+  layout.reserve(views.size());
   for (const SynthView& view : views) {
     layout.push_back({view.id, view.camera, view.frame, view.frame, view.is_test ? 1 : 0, view.is_test});
   }

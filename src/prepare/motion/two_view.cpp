@@ -87,6 +87,7 @@ std::vector<Track> draw(const std::vector<Track>& tracks, size_t count, Random& 
     if (std::find(chosen.begin(), chosen.end(), i) == chosen.end()) chosen.push_back(i);
   }
   std::vector<Track> sample;
+  sample.reserve(count);
   for (const size_t i : chosen) sample.push_back(tracks[i]);
   return sample;
 }
