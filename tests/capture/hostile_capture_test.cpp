@@ -72,9 +72,9 @@ TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
         {{1, 0, 0}, {0, 1, 0}, {0, 0, "1"}},
         {{1, 0, 0}, {0, 1, 0}, {0, 0, 1e308}}}},
       {"position", {nullptr, "here", {1, 2}, {1, 2, nullptr}, {1, 2, 3, 4}}},
-      {"focal_length", {nullptr, 0, -5, "10", Json::array({10})}},
-      {"principal_point", {nullptr, 6, {6}, {"6", "4"}}},
-      {"image_size", {nullptr, 12, {0, 8}, {-12, 8}, {12}}},
+      {"focal_length", {nullptr, 0, -5, 1e-300, 1e300, "10", Json::array({10})}},
+      {"principal_point", {nullptr, 6, {6}, {1e300, 4}, {"6", "4"}}},
+      {"image_size", {nullptr, 12, {0, 8}, {-12, 8}, {12, 1e300}, {12}}},
       {"pixel_aspect_ratio", {0, -1, "1"}},
       {"skew", {"0", {0}}},
       {"radial_distortion", {0.1, {0.1}, {0.1, 0.1, "0"}, {-50, 0, 0}, {1e300, 0, 0}}},
@@ -96,7 +96,7 @@ TEST(HostileCapture, camera_fields_missing_or_of_other_types) {
 TEST(HostileCapture, scene_fields) {
   const std::vector<std::pair<std::string, std::vector<Json>>> bad = {
       {"center", {nullptr, 1, {1, 2}, {1, 2, "3"}}},
-      {"scale", {nullptr, 0, -1, "1"}},
+      {"scale", {nullptr, 0, -1, 1e300, "1"}},
       {"near", {"0.1"}},
       {"far", {0.05, "2"}}};
   for (const auto& [field, values] : bad) {
@@ -114,6 +114,7 @@ TEST(HostileCapture, dataset_and_metadata_fields) {
       {"train_ids", "all"},     {"train_ids", {1.5}},
       {"train_ids", {nullptr}}, {"train_ids", {"../../etc/passwd"}},
       {"train_ids", {""}},      {"train_ids", {".."}},
+      {"train_ids", {"a\nb"}},  {"train_ids", {std::string(300, 'a')}},
       {"val_ids", {{"a", 1}}}};
   for (const auto& [field, value] : bad) {
     NerfDsCapture fake(1);

@@ -92,6 +92,17 @@ TEST(JsonDocument, HoldsDepthToALimit) {
   EXPECT_EQ(refusal("\"" + std::string(100, '[') + "\\\"[\"", [](auto&) {}), "");
 }
 
+TEST(JsonDocument, HoldsListsToALimit) {
+  const auto list = [](size_t count) {
+    std::string text = "[0";
+    for (size_t i = 1; i < count; ++i) text += ",0";
+    return text + "]";
+  };
+  EXPECT_EQ(refusal(list(1'000'000), [](auto& d) { d.strings(); }), "");
+  EXPECT_EQ(refusal(list(1'000'001), [](auto& d) { d.strings(); }),
+            "file: found 1000001 elements, expected 1000000 at most");
+}
+
 TEST(JsonDocument, QuotesOnlyTheBeginningOfWhatItFound) {
   const std::string message =
       refusal("[\"" + std::string(1000, 'x') + "\"]", [](const JsonField& f) { (void)f.number(); });

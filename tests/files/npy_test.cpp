@@ -156,6 +156,7 @@ TEST(NpyHostile, headers_that_lie_are_refused) {
       npy(dictionary("<f4", "(99999999999999,)"), data),
       npy(dictionary("<f4", "(4294967296, 4294967296, 4294967296)"), data),
       npy(dictionary("<f4", "(99999999999999999999999,)"), data),
+      npy(dictionary("<f4", "(4294967296, 4294967296, 0)"), data),
       npy(dictionary("<f4", "(-1,)"), data),
       npy(dictionary("<f4", "(1, 1, 1, 1, 4)"), data),
       npy(dictionary("<f4", "(x,)"), data),
@@ -183,6 +184,12 @@ TEST(NpyHostile, headers_that_lie_are_refused) {
     write_bytes(folder / "bad.npy", bytes);
     EXPECT_THROW(read_npy(folder / "bad.npy"), InputError) << bytes;
   }
+}
+
+TEST(NpyHostile, any_number_of_empty_rows_is_nothing_to_do) {
+  const TempFolder folder;
+  write_bytes(folder / "a.npy", npy(dictionary("<f4", "(1099511627776, 0)", true), ""));
+  EXPECT_EQ(read_npy(folder / "a.npy").shape(), (Shape{1099511627776, 0}));
 }
 
 TEST(NpyHostile, truncated_files_are_refused) {

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <png.h>
 #include <rapidcheck/gtest.h>
+#include <sys/resource.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <cstdio>
@@ -191,6 +193,40 @@ std::string header_only(uint32_t width, uint32_t height) {
   png += std::string{'\0', '\0', '\0', '\x0d'} + chunk;
   for (int shift = 24; shift >= 0; shift -= 8) png += static_cast<char>(crc >> shift & 0xff);
   return png + std::string{'\0', '\0', '\0', '\0'} + "IDAT" + std::string{'\x35', '\xaf', '\x06', '\x1e'};
+}
+
+int64_t most_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return int64_t{usage.ru_maxrss} << 10;
+}
+
+// Eight kilobytes of file each.
+TEST(PngHostile, text_that_unpacks_to_megabytes_is_passed_over) {
+  const TempFolder folder;
+  write_png(folder / "image.png", random_pixels({4, 6, 3}, 3));
+  std::string bytes = bytes_of(folder / "image.png");
+  std::string text("zTXta\0\0", 7);
+  {
+    const std::string zeros(7 << 20, '\0');
+    std::string packed(compressBound(zeros.size()), '\0');
+    uLongf size = packed.size();
+    compress(reinterpret_cast<Bytef*>(packed.data()), &size, reinterpret_cast<const Bytef*>(zeros.data()),
+             zeros.size());
+    text += packed.substr(0, size);
+  }
+  const auto big_endian = [](uint64_t n) {
+    return std::string{static_cast<char>(n >> 24), static_cast<char>(n >> 16), static_cast<char>(n >> 8),
+                       static_cast<char>(n)};
+  };
+  const uLong checksum =
+      crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size()));
+  for (int i = 0; i < 100; ++i)
+    bytes.insert(bytes.find("IDAT") - 4, big_endian(text.size() - 4) + text + big_endian(checksum));
+  write_bytes(folder / "image.png", bytes);
+  const int64_t before = most_memory();
+  EXPECT_EQ(read_png(folder / "image.png").shape(), (Shape{4, 6, 3}));
+  EXPECT_LT(most_memory() - before, int64_t{64} << 20);
 }
 
 TEST(PngHostile, huge_headers_are_refused_before_memory_is_taken) {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "scene/rows.h"
 
@@ -101,6 +102,53 @@ TEST(SceneFile, AMissingOrMisshapenTensorIsNamed) {
     EXPECT_NE(std::string(error.what()).find("scene/main/opacity_logit"), std::string::npos) << error.what();
   }
   EXPECT_THROW(get_scene(Safetensors{}), InputError);
+}
+
+// What get_scene says where one field of the scene's metadata is another.
+std::string refusal(const std::string& pointer, const nlohmann::json& value) {
+  Safetensors file;
+  put_scene(full_scene(), file);
+  nlohmann::json json = nlohmann::json::parse(file.metadata["scene"]);
+  json[nlohmann::json::json_pointer(pointer)] = value;
+  file.metadata["scene"] = json.dump();
+  try {
+    get_scene(file);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(SceneFile, MetadataThatPromisesWhatIsNotThereIsRefusedBeforeMemoryIsTaken) {
+  EXPECT_EQ(refusal("/main_field/outputs", 2147483647),
+            "safetensors: scene: main_field.outputs: found 2147483647, expected 11");
+  EXPECT_EQ(refusal("/main_field/outputs", -1),
+            "safetensors: scene: main_field.outputs: found -1, expected 11");
+  EXPECT_EQ(refusal("/main_field/width", 1024),
+            "safetensors: scene/main_field/weight0: found shape 16x76, expected 1024x76");
+  EXPECT_NE(refusal("/main_field/depth", 1000).find("expected 1 to 32 layers"), std::string::npos);
+  EXPECT_EQ(refusal("/extent", -1), "safetensors: scene: extent: found -1, expected 1e-12 to 1000000000000");
+  EXPECT_EQ(refusal("/scale", 0), "safetensors: scene: scale: found 0, expected 1e-12 to 1000000000000");
+  EXPECT_EQ(refusal("/environment", 1), "safetensors: scene: environment: found 1, expected true or false");
+  EXPECT_EQ(refusal("/specular", "mirrors"),
+            "safetensors: scene: specular: found \"mirrors\", expected none, environment-gaussians or "
+            "environment-map");
+}
+
+TEST(SceneFile, TensorsThatMakeNoSceneAreRefused) {
+  for (const auto& [name, shape] :
+       std::vector<std::pair<std::string, Shape>>{{"scene/map/logit", {12, 3, 3}},
+                                                  {"scene/map/logit", {0, 0, 3}},
+                                                  {"scene/map/logit", {36}},
+                                                  {"scene/main/sh", {7, 5, 3}},
+                                                  {"scene/main/sh", {7, 4}},
+                                                  {"scene/main/position", {7}},
+                                                  {"scene/main_field/bias0", {17}}}) {
+    Safetensors file;
+    put_scene(full_scene(), file);
+    file.add(name, Tensor<float>(shape));
+    EXPECT_THROW(get_scene(file), InputError) << name << " " << shape.to_string();
+  }
 }
 
 TEST(SceneFile, DamagedMetadataIsRefused) {
