@@ -1,0 +1,191 @@
+#include "base/atomic_file.h"
+#include "cli/malformed_cases.h"
+#include "files/safetensors.h"
+#include "support/temp_folder.h"
+
+namespace traceflow::cli {
+
+namespace {
+
+const std::vector<std::string> inspect = {"inspect", "-d", "capture"};
+const std::vector<std::string> trace = {"trace", "scene.ply", "--rays", "rays.npy", "-o", "out"};
+const std::vector<std::string> export_run = {"export", "run", "-o", "out"};
+const std::string rays = "rays.npy", ply = "scene.ply", checkpoint = "run/checkpoint.safetensors";
+
+// A .npy as numpy writes it, of what is said to be six numbers.
+std::string npy(const std::string& type, const std::string& shape, size_t bytes) {
+  const std::string head = "{'descr': " + type + ", 'fortran_order': False, 'shape': " + shape + ", }\n";
+  return "\x93NUMPY" + std::string{'\1', '\0', static_cast<char>(head.size()), '\0'} + head +
+         std::string(bytes, '\0');
+}
+
+// A checkpoint read, changed, and written again.
+std::function<void(Files&)> edit(const std::function<void(Safetensors&)>& change) {
+  return [change](Files& files) {
+    const TempFolder folder;
+    const auto path = folder / "checkpoint.safetensors";
+    write_atomically(path, std::string_view(files.at(checkpoint)));
+    Safetensors file = Safetensors::read(path);
+    change(file);
+    file.write(path);
+    files[checkpoint] = read_bytes(path);
+  };
+}
+
+}  // namespace
+
+MalformedKind malformed_arrays() {
+  const std::string points = "capture/points.npy", normals = "capture/normal.npz";
+  return {
+      "Arrays: .npy and .npz",
+      {{"objects of Python", trace, put(rays, npy("'|O'", "(1, 6)", 24)),
+        "rays.npy: descr: found an array of Python objects, expected numbers of one type; save the array "
+        "again"},
+       {"records", trace, put(rays, npy("[('x', '<f4')]", "(1, 6)", 24)),
+        "rays.npy: descr: found a structured array, expected numbers of one type; save the array again"},
+       {"the other byte order", trace, put(rays, npy("'>f4'", "(1, 6)", 24)),
+        "rays.npy: descr: found big-endian >f4, expected little-endian numbers; save the array again"},
+       {"complex numbers", trace, put(rays, npy("'<c8'", "(1, 6)", 48)),
+        "rays.npy: descr: found <c8, expected float16/32/64, a whole number of 8 to 64 bits, or bool; save "
+        "the array again"},
+       {"more numbers than the file has", trace, put(rays, npy("'<f4'", "(1000, 6)", 24)),
+        "rays.npy: shape: found 1000x6, expected an array that the file holds; the file is cut short or "
+        "broken"},
+       {"more numbers than any file has", trace, put(rays, npy("'<f4'", "(4294967296, 4294967296, 6)", 24)),
+        "rays.npy: shape: found 4294967296x4294967296x6, expected an array that the file holds; the file is "
+        "cut short or broken"},
+       {"a size that no number holds, times nothing", trace,
+        put(rays, npy("'<f4'", "(4294967296, 4294967296, 0)", 0)),
+        "rays.npy: shape: found 4294967296x4294967296x0, expected an array that the file holds; the file is "
+        "cut short or broken"},
+       {"five dimensions", trace, put(rays, npy("'<f4'", "(1, 1, 1, 1, 6)", 24)),
+        "rays.npy: shape: found 5 dimensions, expected 4 at most; reshape the array"},
+       {"a shape in words", trace, put(rays, npy("'<f4'", "(many,)", 24)),
+        "rays.npy: shape: found (many,), expected a tuple of whole numbers; save the array again"},
+       {"a type that would clear the terminal", trace, put(rays, npy("'\x1b[2J'", "(1, 6)", 24)),
+        "rays.npy: descr: found ?[2J, expected float16/32/64, a whole number of 8 to 64 bits, or bool; save "
+        "the array again"},
+       {"cut short", trace, cut(rays, 40),
+        "rays.npy: header: found 118 bytes, expected a header within the file, of 64 KiB at most; save the "
+        "array again"},
+       {"another kind of file", trace, put(rays, "ply\n"),
+        "rays.npy: found a file that does not start as one, expected a .npy array; save the array again"},
+       {"rays of three numbers", trace, put(rays, npy("'<f4'", "(2, 3)", 24)),
+        "rays.npy: shape: found 2x3, expected Nx6: origin and direction of each ray"},
+       {"points in the plane", inspect, put(points, npy("'<f4'", "(3, 2)", 24)),
+        "capture/points.npy: shape: found 3x2, expected P×3"},
+       {"priors for another number of views", inspect,
+        [=](Files& files) {
+          files.erase("capture/normal/1x/a.png");
+          files["capture/normal.npy"] = npy("'<f4'", "(7, 1, 1, 3)", 84);
+        },
+        "capture/normal.npy: shape: found 7x1x1x3, expected T×H×W×3 with T the training views (1) or all "
+        "(2); make the priors again or take the file away"}}};
+}
+
+MalformedKind malformed_plys() {
+  return {
+      "Surfels: .ply",
+      {{"another kind of file", trace, put(ply, "PK\3\4"),
+        R"(scene.ply: first line: found "PK??", expected "ply"; write it with 2DGS or `traceflow export`)"},
+       {"no end of the header", trace, cut(ply, 60),
+        "scene.ply: header: found no end_header line, expected one within the first 65536 bytes; write it "
+        "with 2DGS or `traceflow export`"},
+       {"text in the place of bytes", trace, replace(ply, "binary_little_endian", "ascii"),
+        R"(scene.ply: format: found "format ascii 1.0", expected binary_little_endian 1.0; write it with 2DGS or `traceflow export`)"},
+       {"the other byte order", trace, replace(ply, "binary_little_endian", "binary_big_endian"),
+        R"(scene.ply: format: found "format binary_big_endian 1.0", expected binary_little_endian 1.0; write it with 2DGS or `traceflow export`)"},
+       {"a list among the properties", trace, replace(ply, "float nx", "list uchar int nx"),
+        R"(scene.ply: property: found "property list uchar int nx", expected a scalar type and a name; write it with 2DGS or `traceflow export`)"},
+       {"the ellipsoids of 3DGS", trace, replace(ply, "float nx", "float scale_2"),
+        "scene.ply: property scale_2: found three scales, a 3DGS scene of ellipsoids, expected two, the "
+        "surfels of 2DGS; retrain with 2DGS or `traceflow train`"},
+       {"an attribute that is missing", trace, replace(ply, "float opacity", "float transparency"),
+        "scene.ply: property opacity: found none, expected every attribute of 2DGS; write it with 2DGS or "
+        "`traceflow export`"},
+       {"an attribute that comes twice", trace, replace(ply, "float y", "float x"),
+        R"(scene.ply: property "x": found two of it, expected one; write it with 2DGS or `traceflow export`)"},
+       {"harmonics of no degree", trace, replace(ply, "float nx", "float f_rest_0"),
+        "scene.ply: f_rest_*: found 1 of them, expected 0, 9, 24 or 45 (degree 0 to 3); write it with 2DGS "
+        "or `traceflow export`"},
+       {"more surfels than the file has", trace, replace(ply, "vertex 1", "vertex 2147483647"),
+        "scene.ply: element vertex: found 2147483647 vertices of 64 bytes in a body of 64 bytes, expected as "
+        "many bytes as the header promises; write it with 2DGS or `traceflow export`"},
+       {"fewer than no surfels", trace, replace(ply, "vertex 1", "vertex -1"),
+        R"(scene.ply: first element: found "element vertex -1", expected element vertex COUNT; write it with 2DGS or `traceflow export`)"}}};
+}
+
+MalformedKind malformed_checkpoints() {
+  const auto metadata = [](const std::string& key, const std::string& value) {
+    return edit([=](Safetensors& file) { file.metadata[key] = value; });
+  };
+  const auto scene = [](const std::string& field, const nlohmann::json& value) {
+    return edit([=](Safetensors& file) {
+      nlohmann::json json = nlohmann::json::parse(file.metadata.at("scene"));
+      json[field] = value;
+      file.metadata["scene"] = json.dump();
+    });
+  };
+  const auto header = [](const std::string& text) {
+    std::string bytes(8, '\0');
+    for (size_t i = 0; i < 8; ++i) bytes[i] = static_cast<char>(text.size() >> (8 * i));
+    return put(checkpoint, bytes + text);
+  };
+  return {
+      "Checkpoints: .safetensors",
+      {{"cut short", export_run, cut(checkpoint, 6),
+        "run/checkpoint.safetensors: found 6 bytes, expected a safetensors file of 8 bytes or more; there is "
+        "no checkpoint before it to go back to"},
+       {"another kind of file", export_run, put(checkpoint, "ply\nformat"),
+        "run/checkpoint.safetensors: header length: found 7886488381532236912, expected at most 2; the file "
+        "is cut short or is not a safetensors file; there is no checkpoint before it to go back to"},
+       {"a header that is not JSON", export_run, header("{\"a\": "),
+        "run/checkpoint.safetensors: header: found text that is not JSON, expected a JSON object; there is "
+        "no checkpoint before it to go back to"},
+       {"a tensor outside the file", export_run,
+        header(R"({"a":{"dtype":"F32","shape":[9],"data_offsets":[0,36]}})"),
+        "run/checkpoint.safetensors: tensor a data_offsets: found [0,36], expected a range within 0 bytes of "
+        "data; there is no checkpoint before it to go back to"},
+       {"a tensor of another size than its shape", export_run,
+        header(R"({"a":{"dtype":"F32","shape":[9223372036854775807,9],"data_offsets":[0,0]}})"),
+        "run/checkpoint.safetensors: tensor a shape: found [9223372036854775807,9], expected a size that "
+        "fits 63 bits; there is no checkpoint before it to go back to"},
+       {"a type that is not known", export_run,
+        header(R"({"a":{"dtype":"F8","shape":[0],"data_offsets":[0,0]}})"),
+        R"(run/checkpoint.safetensors: tensor a dtype: found "F8", expected F32, F64, I32, I64, U8, F16 or BF16; there is no checkpoint before it to go back to)"},
+       {"a tensor that comes twice", export_run,
+        header(R"({"a":{"dtype":"U8","shape":[0],"data_offsets":[0,0]},"a":{}})"),
+        R"(run/checkpoint.safetensors: header: found the name "a" twice, expected every tensor once; there is no checkpoint before it to go back to)"},
+       {"no scene", export_run, edit([](Safetensors& file) { file.metadata.erase("scene"); }),
+        "run/checkpoint.safetensors: scene: found no such metadata, expected a checkpoint written by "
+        "traceflow train"},
+       {"a scene that is not JSON", export_run, metadata("scene", "{"),
+        "run/checkpoint.safetensors: scene: byte 2: found text that is not JSON, expected JSON"},
+       {"reflections of an unknown kind", export_run, scene("specular", "mirrors"),
+        R"(run/checkpoint.safetensors: scene: specular: found "mirrors", expected none, environment-gaussians or environment-map)"},
+       {"an extent of no length", export_run, scene("extent", -1),
+        "run/checkpoint.safetensors: scene: extent: found -1, expected 1e-12 to 1000000000000"},
+       {"a field too large for any memory", export_run,
+        scene("main_field", {{"depth", 2},
+                             {"width", 1024},
+                             {"skip", 0},
+                             {"position_frequencies", 0},
+                             {"time_frequencies", 0},
+                             {"outputs", 2147483647}}),
+        "run/checkpoint.safetensors: scene: main_field.outputs: found 2147483647, expected 11"},
+       {"a tensor of another shape", export_run, edit([](Safetensors& file) {
+          file.add("scene/main/rotation", Tensor<float>({7, 4}));
+        }),
+        "run/checkpoint.safetensors: scene/main/rotation: found shape 7x4, expected 2x4"},
+       {"surfels on a line", export_run,
+        edit([](Safetensors& file) { file.add("scene/main/position", Tensor<float>({7})); }),
+        "run/checkpoint.safetensors: scene/main/: found shapes 7 and 2x9x3, expected N×3 positions and N×K×3 "
+        "harmonics, K of 1, 4, 9 or 16"},
+       {"an option of another version", export_run, metadata("options", R"({"iterationz": 5})"),
+        "run/checkpoint.safetensors: options: iterationz: found no option of this name, expected one that "
+        "`traceflow --help-options` lists; did you mean iterations?"},
+       {"an iteration in words", export_run, metadata("iteration", "the last"),
+        "run/checkpoint.safetensors: iteration: found the last, expected a number"}}};
+}
+
+}  // namespace traceflow::cli
