@@ -15,7 +15,6 @@ namespace traceflow::cli {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 using Json = nlohmann::json;
 
 struct Result {

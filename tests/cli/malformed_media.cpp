@@ -74,7 +74,7 @@ MalformedKind malformed_images() {
            {"text in the place of a photograph", inspect, put(photograph, "<html>"),
             "capture/rgb/1x/a.png: found a file that begins with \"<html>\", expected a PNG or JPEG image; "
             "convert it"},
-           {"a photograph of a kind that is not read", inspect, put(photograph, "GIF89a\1\0\1\0"),
+           {"a photograph of a kind that is not read", inspect, put(photograph, "GIF89a\1\1"),
             "capture/rgb/1x/a.png: found a GIF image, expected a PNG or JPEG image; convert it"},
            {"a photograph cut short in its header", inspect, cut(photograph, 20),
             "capture/rgb/1x/a.png: found the file is cut short, expected a PNG image of at most 32,768 "

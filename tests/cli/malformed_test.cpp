@@ -133,6 +133,7 @@ std::string page() {
 
 TEST(Malformed, ThePageIsOfTheseCases) {
   const fs::path path = TRACEFLOW_SOURCE_FOLDER "/docs/malformed.md";
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes there
   if (std::getenv("TRACEFLOW_WRITE_PAGES") != nullptr) std::ofstream(path) << page();
   EXPECT_EQ(read_bytes(path), page())
       << "run: TRACEFLOW_WRITE_PAGES=1 build/release/test_cli --gtest_filter=Malformed.ThePage*";

@@ -36,15 +36,15 @@ SynthOptions small() {
 class AttachPriors : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    made_ = std::make_unique<TempFolder>();
-    write_synthetic_capture(small(), *made_ / "capture");
+    made = std::make_unique<TempFolder>();
+    write_synthetic_capture(small(), *made / "capture");
   }
-  static void TearDownTestSuite() { made_.reset(); }
+  static void TearDownTestSuite() { made.reset(); }
 
   AttachPriors() {
-    fs::copy(*made_ / "capture", capture(), fs::copy_options::recursive);
+    fs::copy(*made / "capture", capture(), fs::copy_options::recursive);
     fs::remove_all(capture() / "normal");
-    truth_ = load_capture(*made_ / "capture", {});
+    truth_ = load_capture(*made / "capture", {});
   }
 
   fs::path capture() const { return folder_ / "capture"; }
@@ -97,12 +97,12 @@ class AttachPriors : public testing::Test {
     return "";
   }
 
-  static std::unique_ptr<TempFolder> made_;
+  static std::unique_ptr<TempFolder> made;
   TempFolder folder_;
   Capture truth_;
   const std::atomic<bool> never_ = false;
 };
-std::unique_ptr<TempFolder> AttachPriors::made_;
+std::unique_ptr<TempFolder> AttachPriors::made;
 
 TEST_F(AttachPriors, FindsTheAxesOfEachKind) {
   const std::vector<std::pair<Vec3<double>, std::string>> kinds = {{{1, -1, -1}, "opengl"},
@@ -155,7 +155,7 @@ TEST_F(AttachPriors, NothingIsReplacedUnasked) {
   attach(options);
   EXPECT_THAT(refusal(options), HasSubstr("add --force to replace it"));
   options = {};
-  options.masks = *made_ / "capture/mask/1x";
+  options.masks = *made / "capture/mask/1x";
   EXPECT_THAT(refusal(options), HasSubstr("mask: found something there already"));
   expect_normals_of_the_truth(0.012);
 }

@@ -23,6 +23,7 @@ traceflow::Instructions instructions_of(const std::string& name) {
 // tested.
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): no other thread runs yet
   if (const char* name = std::getenv("TRACEFLOW_INSTRUCTIONS")) {
     try {
       traceflow::limit_instructions(instructions_of(name));

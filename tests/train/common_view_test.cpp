@@ -54,6 +54,7 @@ TEST(CommonView, a_ring_of_cameras_gives_points_in_its_middle) {
 
 TEST(CommonView, cameras_side_by_side_give_points_before_them) {
   std::vector<View> views;
+  views.reserve(10);
   for (int i = 0; i < 10; ++i)
     views.push_back(looking({0.1F * static_cast<float>(i), 0, 0}, {0.1F * static_cast<float>(i), 5, 0}));
   Random random(2), again(2);

@@ -58,12 +58,13 @@ TEST(Normalise, points_and_cameras_share_a_box_that_outliers_do_not_move) {
   Random random(5);
   std::vector<FoundView> views = hemisphere(random, {0, 0, 0}, 1);
   std::vector<Vec3<double>> points;
+  points.reserve(2021);
   for (int i = 0; i < 2000; ++i) {
-    points.push_back({random.uniform(-4, 0), random.uniform(-2, 2), random.uniform(-1, 1)});
+    points.emplace_back(random.uniform(-4, 0), random.uniform(-2, 2), random.uniform(-1, 1));
   }
   const SceneNormalisation clean = normalise(views, points);
-  for (int i = 0; i < 20; ++i) points.push_back({1e6 * random.normal(), 1e6, -1e6});
-  points.push_back(Vec3<double>(std::nan("")));
+  for (int i = 0; i < 20; ++i) points.emplace_back(1e6 * random.normal(), 1e6, -1e6);
+  points.emplace_back(std::nan(""));
   const SceneNormalisation found = normalise(views, points);
   EXPECT_LT(length(found.centre - clean.centre), 0.15);
   EXPECT_NEAR(found.scale / clean.scale, 1, 0.05);
