@@ -233,6 +233,7 @@ describe('looking at a run', { skip: !available('view') }, () => {
         document.dispatchEvent(new Event('visibilitychange'));
       }, hidden);
     await hide(true);
+    await page.waitForTimeout(500); // for what was under way
     const look = await newest_look(page);
     await press(page, 'layer-normal');
     await page.waitForTimeout(700);
