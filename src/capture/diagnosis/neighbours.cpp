@@ -14,10 +14,12 @@ namespace traceflow {
 namespace {
 
 constexpr size_t fewest_views = 5;
-constexpr size_t reach = 3;          // neighbours on either side that a picture's sharpness is compared with
-constexpr double blur_share = 0.4;   // of their median sharpness
-constexpr double jump_stops = 0.75;  // from one picture to the next,
-constexpr double jump_steps = 6;     // and in median steps
+constexpr size_t reach = 3;         // neighbours on either side that a picture's sharpness is compared with
+constexpr double film_share = 0.6;  // of the difference between far pictures, from one to the next
+constexpr double blur_share = 0.4;  // of their median sharpness
+constexpr double blur_deviations = 6;  // and below it by so many, in logarithms
+constexpr double jump_stops = 0.75;    // from one picture to the next,
+constexpr double jump_steps = 6;       // and in median steps
 constexpr double frozen_share = 0.05;  // of the median difference between one picture and the next
 
 // One camera's views of both splits in the order of time, those that could not be read left out.
@@ -58,16 +60,45 @@ struct Found {
   }
 };
 
+double difference(const Tensor<uint8_t>& a, const Tensor<uint8_t>& b) {
+  if (a.shape() != b.shape()) return 255;
+  int64_t sum = 0;
+  for (int64_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
+  return static_cast<double>(sum) / static_cast<double>(a.size());
+}
+
+double usual_difference(const Sequence& sequence, size_t lag) {
+  std::vector<double> differences;
+  for (size_t i = 0; i + lag < sequence.size(); ++i)
+    differences.push_back(difference(sequence[i]->thumbnail, sequence[i + lag]->thumbnail));
+  return median(std::move(differences));
+}
+
+// Whether the pictures follow each other, as a film's do: a picture and the next differ less than two that
+// lie far apart in the sequence, at one distance at least, as a film may come back to where it was. In a
+// collection of photographs the next one says nothing of this one.
+bool is_film(const Sequence& sequence) {
+  double far = 0;
+  for (const size_t parts : {2, 3, 4})
+    far = std::max(far, usual_difference(sequence, sequence.size() / parts));
+  return usual_difference(sequence, 1) <= film_share * far;
+}
+
 void find_blur(const Sequence& sequence, Found& found) {
+  std::vector<double> shares(sequence.size(), 1), logarithms;
   for (size_t i = 0; i < sequence.size(); ++i) {
     std::vector<double> around;
     for (size_t j = i < reach ? 0 : i - reach; j <= std::min(i + reach, sequence.size() - 1); ++j) {
       if (j != i) around.push_back(sequence[j]->sharpness);
     }
     const double usual = median(std::move(around));
-    const bool has_contrast = sequence[i]->sharpness > 0 && usual > 0;
-    if (has_contrast && sequence[i]->sharpness < blur_share * usual)
-      found.add(*sequence[i], sequence[i]->sharpness / usual, blur_share);
+    if (!(sequence[i]->sharpness > 0 && usual > 0)) continue;
+    shares[i] = sequence[i]->sharpness / usual;
+    logarithms.push_back(std::log(shares[i]));
+  }
+  const double limit = std::min(blur_share, std::exp(-blur_deviations * robust_deviation(logarithms)));
+  for (size_t i = 0; i < sequence.size(); ++i) {
+    if (shares[i] < limit) found.add(*sequence[i], shares[i], limit);
   }
 }
 
@@ -89,13 +120,6 @@ void find_jumps(const Sequence& whole, Found& found) {
   }
 }
 
-double difference(const Tensor<uint8_t>& a, const Tensor<uint8_t>& b) {
-  if (a.shape() != b.shape()) return 255;
-  int64_t sum = 0;
-  for (int64_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
-  return static_cast<double>(sum) / static_cast<double>(a.size());
-}
-
 void find_frozen(const Sequence& sequence, Found& found) {
   std::vector<double> differences;
   for (size_t i = 1; i < sequence.size(); ++i)
@@ -113,9 +137,10 @@ void check_neighbours(const Capture& capture, const std::vector<ViewFacts>& fact
   Found blurred, jumping, frozen;
   blurred.less_is_worse = frozen.less_is_worse = true;
   for (const Sequence& sequence : sequences(capture, facts)) {
+    find_frozen(sequence, frozen);
+    if (!is_film(sequence)) continue;
     find_blur(sequence, blurred);
     find_jumps(sequence, jumping);
-    find_frozen(sequence, frozen);
   }
   const auto views = [](const Found& found) {
     return found.views.size() == 1 ? "1 view" : std::to_string(found.views.size()) + " views";

@@ -54,6 +54,7 @@ std::vector<Tile> choose_tiles(const Capture& capture, const Marks& marks) {
   choose(
       all, most_tiles - places.size(), [&](const Tile& tile) { return !is_marked(tile); }, places);
   std::vector<Tile> tiles;
+  tiles.reserve(places.size());
   for (const size_t place : places) tiles.push_back(all[place]);
   return tiles;
 }

@@ -53,12 +53,12 @@ class BrokenCapture {
   Inspection inspection() const { return inspect(load_capture(folder_.path(), {})); }
 
  private:
-  // Made once: twelve pictures of the training camera, three of the test camera.
+  // Made once: forty pictures of the training camera, ten of the test camera.
   static const std::filesystem::path& healthy() {
     static const TempFolder made;
     static const bool is_made = [] {
       SynthOptions options;
-      options.frames = 12;
+      options.frames = 40;
       options.width = 96;
       options.height = 54;
       options.samples = 4;

@@ -48,7 +48,7 @@ TEST(Diagnosis, finds_nothing_in_a_healthy_capture) {
   const Inspection found = BrokenCapture().inspection();
   EXPECT_TRUE(found.findings.empty()) << all(found);
   EXPECT_GT(found.sight.in_view, 0.2);
-  EXPECT_EQ(found.pixels.views, 15);
+  EXPECT_EQ(found.pixels.views, 50);
   EXPECT_GT(found.pixels.prior_angle, 1);
   EXPECT_LT(found.pixels.prior_angle, 45);
 }
@@ -168,7 +168,7 @@ TEST(Diagnosis, finds_a_dark_picture_and_does_not_call_it_blurred) {
 
 TEST(Diagnosis, finds_a_change_of_exposure_that_lasts) {
   const BrokenCapture capture;
-  for (int frame = 7; frame < 12; ++frame) {
+  for (int frame = 7; frame < 40; ++frame) {
     capture.edit_image(BrokenCapture::image(frame), [](auto& pixels) {
       for (uint8_t& v : pixels.values()) v = static_cast<uint8_t>(v * 0.7);
     });
@@ -183,6 +183,17 @@ TEST(Diagnosis, finds_a_frozen_picture) {
   const Finding found = only(capture, "frozen");
   EXPECT_THAT(found.views, ElementsAre("000005_left"));
   EXPECT_EQ(*found.value, 0);
+}
+
+TEST(Diagnosis, says_nothing_of_neighbours_in_a_collection_of_photographs) {
+  const BrokenCapture capture;
+  capture.edit_image(BrokenCapture::image(6), blur);
+  // Far pictures stand side by side.
+  capture.edit_json("metadata.json", [](auto& json) {
+    for (int frame = 0; frame < 40; ++frame) json[BrokenCapture::id(frame)]["time_id"] = 7 * frame % 40;
+  });
+  const Inspection found = capture.inspection();
+  EXPECT_TRUE(found.findings.empty()) << all(found);
 }
 
 TEST(Diagnosis, finds_pictures_of_one_colour) {
