@@ -291,6 +291,19 @@ TEST(NgpCapture, smaller_images_are_taken_where_they_are) {
   expect_pixels(capture, capture.train[0], small, 0.01);
 }
 
+TEST(NgpCapture, images_at_the_top_are_box_filtered) {
+  NgpCapture fake(3);
+  for (Json& frame : fake.json()["frames"])
+    frame["file_path"] = std::filesystem::path(frame["file_path"].get<std::string>()).filename().string();
+  fake.save();
+  for (const auto& entry : std::filesystem::directory_iterator(fake.path() / "images"))
+    std::filesystem::rename(entry.path(), fake.path() / entry.path().filename());
+  CaptureOptions options;
+  const int width = load_capture(fake.path(), options).train[0].camera.width;
+  options.downscale = 2;
+  EXPECT_EQ(load_capture(fake.path(), options).train[0].camera.width, width / 2);
+}
+
 TEST(NgpCaptureHostile, each_is_refused_by_name) {
   const std::pair<std::function<void(Json&)>, const char*> cases[] = {
       {[](Json& j) { j.erase("frames"); }, "transforms.json: frames: found nothing"},
