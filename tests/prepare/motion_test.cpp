@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "math/rotation.h"
+#include "prepare/motion/motion.h"
 #include "prepare/motion/moving_mask.h"
 #include "prepare/motion/null_vector.h"
 #include "prepare/motion/track.h"
@@ -85,7 +86,7 @@ struct Cameras {
     const Vec3<double> p = camera.pixel_from_camera * (camera.camera_from_world * (point - camera.position));
     return {p.x / p.z, p.y / p.z};
   }
-  Track track_of(const Vec3<double>& point) const { return {see(a, point), see(b, point)}; }
+  Track track_of(const Vec3<double>& point) const { return {see(a, point), see(b, point), 0}; }
 };
 
 Vec3<double> point_in_room(Random& random) {
@@ -109,6 +110,28 @@ TEST(TwoView, SampsonsDistanceIsThatFromTheLine) {
     const Vec3<double> line = lines.matrix * Vec3<double>(t.from, 1);
     t.to += Vec2<double>(line) / length(Vec2<double>(line));
     EXPECT_NEAR(lines.distance(t), std::sqrt(0.5), 0.1);
+  }
+}
+
+// The centres of a large pixel and of the small ones in it are at the same place.
+TEST(TwoView, LargerPixelsSeeTheSame) {
+  const double factor = 2.5;
+  const auto larger = [&](const Vec2<double>& p) {
+    return (p + Vec2<double>(0.5)) / factor - Vec2<double>(0.5);
+  };
+  const Cameras cameras;
+  Cameras turning;
+  turning.b.position = turning.a.position;
+  std::vector<Track> turned;
+  Random random(6);
+  for (int i = 0; i < 30; ++i) turned.push_back(turning.track_of(point_in_room(random)));
+  const TwoView lines = in_larger_pixels(epipolar_lines(cameras.a, cameras.b), factor),
+                plane = in_larger_pixels(fit_homography(turned), factor);
+  for (int i = 0; i < 30; ++i) {
+    Track t = cameras.track_of(point_in_room(random)), u = turned[static_cast<size_t>(i)];
+    for (Track* track : {&t, &u}) *track = {larger(track->from), larger(track->to), 0};
+    EXPECT_LT(lines.distance(t), 1e-9);
+    EXPECT_LT(plane.distance(u), 1e-6);
   }
 }
 
@@ -153,7 +176,7 @@ TEST(TwoView, FindsThePlaneOfACameraThatTurns) {
 
 TEST(TwoView, TooFewTracksAndTracksOnOnePlaceDoNotHang) {
   EXPECT_EQ(fit_two_view({}, 1, 0).matrix, Mat3<double>(1));
-  const std::vector<Track> same(40, Track{{5, 5}, {6, 6}});
+  const std::vector<Track> same(40, Track{{5, 5}, {6, 6}, 0});
   (void)fit_two_view(same, 1, 0);
 }
 
@@ -222,6 +245,31 @@ TEST(MovingMask, IsWhereTheSquareMoves) {
           << "picture " << i << (known ? " with" : " without") << " known cameras";
     }
   }
+}
+
+// Stripes that repeat every 12 pixels and go by 9 a picture, as sleepers of a railway: the nearest stripe is
+// the next one.
+TEST(Motion, WhatRepeatsIsFollowedAsWhatIsAroundIt) {
+  const double way = 9;
+  const auto scene = [&](double shift) {
+    return make_pyramid(painted(128, 240, [&](double x, double y) {
+      const double at = x - shift;
+      const bool is_striped = y > 30 && y < 100 && at > 40 && at < 170;
+      return is_striped ? 128 + 60 * std::sin(2 * std::acos(-1.0) * at / 12) + 8 * std::sin(0.4 * y)
+                        : pattern(at, y);
+    }));
+  };
+  const Pyramid here = scene(0), there = scene(way);
+  Motion motion{track(here, there, find_corners(here, 8)), {}};
+  motion.still = fit_two_view(motion.tracks, stillness, 0);
+  const auto astray = [&] {
+    return std::count_if(motion.tracks.begin(), motion.tracks.end(),
+                         [&](const Track& t) { return length(t.to - t.from - Vec2<double>(way, 0)) > 1; });
+  };
+  const auto before = astray();
+  EXPECT_GT(before, 20);
+  look_again(motion, here, there);
+  EXPECT_LT(astray(), before / 4);
 }
 
 TEST(MovingMask, IsTheSameOnAnyNumberOfThreads) {
