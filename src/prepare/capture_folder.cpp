@@ -248,6 +248,7 @@ void check_place(const fs::path& capture) {
     const std::string name = entry.path().filename().string();
     if (!own.contains(name)) refuse(name + ", which prepare did not write");
   }
+  if (fs::exists(capture / attached_masks)) refuse("masks that attach-priors put there");
 }
 
 void move_into_place(const fs::path& folder, const fs::path& capture, const fs::path& aside) {
