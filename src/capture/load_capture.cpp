@@ -88,7 +88,8 @@ class Assembly {
                        missing == capture_.warnings.end() ? "" : "see what is missing: " + missing->text);
     }
     if (!(last_time_ > 0)) {
-      warn("all views have time 0: the scene cannot move", "one-time");
+      warn("all views have time 0: the scene cannot move", "one-time",
+           found_.says_times ? Severity::problem : Severity::notice);
       last_time_ = 1;
     }
     capture_.train = make_split(found_.train);

@@ -133,7 +133,7 @@ TEST(ColmapCapture, two_cameras_side_by_side_share_their_times) {
   options.times = CaptureTimes::none;
   const Capture still = load_capture(fake.path(), options);
   EXPECT_EQ(still.train[4].time, 0);
-  EXPECT_THAT(still.warnings, Contains(says("all views have time 0")));
+  EXPECT_THAT(still.warnings, Contains(tells("one-time", Severity::notice, "all views have time 0")));
 }
 
 TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
@@ -397,6 +397,10 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
     EXPECT_THAT(refusal(fake.path()), HasSubstr(expected));
     splits = whole;
   }
+  for (auto& [name, split] : splits) split["time_ids"] = Json(4, 0);
+  save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(tells("one-time", Severity::problem, "all views have time 0")));
 }
 
 TEST(Formats, are_chosen_by_looking_or_by_name) {

@@ -100,6 +100,7 @@ class Reader {
   void split() {
     found_.all_ids = image_ids(names_, tree_->name_of(model_.images_file));
     const std::vector<double> times = times_by_names(names_);
+    found_.says_times = options_.times != CaptureTimes::none;
     std::map<std::string, size_t> place;
     for (size_t i = 0; i < names_.size(); ++i) place.emplace(found_.all_ids[i], i);
     const auto exists = [&](const std::string& id) { return !path_of(names_[place.at(id)]).empty(); };

@@ -36,6 +36,7 @@ struct FoundCapture {
   std::string format;
   StoredImages images;
   std::vector<FoundView> train, test;  // whole ones alone
+  bool says_times = true;              // else all are 0, as for a scene that stands still
   // As the capture lists them, those left out included: what arrays with one element per view count.
   std::vector<std::string> train_ids, all_ids;
   SceneNormalisation normalisation;

@@ -161,6 +161,8 @@ class Reader {
     }
     times_.assign(frames_.size(), 0);
     const bool timed = without.size() < frames_.size();
+    found_.says_times =
+        options_.times == CaptureTimes::names || (options_.times == CaptureTimes::automatic && timed);
     if (options_.times == CaptureTimes::names) {
       times_ = times_by_names(paths);
     } else if (options_.times == CaptureTimes::automatic && timed) {
