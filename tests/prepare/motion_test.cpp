@@ -247,29 +247,42 @@ TEST(MovingMask, IsWhereTheSquareMoves) {
   }
 }
 
-// Stripes that repeat every 12 pixels and go by 9 a picture, as sleepers of a railway: the nearest stripe is
-// the next one.
-TEST(Motion, WhatRepeatsIsFollowedAsWhatIsAroundIt) {
-  const double way = 9;
-  const auto scene = [&](double shift) {
+// Stripes that repeat every 12 pixels, whose tracks ended at the next one, as those of a railway's sleepers
+// may; and a square that moves by itself.
+TEST(Motion, WhatRepeatsIsFollowedAgainAndWhatMovesStaysAsItIs) {
+  const Vec2<double> way(9, 0), own(-4, 15);
+  constexpr double period = 12;
+  const auto in_stripes = [](double x, double y) { return x > 40 && x < 150 && y > 30 && y < 100; };
+  const auto in_square = [](double x, double y) { return x > 170 && x < 210 && y > 40 && y < 80; };
+  const auto scene = [&](double time) {
     return make_pyramid(painted(128, 240, [&](double x, double y) {
-      const double at = x - shift;
-      const bool is_striped = y > 30 && y < 100 && at > 40 && at < 170;
-      return is_striped ? 128 + 60 * std::sin(2 * std::acos(-1.0) * at / 12) + 8 * std::sin(0.4 * y)
-                        : pattern(at, y);
+      if (in_square(x - time * own.x, y - time * own.y))
+        return pattern(300 + x - time * own.x, 700 + y - time * own.y);
+      const double at = x - time * way.x;
+      return in_stripes(at, y)
+                 ? 128 + 60 * std::sin(2 * std::acos(-1.0) * at / period) + 8 * std::sin(0.4 * y)
+                 : pattern(at, y);
     }));
   };
-  const Pyramid here = scene(0), there = scene(way);
+  const Pyramid here = scene(0), there = scene(1);
   Motion motion{track(here, there, find_corners(here, 8)), {}};
   motion.still = fit_two_view(motion.tracks, stillness, 0);
-  const auto astray = [&] {
+  int64_t striped = 0;
+  for (Track& t : motion.tracks) {
+    if (!in_stripes(t.from.x - 6, t.from.y) || !in_stripes(t.from.x + 6, t.from.y)) continue;
+    t.to.x += period;
+    ++striped;
+  }
+  const auto going = [&](const Vec2<double>& shift) {
     return std::count_if(motion.tracks.begin(), motion.tracks.end(),
-                         [&](const Track& t) { return length(t.to - t.from - Vec2<double>(way, 0)) > 1; });
+                         [&](const Track& t) { return length(t.to - t.from - shift) < 0.5; });
   };
-  const auto before = astray();
-  EXPECT_GT(before, 20);
+  const auto still = going(way), moving = going(own);
+  EXPECT_GT(striped, 20);
+  EXPECT_GT(moving, 8);
   look_again(motion, here, there);
-  EXPECT_LT(astray(), before / 4);
+  EXPECT_GT(going(way), still + striped * 9 / 10);
+  EXPECT_EQ(going(own), moving);
 }
 
 TEST(MovingMask, IsTheSameOnAnyNumberOfThreads) {
