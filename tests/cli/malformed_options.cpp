@@ -30,7 +30,7 @@ MalformedKind malformed_options() {
                    "options.toml:1: found Error while parsing key-value pair: expected value, saw '\\n', "
                    "expected TOML"),
        in_settings("text that is not UTF-8", "specular = \"\xff\"\n",
-                   "options.toml:1: found Encountered invalid utf-8 sequence, expected TOML"),
+                   "options.toml:1: found bytes that are no UTF-8, expected text in UTF-8"),
        in_settings("an option that comes twice", "iterations = 1\niterations = 2\n",
                    "options.toml:2: found Error while parsing key-value pair: cannot redefine existing "
                    "integer 'iterations', expected TOML"),
