@@ -1,30 +1,23 @@
 #include "base/printable.h"
 
 #include <algorithm>
-#include <cstdint>
+
+#include "base/utf8.h"
 
 namespace traceflow {
 
 namespace {
 
-// Bytes of the UTF-8 character at the beginning of the text that may be shown; 0 where there is none.
+// Bytes of the character at the beginning of the text that may be shown; 0 where there is none.
 size_t shown_bytes(std::string_view text) {
-  const auto byte = [&](size_t i) { return static_cast<uint8_t>(text[i]); };
-  if (byte(0) < 0x80) return byte(0) >= 0x20 && byte(0) != 0x7f ? 1 : 0;
-  const size_t length = byte(0) < 0xc2 ? 0 : byte(0) < 0xe0 ? 2 : byte(0) < 0xf0 ? 3 : byte(0) < 0xf5 ? 4 : 0;
-  if (length == 0 || text.size() < length) return 0;
-  uint32_t code = byte(0) & (0xffU >> (length + 1));
-  for (size_t i = 1; i < length; ++i) {
-    if ((byte(i) & 0xc0U) != 0x80) return 0;
-    code = code << 6 | (byte(i) & 0x3fU);
-  }
-  constexpr uint32_t smallest[] = {0, 0, 0x80, 0x800, 0x10000};
-  const bool is_character = code >= smallest[length] && code <= 0x10ffff && (code < 0xd800 || code > 0xdfff);
-  const bool is_control = code < 0xa0;
+  const auto character = first_utf8_character(text);
+  if (!character) return 0;
+  const char32_t code = character->code;
+  const bool is_control = code < 0x20 || (code >= 0x7f && code < 0xa0);
   // What turns the direction of writing shows a line in another order than it has.
   const bool turns = (code >= 0x200e && code <= 0x200f) || (code >= 0x2028 && code <= 0x202e) ||
                      (code >= 0x2066 && code <= 0x2069);
-  return is_character && !is_control && !turns ? length : 0;
+  return is_control || turns ? 0 : character->bytes;
 }
 
 }  // namespace

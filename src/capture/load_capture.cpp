@@ -81,13 +81,15 @@ class Assembly {
       for (const FoundView& view : *split) last_time_ = std::max(last_time_, view.time);
     }
     if (found_.train.empty()) {
-      throw InputError(
-          capture_.folder.string(), "training views", "none that is whole",
-          "an image, a camera and a time each",
-          "see what is missing: " + (capture_.warnings.empty() ? "" : capture_.warnings.back().text));
+      const auto missing = std::find_if(capture_.warnings.begin(), capture_.warnings.end(),
+                                        [](const Finding& f) { return f.kind.starts_with("missing-"); });
+      throw InputError(capture_.folder.string(), "training views", "none that is whole",
+                       "an image, a camera and a time each",
+                       missing == capture_.warnings.end() ? "" : "see what is missing: " + missing->text);
     }
     if (!(last_time_ > 0)) {
-      warn("all views have time 0: the scene cannot move", "one-time");
+      warn("all views have time 0: the scene cannot move", "one-time",
+           found_.says_times ? Severity::problem : Severity::notice);
       last_time_ = 1;
     }
     capture_.train = make_split(found_.train);

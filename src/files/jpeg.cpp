@@ -1,17 +1,9 @@
 #include "files/jpeg.h"
 
 #include <algorithm>
-#include <array>
-#include <csetjmp>
-#include <cstdio>
-#include <new>
-
-// libjpeg's header wants the above before it.
-#include <jpeglib.h>
-// Its macros for errors.
-#include <jerror.h>
 
 #include "base/error.h"
+#include "files/jpeg_exit.h"
 
 namespace traceflow {
 
@@ -20,25 +12,10 @@ namespace {
 // From here on a picture is for looking closely: edges between colours stay sharp.
 constexpr int fine_quality = 90;
 
-// libjpeg leaves by longjmp, which skips destructors: what owns memory lives here, outside the jump. The
-// library hands back pointers to its own structs, which are therefore the first members of these.
-struct ErrorExit {
-  jpeg_error_mgr manager;
-  std::jmp_buf jump;
-  std::array<char, JMSG_LENGTH_MAX> text;
-};
-
 struct Sink {
   jpeg_destination_mgr manager;
   std::string bytes;
 };
-
-void on_error(j_common_ptr info) {
-  auto* exit = reinterpret_cast<ErrorExit*>(info->err);
-  (*info->err->format_message)(info, exit->text.data());
-  std::longjmp(exit->jump, 1);
-}
-void on_message(j_common_ptr) {}
 
 Sink* sink_of(j_compress_ptr info) { return reinterpret_cast<Sink*>(info->dest); }
 
@@ -71,15 +48,13 @@ void end(j_compress_ptr info) {
 }
 
 struct Encoder {
-  ErrorExit error{};
+  JpegExit error{};
   Sink sink{};
   jpeg_compress_struct jpeg{};
 
   // False with error.text where the library gave up.
   bool encode(const Tensor<uint8_t>& pixels, int quality) {
-    jpeg.err = jpeg_std_error(&error.manager);
-    error.manager.error_exit = on_error;
-    error.manager.output_message = on_message;
+    jpeg.err = error.prepare();
     if (setjmp(error.jump) != 0) return false;
     jpeg_create_compress(&jpeg);
     jpeg.dest = &sink.manager;
@@ -113,11 +88,10 @@ std::string jpeg_bytes(const Tensor<uint8_t>& pixels, int quality) {
           pixels.shape().to_string());
   require(quality >= 1 && quality <= 100, "a JPEG's quality is 1 to 100", std::to_string(quality));
   Encoder encoder;
-  if (!encoder.encode(pixels, quality)) {
-    throw InputError("JPEG", "", pixels.shape().to_string() + ": " + encoder.error.text.data(),
-                     "a picture of 1 to 65,500 pixels a side");
-  }
-  return std::move(encoder.sink.bytes);
+  if (encoder.encode(pixels, quality)) return std::move(encoder.sink.bytes);
+  encoder.error.throw_if_out_of_memory();
+  throw InputError("JPEG", "", pixels.shape().to_string() + ": " + encoder.error.text.data(),
+                   "a picture of 1 to 65,500 pixels a side");
 }
 
 }  // namespace traceflow

@@ -12,7 +12,8 @@ namespace traceflow {
 std::string jpeg_bytes(const Tensor<uint8_t>& pixels, int quality);
 
 // An image as stored, H×W×C with C = 1 (grey) or 3 (RGB). Throws InputError for what is not a JPEG, for data
-// that are broken or cut short anywhere, for CMYK, and for more than 32,768 pixels a side or 2²⁸ in all.
+// that are broken or cut short anywhere, for CMYK, and for more than 32,768 pixels a side, 2²⁸ in all,
+// or 2²⁷ in several scans (progressive).
 Tensor<uint8_t> read_jpeg(const InputFile& file);
 // What the header alone says.
 struct JpegSize {

@@ -1,18 +1,12 @@
 #include <algorithm>
 #include <array>
-#include <csetjmp>
-#include <cstdio>
 #include <span>
 #include <string>
-
-// libjpeg's header wants the above before it.
-#include <jpeglib.h>
-// Its macros for errors.
-#include <jerror.h>
 
 #include "base/error.h"
 #include "files/exif.h"
 #include "files/jpeg.h"
+#include "files/jpeg_exit.h"
 
 namespace traceflow {
 
@@ -20,16 +14,10 @@ namespace {
 
 constexpr int64_t max_side = 32768;
 constexpr int64_t max_pixels = int64_t{1} << 28;
+// All coefficients of a picture in several scans are held at once, two bytes each beside the pixels.
+constexpr int64_t max_pixels_in_scans = int64_t{1} << 27;
 // A picture has a few scans; a file of thousands keeps a decoder busy for hours.
 constexpr int max_scans = 500;
-
-// libjpeg leaves by longjmp, which skips destructors: what owns memory lives here, outside the jump. The
-// library hands back pointers to its own structs, which are therefore the first members of these.
-struct ErrorExit {
-  jpeg_error_mgr manager;
-  std::jmp_buf jump;
-  std::array<char, JMSG_LENGTH_MAX> text;
-};
 
 struct Source {
   jpeg_source_mgr manager;
@@ -40,28 +28,13 @@ struct Source {
 
 Source* source_of(j_decompress_ptr info) { return reinterpret_cast<Source*>(info->src); }
 
-[[noreturn]] void leave(j_common_ptr info) {
-  auto* exit = reinterpret_cast<ErrorExit*>(info->err);
-  (*info->err->format_message)(info, exit->text.data());
-  std::longjmp(exit->jump, 1);
-}
-
-[[noreturn]] void leave(j_common_ptr info, const char* text) {
-  auto* exit = reinterpret_cast<ErrorExit*>(info->err);
-  std::snprintf(exit->text.data(), exit->text.size(), "%s", text);
-  std::longjmp(exit->jump, 1);
-}
-
-void on_error(j_common_ptr info) { leave(info); }
-
 // The library would go on with made-up pixels where data are broken or missing.
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;
   const int code = info->err->msg_code;
   if (code == JWRN_ADOBE_XFORM || code == JWRN_JFIF_MAJOR || code == JWRN_EXTRANEOUS_DATA) return;
-  leave(info);
+  JpegExit::leave(info);
 }
-void on_output(j_common_ptr) {}
 
 void begin(j_decompress_ptr) {}
 void end(j_decompress_ptr) {}
@@ -80,8 +53,9 @@ boolean on_empty(j_decompress_ptr info) {
   const int64_t left = source->file->size() - source->offset;
   const auto whole = static_cast<int64_t>(source->buffer.size());
   const auto count = static_cast<size_t>(std::min(left, whole));
-  if (left <= 0) leave(reinterpret_cast<j_common_ptr>(info), "a file that is cut short");
-  if (!try_read(*source, count)) leave(reinterpret_cast<j_common_ptr>(info), "a file that cannot be read");
+  if (left <= 0) JpegExit::leave(reinterpret_cast<j_common_ptr>(info), "a file that is cut short");
+  if (!try_read(*source, count))
+    JpegExit::leave(reinterpret_cast<j_common_ptr>(info), "a file that cannot be read");
   source->offset += static_cast<int64_t>(count);
   source->manager.next_input_byte = source->buffer.data();
   source->manager.bytes_in_buffer = count;
@@ -100,17 +74,15 @@ void on_skip(j_decompress_ptr info, long count) {
 
 void on_progress(j_common_ptr info) {
   const auto* jpeg = reinterpret_cast<j_decompress_ptr>(info);
-  if (jpeg->input_scan_number > max_scans) leave(info, "more than 500 scans");
+  if (jpeg->input_scan_number > max_scans) JpegExit::leave(info, "more than 500 scans");
 }
 
 class JpegReader {
  public:
   explicit JpegReader(const InputFile& file) {
     source_.file = &file;
-    jpeg_.err = jpeg_std_error(&error_.manager);
-    error_.manager.error_exit = on_error;
+    jpeg_.err = error_.prepare();
     error_.manager.emit_message = on_message;
-    error_.manager.output_message = on_output;
   }
   ~JpegReader() { jpeg_destroy_decompress(&jpeg_); }
   JpegReader(const JpegReader&) = delete;
@@ -169,7 +141,7 @@ class JpegReader {
     return true;
   }
 
-  void check(const JpegSize& size) const {
+  void check(const JpegSize& size) {
     const J_COLOR_SPACE colours = jpeg_.jpeg_color_space;
     if (colours == JCS_CMYK || colours == JCS_YCCK) fail("the colours of print (CMYK)");
     if (colours != JCS_GRAYSCALE && colours != JCS_YCbCr && colours != JCS_RGB)
@@ -179,6 +151,8 @@ class JpegReader {
     if (size.width > max_side || size.height > max_side || int64_t{size.width} * size.height > max_pixels) {
       fail(size_text(size));
     }
+    if (jpeg_has_multiple_scans(&jpeg_) != 0 && int64_t{size.width} * size.height > max_pixels_in_scans)
+      fail(size_text(size) + " in several scans, of which 2²⁷ pixels are read");
   }
 
   // Each block of 8×8 numbers takes a bit at least.
@@ -196,14 +170,17 @@ class JpegReader {
     return blocks / 8;
   }
 
-  [[noreturn]] void fail() const { fail(error_.text.data()); }
+  [[noreturn]] void fail() const {
+    error_.throw_if_out_of_memory();
+    fail(error_.text.data());
+  }
   [[noreturn]] void fail(const std::string& found) const {
     throw InputError(source_.file->path().string(), "", found,
                      "a JPEG image, grey or RGB, of at most 32,768 pixels a side and 2²⁸ in all",
                      "write or copy the file again");
   }
 
-  ErrorExit error_{};
+  JpegExit error_{};
   Source source_{};
   jpeg_progress_mgr progress_{};
   jpeg_decompress_struct jpeg_{};

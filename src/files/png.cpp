@@ -3,11 +3,13 @@
 #include <png.h>
 
 #include <csetjmp>
+#include <new>
 #include <string>
 #include <vector>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "files/png_exit.h"
 
 namespace traceflow {
 
@@ -15,29 +17,18 @@ namespace {
 
 constexpr png_uint_32 max_side = 32768;
 
-void on_warning(png_structp, png_const_charp) {}
-
-// libpng leaves by longjmp, which skips destructors: everything that owns memory lives here, outside the
-// jump.
-struct PngSink {
+struct PngSink : PngExit {
   std::string bytes;
-  std::string error;
 };
-
-void on_write_error(png_structp png, png_const_charp text) {
-  static_cast<PngSink*>(png_get_error_ptr(png))->error = text;
-  png_longjmp(png, 1);
-}
 
 void write_bytes(png_structp png, png_bytep bytes, size_t count) {
   auto* sink = static_cast<PngSink*>(png_get_io_ptr(png));
-  bool ok = true;
   try {
     sink->bytes.append(reinterpret_cast<const char*>(bytes), count);
-  } catch (const std::exception&) {
-    ok = false;
+  } catch (const std::bad_alloc&) {
+    sink->out_of_memory = true;
   }
-  if (!ok) png_error(png, "out of memory");
+  if (sink->out_of_memory) png_error(png, "out of memory");
 }
 
 bool encode(png_structp png, png_infop info, png_uint_32 width, png_uint_32 height, int bits, int colour_type,
@@ -69,7 +60,9 @@ std::string encoded(const std::string& where, const Tensor<T>& pixels) {
   }
 
   PngSink sink;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &sink, on_write_error, on_warning);
+  PngExit* exit = &sink;
+  png_structp png = png_create_write_struct_2(PNG_LIBPNG_VER_STRING, exit, PngExit::leave, PngExit::ignore,
+                                              exit, PngExit::take_memory, PngExit::give_back);
   png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
   if (info == nullptr) {
     png_destroy_write_struct(&png, &info);
@@ -80,8 +73,9 @@ std::string encoded(const std::string& where, const Tensor<T>& pixels) {
       encode(png, info, static_cast<png_uint_32>(pixels.dim(1)), static_cast<png_uint_32>(pixels.dim(0)),
              8 * static_cast<int>(sizeof(T)), colour_types[channels - 1], rows.data());
   png_destroy_write_struct(&png, &info);
-  if (!ok) throw InputError(where, "", sink.error, "an image of at most 32,768 pixels a side");
-  return std::move(sink.bytes);
+  if (ok) return std::move(sink.bytes);
+  sink.throw_if_out_of_memory();
+  throw InputError(where, "", sink.text.data(), "an image of at most 32,768 pixels a side");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "base/error.h"
 #include "files/png.h"
+#include "files/png_exit.h"
 
 namespace traceflow {
 
@@ -20,19 +21,11 @@ constexpr int64_t max_pixels = int64_t{1} << 28;
 // before its memory is taken.
 constexpr int64_t max_inflation = 1032;
 
-// libpng leaves by longjmp, which skips destructors: everything that owns memory lives here, outside the
-// jump.
-struct PngSource {
+struct PngSource : PngExit {
+  explicit PngSource(const InputFile& from) : file(from) {}
   const InputFile& file;
   int64_t offset = 0;
-  std::string error = {};
 };
-
-void on_error(png_structp png, png_const_charp text) {
-  static_cast<PngSource*>(png_get_error_ptr(png))->error = text;
-  png_longjmp(png, 1);
-}
-void on_warning(png_structp, png_const_charp) {}
 
 void read_bytes(png_structp png, png_bytep bytes, size_t count) {
   auto* source = static_cast<PngSource*>(png_get_io_ptr(png));
@@ -51,8 +44,10 @@ void read_bytes(png_structp png, png_bytep bytes, size_t count) {
 class PngReader {
  public:
   // bits: of a number in what is read, 8 or 16.
-  PngReader(const InputFile& file, int bits) : source_{file}, bits_(bits) {
-    png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source_, on_error, on_warning);
+  PngReader(const InputFile& file, int bits) : source_(file), bits_(bits) {
+    PngExit* exit = &source_;
+    png_ = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, exit, PngExit::leave, PngExit::ignore, exit,
+                                    PngExit::take_memory, PngExit::give_back);
     if (png_ != nullptr) info_ = png_create_info_struct(png_);
     if (info_ == nullptr) {
       png_destroy_read_struct(&png_, &info_, nullptr);
@@ -117,7 +112,10 @@ class PngReader {
     png_read_end(png_, nullptr);
     return true;
   }
-  [[noreturn]] void fail() const { fail(source_.error); }
+  [[noreturn]] void fail() const {
+    source_.throw_if_out_of_memory();
+    fail(source_.text.data());
+  }
   [[noreturn]] void fail(const std::string& found) const {
     throw InputError(source_.file.path().string(), "", found,
                      "a PNG image of at most 32,768 pixels a side and 2²⁸ in all",

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <new>
 #include <span>
 
 #include "base/error.h"
@@ -202,6 +203,7 @@ InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
     stream.next_out = reinterpret_cast<Bytef*>(output.data());
     stream.avail_out = static_cast<uInt>(piece);
     status = inflate(&stream, Z_NO_FLUSH);
+    if (status == Z_MEM_ERROR) throw std::bad_alloc();
     if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR)
       fail(file, "broken compressed data");
     const size_t made = piece - stream.avail_out;

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 
+#include "base/atomic_file.h"
 #include "base/error.h"
 #include "capture/decode.h"
 #include "capture/image_cache.h"
 #include "files/json_document.h"
 #include "files/png.h"
+#include "prepare/capture_folder.h"
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
 #include "prepare/programs.h"
@@ -20,10 +23,23 @@ namespace {
 namespace fs = std::filesystem;
 using Say = std::function<void(const std::string& line)>;
 
+// What is attached in one go: a folder, and all that a reader would take beside or before it.
+struct Kind {
+  const char* folder;
+  std::vector<const char*> replaced;
+};
+const std::array<Kind, 2> kinds = {
+    {{"normal", {"normal", "normal.npz", "normal.npy"}}, {"mask", {"mask", "resized_mask"}}}};
+const Kind &normals_kind = kinds[0], &masks_kind = kinds[1];
+
 // Everything new lies here, until it is whole.
 class Staging {
  public:
   explicit Staging(const fs::path& capture) : capture_(capture), folder_(capture / ".attach-priors") {
+    // Killed between putting the old aside and putting the new in its place.
+    for (const Kind& kind : kinds) {
+      if (fs::exists(folder_ / kind.folder)) put_back(kind);
+    }
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
@@ -35,20 +51,32 @@ class Staging {
   Staging& operator=(const Staging&) = delete;
 
   fs::path operator/(const fs::path& name) const { return folder_ / name; }
-  // Puts a folder made here in the place of the capture's.
-  void move_in(const std::string& name) const {
-    const fs::path old = folder_ / ("old " + name);
-    if (fs::exists(capture_ / name)) fs::rename(capture_ / name, old);
-    fs::rename(folder_ / name, capture_ / name);
+  // Puts the folder made here in the place of what the capture has.
+  void move_in(const Kind& kind) const {
+    try {
+      for (const char* name : kind.replaced) {
+        if (fs::exists(capture_ / name)) fs::rename(capture_ / name, old(name));
+      }
+      fs::rename(folder_ / kind.folder, capture_ / kind.folder);
+    } catch (const fs::filesystem_error&) {
+      put_back(kind);
+      throw;
+    }
   }
 
  private:
+  fs::path old(const std::string& name) const { return folder_ / ("old " + name); }
+  void put_back(const Kind& kind) const {
+    for (const char* name : kind.replaced) {
+      if (fs::exists(old(name)) && !fs::exists(capture_ / name)) fs::rename(old(name), capture_ / name);
+    }
+  }
+
   fs::path capture_, folder_;
 };
 
-void refuse_to_replace(const fs::path& capture, std::initializer_list<const char*> names,
-                       const AttachOptions& options) {
-  for (const char* name : names) {
+void refuse_to_replace(const fs::path& capture, const Kind& kind, const AttachOptions& options) {
+  for (const char* name : kind.replaced) {
     if (fs::exists(capture / name) && !options.force) {
       throw InputError((capture / name).string(), "", "something there already", "a capture without",
                        "add --force to replace it");
@@ -156,6 +184,7 @@ void attach_masks(const Capture& capture, const AttachOptions& options, const St
         write_mask(staging / "mask/1x" / (id + ".png.png"), mask);
       });
   require_white(options.masks, covered);
+  write_atomically(staging / attached_masks, "by traceflow attach-priors\n");
   say(fmt::format("{:<10}{} of {} views, covering {:.1f}% of the pixels", "masks", matched.size(),
                   capture.train.size() + capture.test.size(), 100 * covered));
 }
@@ -221,14 +250,14 @@ void attach_priors(const fs::path& capture, const AttachOptions& options, const 
     throw InputError(capture.string(), "dataset.json", "no such file", "a folder in the layout of NeRF-DS",
                      "see docs/captures.md");
   }
-  if (!options.normals.empty()) refuse_to_replace(capture, {"normal", "normal.npz", "normal.npy"}, options);
-  if (!options.masks.empty()) refuse_to_replace(capture, {"mask", "resized_mask"}, options);
+  if (!options.normals.empty()) refuse_to_replace(capture, normals_kind, options);
+  if (!options.masks.empty()) refuse_to_replace(capture, masks_kind, options);
   const Capture loaded = load_capture(capture, {});
   const Staging staging(capture);
   if (!options.normals.empty()) attach_normals(loaded, options, staging, say, stop);
   if (!options.masks.empty()) attach_masks(loaded, options, staging, say, stop);
-  if (!options.normals.empty()) staging.move_in("normal");
-  if (!options.masks.empty()) staging.move_in("mask");
+  if (!options.normals.empty()) staging.move_in(normals_kind);
+  if (!options.masks.empty()) staging.move_in(masks_kind);
 }
 
 }  // namespace traceflow::prepare

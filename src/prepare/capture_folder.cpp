@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/robust.h"
 #include "capture/formats/nerfies_writer.h"
 #include "capture/lens/resample.h"
 #include "files/npy.h"
@@ -155,10 +156,7 @@ double typical_depth(const std::vector<Vec3<double>>& points, const std::vector<
       if (z > 0) depths.push_back(z);
     }
   }
-  if (depths.empty()) return 1;
-  const auto middle = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 2);
-  std::nth_element(depths.begin(), middle, depths.end());
-  return *middle;
+  return depths.empty() ? 1 : median(std::move(depths));
 }
 
 // Milliseconds; of pictures without times, their places.
@@ -250,6 +248,7 @@ void check_place(const fs::path& capture) {
     const std::string name = entry.path().filename().string();
     if (!own.contains(name)) refuse(name + ", which prepare did not write");
   }
+  if (fs::exists(capture / attached_masks)) refuse("masks that attach-priors put there");
 }
 
 void move_into_place(const fs::path& folder, const fs::path& capture, const fs::path& aside) {

@@ -26,6 +26,9 @@ std::string write_capture(const PrepareOptions& options, const CaptureParts& par
 // The points that several pictures agree on: the error is below 2 pixels, and three pictures see them.
 std::vector<Vec3<double>> good_points(const ColmapModel& model);
 
+// In a capture: tells that its masks are not those that prepare made.
+inline constexpr const char* attached_masks = "mask/attached.txt";
+
 // Throws InputError unless a finished capture may be put at this place: nothing is there, or a capture made
 // by prepare to which nothing was added.
 void check_place(const std::filesystem::path& capture);

@@ -37,15 +37,6 @@ Scaled small_grey(const fs::path& path) {
   return {to_8bit(resample(from_8bit(grey), {side(grey.dim(1)), side(grey.dim(0)), factor, factor})), factor};
 }
 
-// The same two views in pixels `factor` times as large. Places count from the first pixel's centre.
-TwoView in_larger_pixels(const TwoView& view, double factor) {
-  Mat3<double> larger(1 / factor);
-  larger[2] = Vec3<double>(0.5 / factor - 0.5, 0.5 / factor - 0.5, 1);
-  const Mat3<double> back = inverse(larger);
-  if (view.kind == TwoView::Kind::homography) return {view.kind, larger * view.matrix * back};
-  return {view.kind, transpose(back) * view.matrix * back};
-}
-
 // f(frame, mask) for every frame that --masks has a mask of.
 void take_supplied(const PrepareOptions& options, const Frames& frames, const fs::path& log,
                    const std::atomic<bool>& stop,

@@ -5,7 +5,9 @@
 #include <cctype>
 
 #include "base/error.h"
+#include "capture/formats/image_names.h"
 #include "prepare/film.h"
+#include "prepare/programs.h"
 
 namespace traceflow::prepare {
 
@@ -22,30 +24,6 @@ bool is_picture(const fs::path& path) {
   return std::find(endings.begin(), endings.end(), ending) != endings.end();
 }
 
-// Runs of digits compare as numbers.
-bool comes_before(const std::string& a, const std::string& b) {
-  const auto is_digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
-  const auto run = [&](const std::string& text, size_t& at) {
-    while (at < text.size() && text[at] == '0') ++at;
-    const size_t begin = at;
-    while (at < text.size() && is_digit(text[at])) ++at;
-    return text.substr(begin, at - begin);
-  };
-  size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (is_digit(a[i]) && is_digit(b[j])) {
-      const std::string first = run(a, i), second = run(b, j);
-      if (first.size() != second.size()) return first.size() < second.size();
-      if (first != second) return first < second;
-    } else {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i;
-      ++j;
-    }
-  }
-  return a.size() - i < b.size() - j || (a.size() - i == b.size() - j && a < b);
-}
-
 }  // namespace
 
 std::vector<fs::path> pictures_in(const fs::path& folder) {
@@ -54,7 +32,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
     if (entry.is_regular_file() && is_picture(entry.path())) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
-    return comes_before(a.filename().string(), b.filename().string());
+    return natural_less(a.filename().string(), b.filename().string());
   });
   return files;
 }
@@ -87,6 +65,7 @@ std::vector<std::string> PictureSource::names() const {
 std::vector<double> PictureSource::decode(bool grey, int64_t end,
                                           const std::function<bool(int64_t index)>& wanted,
                                           const Take& take) const {
+  need_program("ffmpeg");
   if (!is_folder()) {
     return decode_film({path_, longest_side_, grey}, log_, *stop_, [&](int64_t i, Tensor<uint8_t>&& picture) {
       if (wanted(i)) take(i, std::move(picture));

@@ -59,9 +59,18 @@ KeptMemory kept_memory(Device device, int64_t budget) {
 
 }  // namespace
 
+int64_t largest_view(const Capture& capture) {
+  int64_t pixels = 0;
+  for (const auto* split : {&capture.train, &capture.test}) {
+    for (const View& view : *split)
+      pixels = std::max(pixels, int64_t{view.camera.width} * view.camera.height);
+  }
+  return pixels;
+}
+
 int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t main, int64_t environment) {
   const TrainOptions& o = run.options;
-  const int64_t pixels = static_cast<int64_t>(run.width) * run.height;
+  const int64_t pixels = run.pixels;
   const bool traced = o.specular == Specular::environment_gaussians;
   const SetShape main_set{o.initial.sh_degree, o.deform.main, o.deform.network};
   const SetShape environment_set{o.initial.environment_sh_degree, o.deform.environment,
@@ -120,7 +129,7 @@ MemoryPlan plan_memory(const MemorySetting& run) {
 int64_t unlimited_forecast(const MemorySetting& run) {
   TrainOptions options = run.options;
   options.memory_budget = mebibyte * 1024;  // a pebibyte
-  return plan_memory({options, run.device, run.width, run.height}).forecast_bytes;
+  return plan_memory({options, run.device, run.pixels}).forecast_bytes;
 }
 
 }  // namespace traceflow

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "capture/capture.h"
 #include "render/renderer.h"
 #include "train/options.h"
 
@@ -9,8 +10,11 @@ namespace traceflow {
 struct MemorySetting {
   const TrainOptions& options;
   Device device;
-  int width, height;  // of its photographs
+  int64_t pixels;  // of its largest photograph
 };
+
+// Pixels of the largest view of both splits: a run renders them all.
+int64_t largest_view(const Capture& capture);
 
 // Bytes that a run may take: options.memory_budget, or three quarters of what the device (for the CPU: the
 // machine) has free.

@@ -100,8 +100,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       schedule_(options),
       perceptual_(network_on(device, perceptual_network(options.loss, capture_))),
       random_(seeded(options.seed)),
-      memory_(plan_memory(
-          {options_, device, capture_.train.at(0).camera.width, capture_.train.at(0).camera.height})),
+      memory_(plan_memory({options_, device, largest_view(capture_)})),
       targets_(device, memory_.image_bytes),
       scene_(scene_on(device, initial_scene(capture_, options, random_))),
       optimiser_(scene_),

@@ -22,6 +22,12 @@ using testing::Not;
 // A finding with this in its text.
 auto says(const std::string& part) { return testing::Field("text", &Finding::text, HasSubstr(part)); }
 
+// A finding of this kind with this in its text.
+auto tells(const std::string& kind, Severity severity, const std::string& part) {
+  return testing::AllOf(says(part), testing::Field("kind", &Finding::kind, kind),
+                        testing::Field("severity", &Finding::severity, severity));
+}
+
 std::vector<std::string> ids(const std::vector<View>& views) {
   std::vector<std::string> result(views.size());
   std::transform(views.begin(), views.end(), result.begin(), [](const View& view) { return view.id; });
@@ -127,7 +133,7 @@ TEST(ColmapCapture, two_cameras_side_by_side_share_their_times) {
   options.times = CaptureTimes::none;
   const Capture still = load_capture(fake.path(), options);
   EXPECT_EQ(still.train[4].time, 0);
-  EXPECT_THAT(still.warnings, Contains(says("all views have time 0")));
+  EXPECT_THAT(still.warnings, Contains(tells("one-time", Severity::notice, "all views have time 0")));
 }
 
 TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
@@ -142,10 +148,17 @@ TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
   // What is left is split.
   EXPECT_THAT(ids(capture.test), ElementsAre("frame_0", "frame_9"));
   EXPECT_EQ(capture.train.size(), 7U);
-  EXPECT_THAT(capture.warnings, Contains(says("1 of 10 registered views have no image (frame_3): left out")));
+  EXPECT_THAT(capture.warnings,
+              Contains(tells("missing-image", Severity::problem,
+                             "1 of 10 registered views have no image (frame_3): left out")));
   EXPECT_THAT(capture.warnings, Contains(says("1 image has no camera (images/blurred.png)")));
-  EXPECT_THAT(capture.warnings, Contains(says("sparse/0 is read, sparse/1 not")));
-  EXPECT_THAT(capture.warnings, Contains(says("--format transforms")));
+  EXPECT_THAT(capture.warnings,
+              Contains(tells("several-models", Severity::problem, "sparse/0 is read, sparse/1 not")));
+  EXPECT_THAT(capture.warnings, Contains(tells("other-format", Severity::notice, "--format transforms")));
+  const auto missing = std::find_if(capture.warnings.begin(), capture.warnings.end(),
+                                    [](const Finding& f) { return f.kind == "missing-image"; });
+  EXPECT_THAT(missing->views, ElementsAre("frame_3"));
+  EXPECT_THAT(missing->files, ElementsAre("images/frame_3.png"));
 }
 
 TEST(ColmapCapture, no_photographs_at_all_is_refused) {
@@ -211,7 +224,8 @@ TEST(SyntheticCapture, times_make_it_a_moving_one) {
     frame["time"] = frame["time"].get<double>() - 3;
   fake.save();
   const Capture shifted = load_capture(fake.path(), {});
-  EXPECT_THAT(shifted.warnings, Contains(says("without a time (test/r_1)")));
+  EXPECT_THAT(shifted.warnings,
+              Contains(tells("missing-time", Severity::problem, "without a time (test/r_1)")));
   EXPECT_EQ(shifted.train[0].time, 0);
 }
 
@@ -257,11 +271,17 @@ TEST(NgpCapture, nerfstudio_splits_points_and_frames_with_their_own_lens) {
   EXPECT_EQ(capture.points.dim(0), 2);
   EXPECT_FLOAT_EQ(capture.train[0].camera.focal_x, 10);
   EXPECT_FLOAT_EQ(capture.train[1].camera.focal_x, 20);
-  EXPECT_THAT(capture.warnings, Contains(says("2 frames are in neither train_filenames nor")));
-  EXPECT_THAT(capture.warnings, Contains(says("mask_path: not used")));
-  EXPECT_THAT(capture.warnings, Contains(says("depth images: not used")));
+  EXPECT_THAT(capture.warnings, Contains(tells("in-no-split", Severity::problem,
+                                               "2 frames are in neither train_filenames nor")));
+  EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "mask_path: not used")));
+  EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "depth images: not used")));
   fake.write_text("sparse_pc.ply", "broken");
-  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(says("points not used: ")));
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(tells("points-unreadable", Severity::problem, "points not used: ")));
+  std::filesystem::remove(fake.path() / "sparse_pc.ply");
+  EXPECT_THAT(
+      load_capture(fake.path(), {}).warnings,
+      Contains(tells("points-unreadable", Severity::problem, "sparse_pc.ply (ply_file_path) is missing")));
 }
 
 TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
@@ -271,7 +291,7 @@ TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
   fake.save();
   const Capture capture = load_capture(fake.path(), {});
   EXPECT_EQ(capture.train.size(), 5U);
-  EXPECT_THAT(capture.warnings, Contains(says("lead out of the capture")));
+  EXPECT_THAT(capture.warnings, Contains(tells("path-outside", Severity::notice, "lead out of the capture")));
   for (Json& frame : fake.json()["frames"]) frame["file_path"] = "../../etc/passwd";
   fake.save();
   EXPECT_THAT(refusal(fake.path()), HasSubstr("none of 1 images"));
@@ -289,6 +309,19 @@ TEST(NgpCapture, smaller_images_are_taken_where_they_are) {
   EXPECT_EQ(capture.train[0].camera.width, 6);
   EXPECT_FLOAT_EQ(capture.train[0].camera.focal_x, 5);
   expect_pixels(capture, capture.train[0], small, 0.01);
+}
+
+TEST(NgpCapture, images_at_the_top_are_box_filtered) {
+  NgpCapture fake(3);
+  for (Json& frame : fake.json()["frames"])
+    frame["file_path"] = std::filesystem::path(frame["file_path"].get<std::string>()).filename().string();
+  fake.save();
+  for (const auto& entry : std::filesystem::directory_iterator(fake.path() / "images"))
+    std::filesystem::rename(entry.path(), fake.path() / entry.path().filename());
+  CaptureOptions options;
+  const int width = load_capture(fake.path(), options).train[0].camera.width;
+  options.downscale = 2;
+  EXPECT_EQ(load_capture(fake.path(), options).train[0].camera.width, width / 2);
 }
 
 TEST(NgpCaptureHostile, each_is_refused_by_name) {
@@ -347,7 +380,7 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
   EXPECT_FLOAT_EQ(capture.test[2].time, 2.0F / 3);
   EXPECT_EQ(capture.images->source("1_00002").rig_camera, "1");
   EXPECT_EQ(capture.normalisation.scale, 0.5);
-  EXPECT_THAT(capture.warnings, Contains(says("depth/ is not used")));
+  EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "depth/ is not used")));
 
   const std::pair<std::function<void()>, const char*> cases[] = {
       {[&] { splits["val"]["time_ids"].erase(0); },
@@ -364,6 +397,10 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
     EXPECT_THAT(refusal(fake.path()), HasSubstr(expected));
     splits = whole;
   }
+  for (auto& [name, split] : splits) split["time_ids"] = Json(4, 0);
+  save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(tells("one-time", Severity::problem, "all views have time 0")));
 }
 
 TEST(Formats, are_chosen_by_looking_or_by_name) {

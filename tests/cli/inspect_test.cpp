@@ -66,6 +66,8 @@ TEST_F(InspectVerb, says_each_problem_in_a_line_with_its_paths) {
               HasSubstr("\nproblem         1 of 5 training views have no image (000001_left): left out\n"
                         "                rgb/1x/000001_left.png\n"));
   EXPECT_THAT(told.out, HasSubstr("\nproblem         1 of 4 training views have no mask (000002_left)\n"));
+  EXPECT_THAT(told.out, HasSubstr("\ntrain           4 views at 4 times from "));
+  EXPECT_THAT(told.out, HasSubstr("; 3 masks, 4 normal priors\n"));
   EXPECT_THAT(told.out, HasSubstr("\nmemory "));
 }
 

@@ -106,7 +106,16 @@ TEST(OptionToml, RefusesWhatItsParserCannotBear) {
   EXPECT_EQ(toml_refusal(repeated("# words\n", 200000)),
             "FILE: found 1600000 bytes, expected a TOML file of options, of at most 1048576");
   EXPECT_EQ(toml_refusal("\xc3\xa9 = 1\n"),
-            "FILE:1: found a letter beyond ASCII, expected such letters in quotes");
+            "FILE:1: found a letter beyond ASCII, expected such letters in double quotes");
+  EXPECT_EQ(toml_refusal("output = '\xc3\xa9'\n"),
+            "FILE:1: found a letter beyond ASCII, expected such letters in double quotes");
+  EXPECT_EQ(toml_refusal("output = \"\\\xc3\xa9\"\n"),
+            "FILE:1: found a letter beyond ASCII, expected such letters in double quotes");
+  EXPECT_EQ(toml_refusal("iterations = 1\n# \xc3\n"),
+            "FILE:2: found bytes that are no UTF-8, expected text in UTF-8");
+  EXPECT_THAT(toml_refusal("specular = \"\xc3\xa9\"\n"), HasSubstr("specular: found \xc3\xa9, expected"));
+  // Looking for the end of what is no value, it would meet the letter outside a string.
+  EXPECT_THAT(toml_refusal("a = +b\"\xcf\x92\"\n"), HasSubstr("FILE:1: found Error"));
   EXPECT_EQ(toml_refusal("a = \"\"\"\n"),
             "FILE:1: found three quotes, expected strings that end in their line");
   EXPECT_EQ(toml_refusal("\xef\xbb\xbf# " + repeated("a sentence\xe2\x80\xa6. ", 80) +

@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
+#include <new>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -171,9 +175,10 @@ TEST(JpegReaderHostile, the_colours_of_print_are_refused_by_name) {
   EXPECT_NE(refusal(two).find("2 colour components"), std::string::npos);
 }
 
-// The header's height and width stand behind the marker SOF0 (ff c0), two bytes of length and one of depth.
-std::string with_size(std::string bytes, int width, int height) {
-  const size_t at = bytes.find("\xff\xc0") + 5;
+// The header's height and width stand behind the marker SOF0 (ff c0; of a progressive one SOF2, ff c2), two
+// bytes of length and one of depth.
+std::string with_size(std::string bytes, int width, int height, const char* marker = "\xff\xc0") {
+  const size_t at = bytes.find(marker) + 5;
   bytes[at] = static_cast<char>(height >> 8);
   bytes[at + 1] = static_cast<char>(height & 255);
   bytes[at + 2] = static_cast<char>(width >> 8);
@@ -190,6 +195,50 @@ TEST(JpegReaderHostile, huge_headers_are_refused_before_memory_is_taken) {
   EXPECT_THROW(read_jpeg_size(file_of(folder, with_size(bytes, 32768, 8193))), InputError);
   EXPECT_THROW(read_jpeg_size(file_of(folder, with_size(bytes, 32769, 8))), InputError);
   EXPECT_THROW(read_jpeg_size(file_of(folder, with_size(bytes, 0, 8))), InputError);
+}
+
+TEST(JpegReaderHostile, several_scans_may_have_half_as_many_pixels) {
+  const TempFolder folder;
+  const std::string bytes = jpeg_of_kind({JCS_YCbCr, true}, 8, 8, 3, waves(8, 8, 3));
+  const auto sized = [&](int width, int height) {
+    return file_of(folder, with_size(bytes, width, height, "\xff\xc2"));
+  };
+  EXPECT_EQ(read_jpeg_size(sized(16384, 8192)).width, 16384);
+  EXPECT_NE(refusal(sized(16384, 8193)).find("16384×8193 in several scans"), std::string::npos);
+}
+
+// Of the process, by the system: libjpeg asks malloc.
+[[noreturn]] void read_with_room_for(const InputFile& file, int64_t bytes) {
+  int64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const auto limit = static_cast<rlim_t>(pages * sysconf(_SC_PAGESIZE) + bytes);
+  const rlimit room{limit, limit};
+  if (setrlimit(RLIMIT_AS, &room) != 0) std::_Exit(1);
+  try {
+    read_jpeg(file);
+  } catch (const std::bad_alloc&) {
+    std::_Exit(4);
+  } catch (const InputError&) {
+    std::_Exit(2);
+  }
+  std::_Exit(0);
+}
+
+TEST(JpegReaderHostile, memory_refused_is_no_fault_of_the_file) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "a sanitizer's shadow memory takes all room";
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
+  GTEST_SKIP() << "a sanitizer's shadow memory takes all room";
+#endif
+#endif
+  const TempFolder folder;
+  constexpr int side = 4096;  // 16 MiB of pixels, 32 MiB of coefficients
+  const std::string bytes = jpeg_of_kind({JCS_GRAYSCALE, true, 1, 1}, side, side, 1,
+                                         std::vector<unsigned char>(size_t{side} * side, 90));
+  const InputFile file = file_of(folder, bytes);
+  EXPECT_EXIT(read_with_room_for(file, int64_t{32} << 20), testing::ExitedWithCode(4), "");
+  EXPECT_EXIT(read_with_room_for(file, int64_t{256} << 20), testing::ExitedWithCode(0), "");
 }
 
 // A flat picture takes the least room that there is: it must not be taken for a bomb.

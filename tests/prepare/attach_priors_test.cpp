@@ -3,13 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <fstream>
 #include <numeric>
 
 #include "base/error.h"
+#include "capture/image_cache.h"
 #include "capture/synth/synth.h"
 #include "files/npy.h"
 #include "files/png.h"
+#include "prepare/capture_folder.h"
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
 #include "support/temp_folder.h"
@@ -158,6 +161,51 @@ TEST_F(AttachPriors, NothingIsReplacedUnasked) {
   options.masks = *made / "capture/mask/1x";
   EXPECT_THAT(refusal(options), HasSubstr("mask: found something there already"));
   expect_normals_of_the_truth(0.012);
+}
+
+// resized_mask would go on serving the views that the new masks lack.
+TEST_F(AttachPriors, ForceReplacesAllThatAReaderWouldTake) {
+  fs::rename(capture() / "mask", capture() / "resized_mask");
+  const fs::path given = folder_ / "given";
+  fs::create_directory(given);
+  for (const View& view : truth_.train)
+    fs::copy(*made / "capture/mask/1x" / (view.id + ".png.png"), given / (view.id + ".png"));
+  AttachOptions options;
+  options.masks = given;
+  EXPECT_THAT(refusal(options), HasSubstr("resized_mask: found something there already"));
+  options.force = true;
+  attach(options);
+  std::ofstream(capture() / "prepare.json") << "{}";
+  for (const char* name : {"truth", "synth.json"}) fs::remove_all(capture() / name);
+  EXPECT_THAT([&] { check_place(capture()); },
+              testing::ThrowsMessage<InputError>(HasSubstr("masks that attach-priors put there")));
+  EXPECT_FALSE(fs::exists(capture() / "resized_mask"));
+  EXPECT_FALSE(fs::exists(capture() / ".attach-priors"));
+  const Capture attached = load_capture(capture(), {});
+  for (const View& view : attached.test) EXPECT_FALSE(attached.images->source(view.id).mask);
+  for (const View& view : attached.train) EXPECT_FALSE(attached.images->source(view.id).mask_is_inverted);
+}
+
+TEST_F(AttachPriors, WhatAKilledOnePutAsideComesBack) {
+  const fs::path staging = capture() / ".attach-priors";
+  fs::create_directories(staging / "mask/1x");
+  fs::rename(capture() / "mask", staging / "old mask");
+  write_npy(folder_ / "normals.npy", normals_in({1, 1, 1}));
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  attach(options);
+  EXPECT_FALSE(fs::exists(staging));
+  EXPECT_TRUE(load_capture(capture(), {}).has_masks);
+}
+
+TEST_F(AttachPriors, WithoutFfmpegSaysHowToGetIt) {
+  const std::string path = std::getenv("PATH");
+  AttachOptions options;
+  options.masks = *made / "capture/mask/1x";
+  options.force = true;
+  ::setenv("PATH", "/nowhere", 1);
+  EXPECT_THAT(refusal(options), HasSubstr("install it with `scripts/setup --prepare`"));
+  ::setenv("PATH", path.c_str(), 1);
 }
 
 TEST_F(AttachPriors, WhatDoesNotFitIsRefusedAndTheCaptureLeftAsItWas) {

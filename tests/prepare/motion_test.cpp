@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "base/random.h"
 #include "math/rotation.h"
+#include "prepare/motion/motion.h"
 #include "prepare/motion/moving_mask.h"
 #include "prepare/motion/null_vector.h"
 #include "prepare/motion/track.h"
@@ -85,7 +86,7 @@ struct Cameras {
     const Vec3<double> p = camera.pixel_from_camera * (camera.camera_from_world * (point - camera.position));
     return {p.x / p.z, p.y / p.z};
   }
-  Track track_of(const Vec3<double>& point) const { return {see(a, point), see(b, point)}; }
+  Track track_of(const Vec3<double>& point) const { return {see(a, point), see(b, point), 0}; }
 };
 
 Vec3<double> point_in_room(Random& random) {
@@ -109,6 +110,28 @@ TEST(TwoView, SampsonsDistanceIsThatFromTheLine) {
     const Vec3<double> line = lines.matrix * Vec3<double>(t.from, 1);
     t.to += Vec2<double>(line) / length(Vec2<double>(line));
     EXPECT_NEAR(lines.distance(t), std::sqrt(0.5), 0.1);
+  }
+}
+
+// The centres of a large pixel and of the small ones in it are at the same place.
+TEST(TwoView, LargerPixelsSeeTheSame) {
+  const double factor = 2.5;
+  const auto larger = [&](const Vec2<double>& p) {
+    return (p + Vec2<double>(0.5)) / factor - Vec2<double>(0.5);
+  };
+  const Cameras cameras;
+  Cameras turning;
+  turning.b.position = turning.a.position;
+  std::vector<Track> turned;
+  Random random(6);
+  for (int i = 0; i < 30; ++i) turned.push_back(turning.track_of(point_in_room(random)));
+  const TwoView lines = in_larger_pixels(epipolar_lines(cameras.a, cameras.b), factor),
+                plane = in_larger_pixels(fit_homography(turned), factor);
+  for (int i = 0; i < 30; ++i) {
+    Track t = cameras.track_of(point_in_room(random)), u = turned[static_cast<size_t>(i)];
+    for (Track* track : {&t, &u}) *track = {larger(track->from), larger(track->to), 0};
+    EXPECT_LT(lines.distance(t), 1e-9);
+    EXPECT_LT(plane.distance(u), 1e-6);
   }
 }
 
@@ -153,7 +176,7 @@ TEST(TwoView, FindsThePlaneOfACameraThatTurns) {
 
 TEST(TwoView, TooFewTracksAndTracksOnOnePlaceDoNotHang) {
   EXPECT_EQ(fit_two_view({}, 1, 0).matrix, Mat3<double>(1));
-  const std::vector<Track> same(40, Track{{5, 5}, {6, 6}});
+  const std::vector<Track> same(40, Track{{5, 5}, {6, 6}, 0});
   (void)fit_two_view(same, 1, 0);
 }
 
@@ -222,6 +245,44 @@ TEST(MovingMask, IsWhereTheSquareMoves) {
           << "picture " << i << (known ? " with" : " without") << " known cameras";
     }
   }
+}
+
+// Stripes that repeat every 12 pixels, whose tracks ended at the next one, as those of a railway's sleepers
+// may; and a square that moves by itself.
+TEST(Motion, WhatRepeatsIsFollowedAgainAndWhatMovesStaysAsItIs) {
+  const Vec2<double> way(9, 0), own(-4, 15);
+  constexpr double period = 12;
+  const auto in_stripes = [](double x, double y) { return x > 40 && x < 150 && y > 30 && y < 100; };
+  const auto in_square = [](double x, double y) { return x > 170 && x < 210 && y > 40 && y < 80; };
+  const auto scene = [&](double time) {
+    return make_pyramid(painted(128, 240, [&](double x, double y) {
+      if (in_square(x - time * own.x, y - time * own.y))
+        return pattern(300 + x - time * own.x, 700 + y - time * own.y);
+      const double at = x - time * way.x;
+      return in_stripes(at, y)
+                 ? 128 + 60 * std::sin(2 * std::acos(-1.0) * at / period) + 8 * std::sin(0.4 * y)
+                 : pattern(at, y);
+    }));
+  };
+  const Pyramid here = scene(0), there = scene(1);
+  Motion motion{track(here, there, find_corners(here, 8)), {}};
+  motion.still = fit_two_view(motion.tracks, stillness, 0);
+  int64_t striped = 0;
+  for (Track& t : motion.tracks) {
+    if (!in_stripes(t.from.x - 6, t.from.y) || !in_stripes(t.from.x + 6, t.from.y)) continue;
+    t.to.x += period;
+    ++striped;
+  }
+  const auto going = [&](const Vec2<double>& shift) {
+    return std::count_if(motion.tracks.begin(), motion.tracks.end(),
+                         [&](const Track& t) { return length(t.to - t.from - shift) < 0.5; });
+  };
+  const auto still = going(way), moving = going(own);
+  EXPECT_GT(striped, 20);
+  EXPECT_GT(moving, 8);
+  look_again(motion, here, there);
+  EXPECT_GT(going(way), still + striped * 9 / 10);
+  EXPECT_EQ(going(own), moving);
 }
 
 TEST(MovingMask, IsTheSameOnAnyNumberOfThreads) {

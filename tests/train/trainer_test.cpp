@@ -248,9 +248,27 @@ TEST(Trainer, ThePerceptualTermIsToldFromWhereItStarts) {
   EXPECT_EQ(told, (std::vector<int64_t>{10, 11, 12}));
 }
 
+TEST(Memory, TheLargestViewOfEitherSplitCounts) {
+  Capture capture;
+  const auto add = [](std::vector<View>& split, int width, int height) {
+    View& view = split.emplace_back();
+    view.camera.width = width;
+    view.camera.height = height;
+  };
+  add(capture.train, 40, 30);
+  add(capture.train, 20, 70);
+  EXPECT_EQ(largest_view(capture), 1400);
+  add(capture.test, 60, 50);
+  EXPECT_EQ(largest_view(capture), 3000);
+
+  const TrainOptions options = preset("paper");
+  EXPECT_GT(unlimited_forecast({options, Device::cpu, 3000}),
+            unlimited_forecast({options, Device::cpu, 1200}));
+}
+
 TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {
   TrainOptions options = preset("paper");
-  const MemorySetting run{options, Device::cpu, 480, 270};
+  const MemorySetting run{options, Device::cpu, int64_t{480} * 270};
   options.memory_budget = 1 << 20;
   EXPECT_FALSE(plan_memory(run).caps.lowered);
   EXPECT_EQ(plan_memory(run).caps.main, options.density.max_surfels);

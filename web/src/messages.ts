@@ -273,7 +273,7 @@ export type TrainingEvent =
   | { event: 'measured'; iteration: number; phase: string; iterations: number; steps: OpTime[] }
   | {
       event: 'finished';
-      ending: 'completed' | 'interrupted' | 'diverged' | 'out_of_memory';
+      ending: 'completed' | 'interrupted' | 'diverged' | 'out_of_memory' | 'no_input';
       iteration: number;
       seconds: number;
       psnr: number;

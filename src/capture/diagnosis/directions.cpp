@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 
 namespace traceflow {
 

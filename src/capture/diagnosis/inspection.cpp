@@ -6,8 +6,8 @@
 #include <set>
 
 #include "base/parallel.h"
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 #include "capture/image_cache.h"
 
 namespace traceflow {

@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 #include "capture/image_cache.h"
 
 namespace traceflow {

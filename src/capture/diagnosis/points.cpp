@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <set>
 
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 
 namespace traceflow {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 #include "capture/extent.h"
 
 namespace traceflow {

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 
 namespace traceflow {
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <map>
 
+#include "base/robust.h"
 #include "capture/diagnosis/checks.h"
-#include "capture/diagnosis/robust.h"
 #include "capture/image_cache.h"
 
 namespace traceflow {

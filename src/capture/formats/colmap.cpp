@@ -62,7 +62,8 @@ class Reader {
     }
     if (!others.empty()) {
       found_.warnings.emplace_back("COLMAP made several models that it could not join: " + folder_ +
-                                   " is read, " + ids_text(others) + " not");
+                                       " is read, " + ids_text(others) + " not",
+                                   "several-models");
     }
   }
 
@@ -99,10 +100,15 @@ class Reader {
   void split() {
     found_.all_ids = image_ids(names_, tree_->name_of(model_.images_file));
     const std::vector<double> times = times_by_names(names_);
+    found_.says_times = options_.times != CaptureTimes::none;
     std::map<std::string, size_t> place;
     for (size_t i = 0; i < names_.size(); ++i) place.emplace(found_.all_ids[i], i);
     const auto exists = [&](const std::string& id) { return !path_of(names_[place.at(id)]).empty(); };
-    const auto whole = keep_whole(found_.all_ids, "registered", "image", exists, found_.warnings);
+    const auto usual_path = [&](const std::string& id) {
+      return in_folder(found_.images.folder, names_[place.at(id)]);
+    };
+    const auto whole = keep_whole(found_.all_ids, "registered", "image", exists, found_.warnings,
+                                  "missing-image", usual_path);
     for (size_t n = 0; n < whole.size(); ++n) {
       const size_t i = place.at(whole[n]);
       const double time = options_.times == CaptureTimes::none ? 0 : times[i];

@@ -48,10 +48,12 @@ NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<Finding>& wa
   if (tree.has(test_split)) {
     layout.test_ids = read_split(tree, test_split, layout, seen);
   } else {
-    warnings.emplace_back("splits/val.json is missing: there is nothing to evaluate on");
+    warnings.emplace_back("splits/val.json is missing: there is nothing to evaluate on", "no-test",
+                          Severity::notice);
   }
   for (const char* unused : {"depth", "covisible"}) {
-    if (tree.has_folder(unused)) warnings.emplace_back(std::string(unused) + "/ is not used");
+    if (tree.has_folder(unused))
+      warnings.emplace_back(std::string(unused) + "/ is not used", "not-used", Severity::notice);
   }
   read_nerfies_scene(tree, layout);
   return layout;

@@ -12,19 +12,17 @@ namespace traceflow {
 enum class Severity { problem, notice };
 constexpr std::array<std::string_view, 2> enum_names(Severity) { return {"problem", "notice"}; }
 
-// Something about a capture that its owner should know, said by who loads it or by who inspects it. A reader
-// that has nothing but words gives the text alone.
+// Something about a capture that its owner should know, said by who loads it or by who inspects it.
 struct Finding {
-  std::string text;              // one line, which names three views at most
-  std::string kind = "capture";  // docs/inspect.md lists them
+  std::string text;  // one line, which names three views at most
+  std::string kind;  // docs/inspect.md lists them
   Severity severity = Severity::problem;
   std::vector<std::string> views;  // ids of all that are concerned
   std::vector<std::string> files;  // likewise, paths inside the capture
   std::optional<double> value,
       threshold;  // what was measured, of the worst view, and from where on it is told
 
-  // NOLINTNEXTLINE(google-explicit-constructor): a text is a finding
-  Finding(std::string words, std::string its_kind = "capture", Severity how_bad = Severity::problem)
+  Finding(std::string words, std::string its_kind, Severity how_bad = Severity::problem)
       : text(std::move(words)), kind(std::move(its_kind)), severity(how_bad) {}
 };
 

@@ -33,8 +33,10 @@ FoundCapture read_capture(const std::shared_ptr<const FileTree>& tree, const Cap
   if (format == CaptureFormat::transforms) return read_transforms(tree, options);
   if (format != CaptureFormat::colmap) return read_nerfies(tree, options);
   FoundCapture found = read_colmap(tree, options);
-  if (automatic && is_transforms(*tree))
-    found.warnings.emplace_back("transforms.json lies there too: --format transforms reads it");
+  if (automatic && is_transforms(*tree)) {
+    found.warnings.emplace_back("transforms.json lies there too: --format transforms reads it",
+                                "other-format", Severity::notice);
+  }
   return found;
 }
 

@@ -36,6 +36,7 @@ struct FoundCapture {
   std::string format;
   StoredImages images;
   std::vector<FoundView> train, test;  // whole ones alone
+  bool says_times = true;              // else all are 0, as for a scene that stands still
   // As the capture lists them, those left out included: what arrays with one element per view count.
   std::vector<std::string> train_ids, all_ids;
   SceneNormalisation normalisation;
@@ -47,12 +48,12 @@ struct FoundCapture {
 };
 
 // The ids for which `exists` holds; the others become a warning: "3 of 80 training views have no image (a, b,
-// c): left out". kind: of the warning. path_of: the file in which it should be.
+// c): left out". kind: of the warning. path_of: the file in which it should be; may be null.
 std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const std::string& split,
                                     const std::string& what,
                                     const std::function<bool(const std::string& id)>& exists,
-                                    std::vector<Finding>& warnings, const std::string& kind = "left-out",
-                                    const std::function<std::string(const std::string& id)>& path_of = {});
+                                    std::vector<Finding>& warnings, const std::string& kind,
+                                    const std::function<std::string(const std::string& id)>& path_of);
 
 // The folder with the largest stored images that `downscale` is a multiple of. folder_of: the folder's name
 // by the scale that it is stored at. Throws InputError where there is none.

@@ -76,8 +76,13 @@ std::string find_image(const FileTree& tree, const std::string& path) {
 
 StoredImages choose_stored_images(const FileTree& tree, int downscale,
                                   const std::function<std::string(int stored)>& path_at) {
+  const auto is_there = [&](int scale) {
+    // Images at the top have no folder beside theirs for smaller ones.
+    return downscale % scale == 0 && path_at(scale) != path_at(1) &&
+           !find_image(tree, path_at(scale)).empty();
+  };
   int stored = downscale;
-  while (stored > 1 && (downscale % stored != 0 || find_image(tree, path_at(stored)).empty())) --stored;
+  while (stored > 1 && !is_there(stored)) --stored;
   const std::string folder = std::filesystem::path(path_at(stored)).parent_path().generic_string();
   return {folder, stored, downscale / stored};
 }

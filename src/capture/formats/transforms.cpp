@@ -48,7 +48,9 @@ class Reader {
   }
 
  private:
-  void warn(const std::string& text) { found_.warnings.emplace_back(text); }
+  Finding& warn(const std::string& text, const std::string& kind, Severity severity = Severity::problem) {
+    return found_.warnings.emplace_back(text, kind, severity);
+  }
 
   void read_split_files() {
     found_.background = Background::white;
@@ -58,7 +60,7 @@ class Reader {
     is_test_.assign(frames_.size(), false);
     const char* other = tree_->has(test_file) ? test_file : tree_->has(val_file) ? val_file : nullptr;
     if (other == nullptr) {
-      warn("transforms_test.json is missing: there is nothing to evaluate on");
+      warn("transforms_test.json is missing: there is nothing to evaluate on", "no-test", Severity::notice);
       return;
     }
     take(read_transforms_file(*tree_, other));
@@ -79,8 +81,8 @@ class Reader {
                     [&](const auto& f) { return !train.contains(f.path) && !test.contains(f.path); });
       if (file.frames.size() < all) {
         warn(std::to_string(all - file.frames.size()) +
-             " frames are in neither train_filenames nor "
-             "test_filenames: left out");
+                 " frames are in neither train_filenames nor test_filenames: left out",
+             "in-no-split");
       }
     }
     take(std::move(file));
@@ -93,10 +95,12 @@ class Reader {
     const auto number = [](int n) { return std::to_string(n); };
     if (file.masks > 0) {
       warn(number(file.masks) +
-           " frames name a mask_path: not used, since it says what to leave out, not where "
-           "the moving object is");
+               " frames name a mask_path: not used, since it says what to leave out, not where "
+               "the moving object is",
+           "not-used", Severity::notice);
     }
-    if (file.depths > 0) warn(number(file.depths) + " frames name depth images: not used");
+    if (file.depths > 0)
+      warn(number(file.depths) + " frames name depth images: not used", "not-used", Severity::notice);
     if (points_path_.empty()) points_path_ = file.points;
     // Fields point into their document.
     documents_.push_back(file.json);
@@ -109,7 +113,8 @@ class Reader {
         repeated.push_back(frame.path);
       }
     }
-    if (!repeated.empty()) warn(ids_text(repeated) + " named more than once: used once");
+    if (!repeated.empty())
+      warn(ids_text(repeated) + " named more than once: used once", "repeated-id").files = repeated;
   }
 
   // Paths of the machine that wrote the file: their ends may be here.
@@ -124,9 +129,11 @@ class Reader {
       }
       moved.push_back(written);
     }
-    if (!moved.empty())
-      warn("the paths of " + ids_text(moved) +
-           " lead out of the capture: their last parts are looked for in it");
+    if (moved.empty()) return;
+    warn(
+        "the paths of " + ids_text(moved) + " lead out of the capture: their last parts are looked for in it",
+        "path-outside", Severity::notice)
+        .files = moved;
   }
 
   void choose_images() {
@@ -154,11 +161,15 @@ class Reader {
     }
     times_.assign(frames_.size(), 0);
     const bool timed = without.size() < frames_.size();
+    found_.says_times =
+        options_.times == CaptureTimes::names || (options_.times == CaptureTimes::automatic && timed);
     if (options_.times == CaptureTimes::names) {
       times_ = times_by_names(paths);
     } else if (options_.times == CaptureTimes::automatic && timed) {
       if (found_.format == "nerf-synthetic") found_.format = "d-nerf";
-      if (!without.empty()) warn("frames without a time (" + ids_text(without) + "): taken for the first");
+      if (!without.empty())
+        warn("frames without a time (" + ids_text(without) + "): taken for the first", "missing-time").files =
+            without;
       double first = 0;
       for (const TransformsFrame& frame : frames_) first = std::min(first, frame.time.value_or(0));
       for (size_t i = 0; i < times_.size(); ++i) times_[i] = frames_[i].time.value_or(first) - first;
@@ -172,7 +183,11 @@ class Reader {
     std::map<std::string, size_t> place;
     for (size_t i = 0; i < paths.size(); ++i) place.emplace(found_.all_ids[i], i);
     const auto exists = [&](const std::string& id) { return !image_of(frames_[place.at(id)]).empty(); };
-    const auto whole = keep_whole(found_.all_ids, "listed", "image", exists, found_.warnings);
+    const auto usual_path = [&](const std::string& id) {
+      return at_scale(frames_[place.at(id)].path, found_.images.stored);
+    };
+    const auto whole =
+        keep_whole(found_.all_ids, "listed", "image", exists, found_.warnings, "missing-image", usual_path);
     std::vector<FoundView> views(whole.size());
     parallel_for(
         "capture: frames", static_cast<int64_t>(whole.size()),
@@ -207,12 +222,15 @@ class Reader {
 
   void read_points() {
     if (points_path_.empty()) return;
-    if (!tree_->has(points_path_)) return warn(points_path_ + " (ply_file_path) is missing");
+    if (!tree_->has(points_path_)) {
+      warn(points_path_ + " (ply_file_path) is missing", "points-unreadable").files = {points_path_};
+      return;
+    }
     try {
       found_.points = read_ply_points(tree_->open_file(points_path_));
       if (!found_.points.empty()) found_.points_file = points_path_;
     } catch (const InputError& error) {
-      warn(std::string("points not used: ") + error.what());
+      warn(std::string("points not used: ") + error.what(), "points-unreadable").files = {points_path_};
     }
   }
 

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "base/error.h"
+#include "base/utf8.h"
 #include "files/input_file.h"
 
 // The parser asserts of a table's name, "[:]", what it checks in the next line and refuses. In a debug build
@@ -21,20 +22,26 @@ namespace {
 constexpr int64_t most_bytes = int64_t{1} << 20;
 constexpr int deepest = 64;
 
-// Goes ahead of the parser, which walks tables in tables by recursion, and of a letter beyond ASCII that
-// stands outside strings and comments knows only that it should not be there.
+// Goes ahead of the parser, which walks tables in tables by recursion, and whose search for the end of what
+// it cannot read does not bear letters beyond ASCII: they reach it as escapes.
 class Guard {
  public:
   explicit Guard(const std::filesystem::path& path) : path_(path.string()) {}
 
-  void check(std::string_view text) {
+  // The same settings in ASCII, line by line.
+  std::string in_ascii(std::string_view text) {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
-    for (size_t i = 0; i < text.size(); ++i) {
-      if (text.substr(i, 3) == "\"\"\"" || text.substr(i, 3) == "'''")
+    std::string result;
+    while (!text.empty()) {
+      if (text.starts_with("\"\"\"") || text.starts_with("'''"))
         fail("three quotes", "strings that end in their line");
-      i += quote_ == '"' && text[i] == '\\' ? 1 : 0;
-      if (i < text.size()) take(text[i]);
+      const auto character = first_utf8_character(text);
+      if (!character) fail("bytes that are no UTF-8", "text in UTF-8");
+      if (character->bytes == 1) take(text[0]);
+      result += character->bytes == 1 ? std::string(1, text[0]) : escape(character->code);
+      text.remove_prefix(character->bytes);
     }
+    return result;
   }
 
  private:
@@ -42,8 +49,13 @@ class Guard {
     if (c == '\n') {
       ++line_;
       dots_ = 0;
-      quote_ = 0;
-    } else if (quote_ != 0) {
+      quote_ = '\0';
+      follows_backslash_ = false;
+    } else if (follows_backslash_) {
+      follows_backslash_ = false;
+    } else if (quote_ == '"' && c == '\\') {
+      follows_backslash_ = true;
+    } else if (quote_ != '\0') {
       quote_ = c == quote_ ? '\0' : quote_;
     } else if (c == '"' || c == '\'' || c == '#') {
       quote_ = c == '#' ? '\n' : c;
@@ -52,8 +64,12 @@ class Guard {
       dots_ += c == '.' ? 1 : 0;
       if (brackets_ > deepest) fail(fmt::format("more than {} open brackets", deepest), "options");
       if (dots_ > deepest) fail(fmt::format("more than {} dots", deepest), "options");
-      if (static_cast<unsigned char>(c) > 127) fail("a letter beyond ASCII", "such letters in quotes");
     }
+  }
+  std::string escape(char32_t code) const {
+    if (quote_ == '\n') return "?";
+    if (quote_ != '"' || follows_backslash_) fail("a letter beyond ASCII", "such letters in double quotes");
+    return fmt::format("\\U{:08X}", static_cast<uint32_t>(code));
   }
   [[noreturn]] void fail(const std::string& found, const std::string& expected) const {
     throw InputError(fmt::format("{}:{}", path_, line_), "", found, expected);
@@ -62,6 +78,7 @@ class Guard {
   std::string path_;
   int line_ = 1, brackets_ = 0, dots_ = 0;
   char quote_ = '\0';  // what ends the string or, '\n', the comment that this is in
+  bool follows_backslash_ = false;
 };
 
 std::string read_settings(const std::filesystem::path& path) {
@@ -72,8 +89,7 @@ std::string read_settings(const std::filesystem::path& path) {
   }
   std::string text(static_cast<size_t>(file.size()), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(text)));
-  Guard(path).check(text);
-  return text;
+  return Guard(path).in_ascii(text);
 }
 
 // What stands there, in a word.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "base/error.h"
 #include "base/machine.h"
@@ -18,11 +19,21 @@ namespace {
 void row(const std::string& name, const std::string& text) { fmt::print("{:<16}{}\n", name, text); }
 
 void row(const std::string& name, const Inspection::Split& split) {
-  row(name,
-      fmt::format("{} views at {} times from {:.3f} to {:.3f}; {} masks, {} normal priors, {} true normals, "
-                  "{} true depths",
-                  split.views, split.times, split.first_time, split.last_time, split.masks,
-                  split.normal_priors, split.truth_normals, split.truth_depths));
+  std::string text = fmt::format("{} views", split.views);
+  if (split.times == 1) text += fmt::format(", all at the time {:.3f}", split.first_time);
+  if (split.times > 1) {
+    text += fmt::format(" at {} times from {:.3f} to {:.3f}", split.times, split.first_time, split.last_time);
+  }
+  const char* between = "; ";
+  for (const auto& [count, what] : {std::pair{split.masks, "masks"},
+                                    {split.normal_priors, "normal priors"},
+                                    {split.truth_normals, "true normals"},
+                                    {split.truth_depths, "true depths"}}) {
+    if (count == 0) continue;
+    text += fmt::format("{}{} {}", between, count, what);
+    between = ", ";
+  }
+  row(name, text);
 }
 
 std::string box(const Vec3<double>& low, const Vec3<double>& high) {
@@ -140,8 +151,7 @@ nlohmann::json decoded_json(const Inspection::Pixels& pixels) {
 }  // namespace
 
 MemoryNeeds memory_needs(const Capture& capture, const TrainOptions& options, Inspection& inspection) {
-  MemorySetting run{options, Device::cpu, capture.train.front().camera.width,
-                    capture.train.front().camera.height};
+  MemorySetting run{options, Device::cpu, largest_view(capture)};
   MemoryNeeds needs;
   needs.kept_images = std::min(inspection.decoded_bytes, capture.images->limit_bytes());
   needs.on_cpu = unlimited_forecast(run);

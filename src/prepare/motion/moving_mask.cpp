@@ -3,38 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "base/parallel.h"
+#include "base/robust.h"
 
 namespace traceflow::prepare {
 
 namespace {
 
-constexpr int spacing = 8;       // pixels between tracks, and a side of the cells that votes are counted in
-constexpr double tolerance = 1;  // pixels by which what stands still may seem to move
-constexpr int reach = 3;         // cells over which a track speaks
+constexpr int spacing = 8;  // pixels between tracks, and a side of the cells that votes are counted in
+constexpr int reach = 3;    // cells over which a track speaks
 constexpr double least_voice = 0.3;  // weight of tracks without which nothing is known of a cell
-constexpr int64_t smallest_share = 300, margin_share = 60;
+constexpr int64_t smallest_share = 300, margin_share = 120;
 constexpr std::array<int64_t, 4> neighbours{-2, -1, 1, 2};  // in steps
 constexpr std::array<int64_t, 4> steps{1, 2, 4, 8};         // pictures
 constexpr double enough_motion = 12;                        // pixels between pictures that are compared
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-// What stands still is as exact as the tracks are: from how far those that obey are off.
-double limit_of(const Motion& motion) {
-  std::vector<double> obeying;
-  for (const Track& t : motion.tracks) {
-    const double d = motion.still.distance(t);
-    if (d < 2 * tolerance) obeying.push_back(d);
-  }
-  return std::max(tolerance, 4 * 1.4826 * median(std::move(obeying)));
-}
 
 // Cells: 1 what moves, −1 what stands still, 0 unknown.
 Tensor<float> votes_of(const Motion& motion, int64_t rows, int64_t columns) {
@@ -164,10 +148,12 @@ std::vector<Tensor<uint8_t>> moving_masks(
         for (size_t n = 0; n < neighbours.size(); ++n) {
           const int64_t j = i + step * neighbours[n];
           if (j < 0 || j >= count) continue;
-          Motion motion{track(here, make_pyramid(as_float(picture(j))), corners), {}};
+          const Pyramid there = make_pyramid(as_float(picture(j)));
+          Motion motion{track(here, there, corners), {}};
           const auto known = still(i, j);
           const uint64_t seed = static_cast<uint64_t>(i) * neighbours.size() + n;
-          motion.still = known ? *known : fit_two_view(motion.tracks, tolerance, seed);
+          motion.still = known ? *known : fit_two_view(motion.tracks, stillness, seed);
+          look_again(motion, here, there);
           motions.push_back(std::move(motion));
         }
         masks[static_cast<size_t>(i)] = moving_mask({here.height(), here.width()}, motions);

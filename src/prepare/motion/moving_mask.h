@@ -6,22 +6,15 @@
 #include <vector>
 
 #include "base/tensor.h"
-#include "prepare/motion/track.h"
-#include "prepare/motion/two_view.h"
+#include "prepare/motion/motion.h"
 
 // Where something moves by itself, told from motion alone.
 namespace traceflow::prepare {
 
-// Tracks of one picture into another, and how the still part of the scene goes there.
-struct Motion {
-  std::vector<Track> tracks;
-  TwoView still;
-};
-
 // H×W, 1 where something moves: where the tracks that do not obey outweigh those that do, in most of the
 // motions. Places without texture follow those around them. What is smaller than 1/300 of the picture is
-// dropped; the rest grows by a margin of 1/60 of the picture's longest side. Empty motions give an empty mask
-// (zeros).
+// dropped; the rest grows by a margin of 1/120 of the picture's longest side. Empty motions give an empty
+// mask (zeros).
 Tensor<uint8_t> moving_mask(const Shape& shape, const std::vector<Motion>& motions);
 
 // The same for every picture (8-bit grey, H×W×1, all of one size, in the order of time) from its motions to

@@ -105,9 +105,12 @@ double compare(const Patch& patch, const Tensor<float>& image, const Vec2<double
   return sum / window;
 }
 
-std::optional<Vec2<double>> follow(const Pyramid& from, const Pyramid& to, const Vec2<double>& place) {
-  Vec2<double> shift(0);  // pixels of the level
-  for (size_t level = from.levels.size(); level-- > 0;) {
+// From the coarsest of `levels` on; `shift` in pixels.
+std::optional<Track> follow(const Pyramid& from, const Pyramid& to, const Vec2<double>& place, size_t levels,
+                            Vec2<double> shift) {
+  shift /= static_cast<double>(int64_t{1} << levels);
+  double difference = 0;
+  for (size_t level = levels; level-- > 0;) {
     const Vec2<double> at = place / static_cast<double>(int64_t{1} << level);
     const Patch patch(from.levels[level], at);
     shift *= 2.0;
@@ -118,19 +121,18 @@ std::optional<Vec2<double>> follow(const Pyramid& from, const Pyramid& to, const
     for (int i = 0; i < iterations; ++i) {
       Vec2<double> b(0);
       compare(patch, to.levels[level], at + shift,
-              [&](size_t k, double difference) { b += difference * patch.slope[k]; });
+              [&](size_t k, double apart) { b += apart * patch.slope[k]; });
       const Vec2<double> step = patch.structure.solve(b);
       shift += step;
       if (dot(step, step) < converged * converged) break;
     }
-    if (level > 0) continue;
-    const Vec2<double> found = at + shift;
-    const bool inside = found.x >= 0 && found.y >= 0 && found.x <= static_cast<double>(to.width() - 1) &&
-                        found.y <= static_cast<double>(to.height() - 1);
-    if (!inside || compare(patch, to.levels[0], found, [](size_t, double) {}) > largest_difference)
-      return std::nullopt;
+    if (level == 0) difference = compare(patch, to.levels[0], at + shift, [](size_t, double) {});
   }
-  return place + shift;
+  const Vec2<double> found = place + shift;
+  const bool inside = found.x >= 0 && found.y >= 0 && found.x <= static_cast<double>(to.width() - 1) &&
+                      found.y <= static_cast<double>(to.height() - 1);
+  if (!inside || difference > largest_difference) return std::nullopt;
+  return Track{place, found, difference};
 }
 
 }  // namespace
@@ -175,12 +177,17 @@ std::vector<Vec2<double>> find_corners(const Pyramid& picture, int spacing) {
 std::vector<Track> track(const Pyramid& from, const Pyramid& to, const std::vector<Vec2<double>>& places) {
   std::vector<Track> tracks;
   for (const Vec2<double>& place : places) {
-    const auto there = follow(from, to, place);
+    const auto there = follow(from, to, place, from.levels.size(), Vec2<double>(0));
     if (!there) continue;
-    const auto back = follow(to, from, *there);
-    if (back && length(*back - place) <= farthest_back) tracks.push_back({place, *there});
+    const auto back = follow(to, from, there->to, to.levels.size(), Vec2<double>(0));
+    if (back && length(back->to - place) <= farthest_back) tracks.push_back(*there);
   }
   return tracks;
+}
+
+std::optional<Track> track_near(const Pyramid& from, const Pyramid& to, const Vec2<double>& place,
+                                const Vec2<double>& shift) {
+  return follow(from, to, place, std::min<size_t>(2, from.levels.size()), shift);
 }
 
 }  // namespace traceflow::prepare

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "base/tensor.h"
@@ -20,6 +21,7 @@ Pyramid make_pyramid(Tensor<float> grey);
 // In pixels; the centre of the first is (0, 0).
 struct Track {
   Vec2<double> from{0}, to{0};
+  double difference = 0;  // of the surroundings, mean over a window, of 255
 };
 
 // In every square of `spacing` pixels the place that can best be told from its neighbours, where one can.
@@ -28,5 +30,10 @@ std::vector<Vec2<double>> find_corners(const Pyramid& picture, int spacing);
 // The places found again in another picture. Left out: those that leave it, whose surroundings look different
 // there, or that the way back does not lead to within half a pixel of where they were.
 std::vector<Track> track(const Pyramid& from, const Pyramid& to, const std::vector<Vec2<double>>& places);
+
+// The place found again near `from` + `shift` alone, a few pixels around: by no more than the finest two
+// levels.
+std::optional<Track> track_near(const Pyramid& from, const Pyramid& to, const Vec2<double>& place,
+                                const Vec2<double>& shift);
 
 }  // namespace traceflow::prepare

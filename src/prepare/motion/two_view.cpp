@@ -168,6 +168,15 @@ TwoView fit_two_view(const std::vector<Track>& tracks, double tolerance, uint64_
   return in_plane >= nearly * on_lines ? plane : lines;
 }
 
+TwoView in_larger_pixels(const TwoView& view, double factor) {
+  Mat3<double> larger(1 / factor);
+  // Places count from the first pixel's centre, which is not that of a larger one.
+  larger[2] = Vec3<double>(0.5 / factor - 0.5, 0.5 / factor - 0.5, 1);
+  const Mat3<double> back = inverse(larger);
+  const bool is_plane = view.kind == Kind::homography;
+  return {view.kind, normalised((is_plane ? larger : transpose(back)) * view.matrix * back)};
+}
+
 TwoView epipolar_lines(const PlacedCamera& from, const PlacedCamera& to) {
   const Vec3<double> t = to.camera_from_world * (from.position - to.position);
   const Mat3<double> cross_t(0, t.z, -t.y, -t.z, 0, t.x, t.y, -t.x, 0);

@@ -35,6 +35,9 @@ struct PlacedCamera {
 };
 TwoView epipolar_lines(const PlacedCamera& from, const PlacedCamera& to);
 
+// The same two views in pixels `factor` times as large.
+TwoView in_larger_pixels(const TwoView& view, double factor);
+
 // Least squares: the unit matrix, up to sign, that fits at least 4 (8) tracks. A fundamental matrix has
 // rank 2.
 TwoView fit_homography(const std::vector<Track>& tracks);

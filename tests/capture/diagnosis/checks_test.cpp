@@ -23,7 +23,7 @@ std::string all(const Inspection& inspection) {
 Finding only(const BrokenCapture& capture, const std::string& kind, Severity severity = Severity::problem) {
   const Inspection found = capture.inspection();
   EXPECT_EQ(found.findings.size(), 1U) << all(found);
-  if (found.findings.empty()) return Finding("nothing");
+  if (found.findings.empty()) return Finding("nothing", "none");
   EXPECT_EQ(found.findings[0].kind, kind) << all(found);
   EXPECT_EQ(found.findings[0].severity, severity);
   EXPECT_EQ(found.findings[0].text.find('\n'), std::string::npos);

@@ -90,11 +90,21 @@ void arm() {
 }
 
 NoMemory::NoMemory() {
+  has_failed = false;
   first_failing = 0;
   all_from_there = true;
   armed = true;
 }
 NoMemory::~NoMemory() { armed = false; }
+
+RefusedOnce::RefusedOnce(int64_t n) {
+  allocations = 0;
+  has_failed = false;
+  first_failing = n;
+  all_from_there = false;
+  armed = true;
+}
+RefusedOnce::~RefusedOnce() { armed = false; }
 
 }  // namespace traceflow::faults
 

@@ -57,6 +57,13 @@ struct NoMemory {
   NoMemory(const NoMemory&) = delete;
   NoMemory& operator=(const NoMemory&) = delete;
 };
+// While one stands, this process is refused the n-th of its requests, counted from 1.
+struct RefusedOnce {
+  explicit RefusedOnce(int64_t n);
+  ~RefusedOnce();
+  RefusedOnce(const RefusedOnce&) = delete;
+  RefusedOnce& operator=(const RefusedOnce&) = delete;
+};
 
 // How many allocations a program made to its end, as its World wished: with failing_allocation = count_only.
 inline constexpr int64_t count_only = -1;

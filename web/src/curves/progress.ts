@@ -29,6 +29,7 @@ const endings: Record<Extract<TrainingEvent, { event: 'finished' }>['ending'], s
   interrupted: 'Stopped',
   diverged: 'Diverged',
   out_of_memory: 'Ran out of memory',
+  no_input: 'Lost its capture',
 };
 const most_warnings = 3;
 

@@ -114,4 +114,7 @@ test('ends, saves and warnings are said in words', () => {
   assert.deepEqual(remarks([{ ...end, ending: 'diverged', reason: 'the loss is not finite' }]), [
     { text: 'Diverged at iteration 1,300: the loss is not finite', wrong: true },
   ]);
+  assert.deepEqual(remarks([{ ...end, ending: 'no_input', reason: 'rgb/1x/a.png: found nothing' }]), [
+    { text: 'Lost its capture at iteration 1,300: rgb/1x/a.png: found nothing', wrong: true },
+  ]);
 });

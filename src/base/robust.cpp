@@ -1,4 +1,4 @@
-#include "capture/diagnosis/robust.h"
+#include "base/robust.h"
 
 #include <algorithm>
 #include <cmath>
