@@ -79,6 +79,11 @@ TEST(Ways, of_filming_are_healthy) {
   for (int i = 0; i < 40; ++i) add(capture, {0.001 * std::sin(i), 0.001 * std::cos(i), 0}, {0, 5, 0});
   for (int i = 1; i < 12; ++i) add(capture, {0.05 * i, 0, 0}, {0, 5, 0});
   EXPECT_THAT(kinds(capture), ElementsAre()) << "long at one place, then away step by step";
+
+  // Too few of them to be a second group: each is within reach of the one before.
+  capture = orbit();
+  for (int i = 1; i <= 4; ++i) add(capture, {3 + 2.5 * i, 0, 0.3}, {0, 0, 0});
+  EXPECT_THAT(kinds(capture), ElementsAre()) << "away from an orbit";
 }
 
 TEST(Positions, an_outlier_among_test_cameras_leaves_the_extent) {
