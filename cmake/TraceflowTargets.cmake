@@ -41,7 +41,26 @@ if(TRACEFLOW_SANITIZE)
   target_compile_options(traceflow_settings INTERFACE -fsanitize=${TRACEFLOW_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)
   target_link_options(traceflow_settings INTERFACE -fsanitize=${TRACEFLOW_SANITIZE})
+  # Of Highway's copies of each step, one for each instruction set, two: they are one source.
+  target_compile_definitions(traceflow_settings INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4|HWY_AVX3)")
 endif()
+
+# traceflow_precompile(TARGET HEADER...) compiles headers once; traceflow_precompiled(TARGET OWNER) begins every source of
+# TARGET with what OWNER so compiled. Both do nothing unless TRACEFLOW_PRECOMPILED is on, which shortens a build from
+# nothing but lets a file forget an #include, so builds that are kept leave it off.
+option(TRACEFLOW_PRECOMPILED "Compile the headers that most files include once" OFF)
+set(TRACEFLOW_HEADERS <algorithm> <filesystem> <fstream> <functional> <map> <memory> <optional> <string> <vector>
+  <fmt/format.h> <nlohmann/json.hpp> ${CMAKE_SOURCE_DIR}/src/base/parallel.h ${CMAKE_SOURCE_DIR}/src/base/tensor.h)
+function(traceflow_precompile target)
+  if(TRACEFLOW_PRECOMPILED)
+    target_precompile_headers(${target} PRIVATE ${ARGN})
+  endif()
+endfunction()
+function(traceflow_precompiled target owner)
+  if(TRACEFLOW_PRECOMPILED AND NOT target STREQUAL owner)
+    target_precompile_headers(${target} REUSE_FROM ${owner})
+  endif()
+endfunction()
 
 # traceflow_library(ops_raster LINKS base math scene [SYSTEM packages...])
 # One library per folder: all .cpp files beside the CMakeLists.txt and in its cpu/ and cuda/. LINKS are the rooms below that it may include; SYSTEM
@@ -57,6 +76,7 @@ function(traceflow_library name)
   if(sources)
     add_library(traceflow_${name} STATIC ${sources})
     target_link_libraries(traceflow_${name} PUBLIC traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})
+    traceflow_precompiled(traceflow_${name} traceflow_base)
   else()
     add_library(traceflow_${name} INTERFACE)
     target_link_libraries(traceflow_${name} INTERFACE traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})

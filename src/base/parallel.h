@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <functional>
@@ -21,16 +22,19 @@ bool in_parallel_loop();
 
 namespace detail {
 
-// Carries the first exception out of an OpenMP region, which must not be left by one.
+// Carries the first exception out of an OpenMP region, which must not be left by one. What has not been run
+// by then is not run.
 class ExceptionBridge {
  public:
   template <class F>
   void run(F&& f) noexcept {
+    if (failed_.load(std::memory_order_relaxed)) return;
     try {
       f();
     } catch (...) {
       const std::lock_guard lock(mutex_);
       if (!first_) first_ = std::current_exception();
+      failed_.store(true, std::memory_order_relaxed);
     }
   }
   void rethrow() {
@@ -38,6 +42,7 @@ class ExceptionBridge {
   }
 
  private:
+  std::atomic<bool> failed_{false};
   std::mutex mutex_;
   std::exception_ptr first_;
 };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 
@@ -61,9 +62,11 @@ std::string read_text(const InputFile& file) {
 std::string read_text(const std::filesystem::path& path) { return read_text(InputFile(path)); }
 
 JsonDocument::JsonDocument(std::string name, std::string_view text)
-    : JsonField(name, "", nullptr), root_(parse(name, text)) {
-  point_to(&root_);
+    : JsonField(name, "", nullptr), root_(std::make_unique<const nlohmann::json>(parse(name, text))) {
+  point_to(root_.get());
 }
+
+JsonDocument::~JsonDocument() = default;
 
 JsonFile::JsonFile(const InputFile& file) : JsonDocument(file.path().string(), read_text(file)) {}
 

@@ -3,7 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,7 +22,7 @@ class JsonField {
   bool has(const std::string& key) const;
   // A member that must be there.
   JsonField operator[](const std::string& key) const;
-  // As it stands in the document.
+  // As it stands in the document. Who looks into it includes nlohmann/json.hpp.
   const nlohmann::json& json() const { return *value_; }
 
   // Finite.
@@ -68,11 +69,12 @@ class JsonDocument : public JsonField {
  public:
   // name: of the document in errors.
   JsonDocument(std::string name, std::string_view text);
+  ~JsonDocument();
   JsonDocument(const JsonDocument&) = delete;
   JsonDocument& operator=(const JsonDocument&) = delete;
 
  private:
-  nlohmann::json root_;
+  std::unique_ptr<const nlohmann::json> root_;
 };
 
 // The text of a file of at most 64 MiB, which parsed takes up to 1 GiB.

@@ -53,12 +53,12 @@ float load_scalar(PlyScalar type, const std::byte* p) {
   throw InputError(path, "property " + name, "none", "every attribute of 2DGS", ply_remedy);
 }
 
-// Where one property of a row goes: destination[row · stride].
+// Where one property of a row goes: rows[row · stride + number]. rows: null where there are none.
 struct Column {
   PlyScalar type;
   int64_t offset;
-  float* destination;
-  int64_t stride;
+  float* rows;
+  int64_t stride, number;
 };
 
 class ColumnPlan {
@@ -67,12 +67,12 @@ class ColumnPlan {
 
   // Maps properties prefix_0, prefix_1, … (or the given names) to consecutive numbers of a tensor's row.
   void add(const std::vector<std::string>& names, Tensor<float>& tensor) {
-    for (size_t i = 0; i < names.size(); ++i) add_one(names[i], tensor.data() + i, tensor.row_size());
+    for (size_t i = 0; i < names.size(); ++i) add_one(names[i], tensor, static_cast<int64_t>(i));
   }
-  void add_one(const std::string& name, float* destination, int64_t stride) {
+  void add_one(const std::string& name, Tensor<float>& tensor, int64_t number) {
     const PlyProperty* p = header_.find(name);
     if (p == nullptr) missing_attribute(path_, name);
-    columns_.push_back({p->type, p->offset, destination, stride});
+    columns_.push_back({p->type, p->offset, tensor.data(), tensor.row_size(), number});
   }
   const std::vector<Column>& columns() const { return columns_; }
 
@@ -110,7 +110,7 @@ void read_rows(const InputFile& file, const PlyHeader& header, const std::vector
     for (int64_t r = 0; r < rows; ++r) {
       const std::byte* row = buffer.data() + r * header.row_bytes;
       for (const Column& c : columns)
-        c.destination[(first + r) * c.stride] = load_scalar(c.type, row + c.offset);
+        c.rows[(first + r) * c.stride + c.number] = load_scalar(c.type, row + c.offset);
     }
   }
 }
@@ -170,8 +170,7 @@ PlyScene read_ply(const std::filesystem::path& path) {
   plan.add({"f_dc_0", "f_dc_1", "f_dc_2"}, s.sh);
   for (int64_t channel = 0; channel < 3; ++channel) {
     for (int64_t c = 1; c < k; ++c) {
-      plan.add_one("f_rest_" + std::to_string(channel * (k - 1) + c - 1), s.sh.data() + 3 * c + channel,
-                   3 * k);
+      plan.add_one("f_rest_" + std::to_string(channel * (k - 1) + c - 1), s.sh, 3 * c + channel);
     }
   }
   if (header.find("tint") != nullptr) {

@@ -135,5 +135,18 @@ TEST(Indices, RiseWithinTheirRange) {
   EXPECT_THROW(check({3, 2}, 6), InternalError);
 }
 
+TEST(ParallelBlocks, NothingMoreIsRunOnceSomethingHasThrown) {
+  set_threads(1);
+  int64_t run = 0;
+  EXPECT_THROW(parallel_blocks("test: throws", 100, 1,
+                               [&](int64_t begin, int64_t) {
+                                 ++run;
+                                 if (begin == 10) throw std::bad_alloc();
+                               }),
+               std::bad_alloc);
+  EXPECT_EQ(run, 11);
+  set_threads(0);
+}
+
 }  // namespace
 }  // namespace traceflow

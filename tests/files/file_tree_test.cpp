@@ -5,6 +5,8 @@
 
 #include <fstream>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "support/temp_folder.h"
@@ -82,8 +84,9 @@ TEST_P(SameFiles, AreFoundListedAndRead) {
 TEST_P(SameFiles, PathsDoNotLeadOut) {
   write(folder_ / "secret", "secret");
   const auto tree = FileTree::open(folder_ / "tree");
-  for (const std::string path : {"../secret", "sub/../../secret", (folder_ / "secret").string().c_str(),
-                                 "/etc/passwd", "sub\\..\\secret"}) {
+  const std::vector<std::string> paths{"../secret", "sub/../../secret", folder_ / "secret", "/etc/passwd",
+                                       "sub\\..\\secret"};
+  for (const std::string& path : paths) {
     EXPECT_FALSE(tree->has(path)) << path;
     EXPECT_THAT(error_of([&] { read(*tree, path); }), HasSubstr("expected")) << path;
   }

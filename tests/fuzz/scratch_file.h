@@ -13,7 +13,7 @@
 
 #include "base/error.h"
 #include "fuzz/promise.h"
-#include "support/temp_folder.h"
+#include "support/process_folder.h"
 
 // What the fuzzers of the files' readers share: readers take paths, so an input becomes a file in memory.
 namespace traceflow::fuzz {
@@ -30,11 +30,9 @@ inline std::string read_all(const std::filesystem::path& path) {
 // A folder of one fuzzer's own. What is unpacked on the way comes to stand there as well.
 class ScratchFolder {
  public:
-  ScratchFolder() { ::setenv("TMPDIR", folder_.path().c_str(), 1); }
-
   const std::filesystem::path& path() const { return folder_.path(); }
   std::filesystem::path write(const std::filesystem::path& name, std::string_view bytes) const {
-    const std::filesystem::path path = folder_ / name;
+    const std::filesystem::path path = folder_.path() / name;
     const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     promise(descriptor >= 0, "there is room for the input");
     promise(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
@@ -48,7 +46,7 @@ class ScratchFolder {
   }
 
  private:
-  TempFolder folder_;
+  ProcessFolder folder_;
 };
 
 // The lowest number that a descriptor could have: one that is left open shifts it.

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "primitives/instructions.h"
+#include "support/process_folder.h"
 
 namespace {
 
@@ -32,5 +33,6 @@ int main(int argc, char** argv) {
       return skipped;
     }
   }
+  const traceflow::ProcessFolder folder;
   return RUN_ALL_TESTS();
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
@@ -8,12 +7,11 @@
 
 namespace traceflow {
 
-// A new empty folder for one test, removed with everything in it at the end. In memory where the system has
-// room there: files are synced when they are written, which on a busy disk takes longer than the test.
+// A new empty folder for one test, removed with everything in it at the end.
 class TempFolder {
  public:
   TempFolder() {
-    std::string name = (parent() / "traceflow-test-XXXXXX").string();
+    std::string name = (std::filesystem::temp_directory_path() / "traceflow-test-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
     path_ = name;
   }
@@ -28,14 +26,6 @@ class TempFolder {
   std::filesystem::path operator/(const std::filesystem::path& name) const { return path_ / name; }
 
  private:
-  static std::filesystem::path parent() {
-    const std::filesystem::path memory("/dev/shm");
-    std::error_code error;
-    const auto space = std::filesystem::space(memory, error);
-    constexpr uintmax_t enough = uintmax_t{1} << 28;
-    return !error && space.available >= enough ? memory : std::filesystem::temp_directory_path();
-  }
-
   std::filesystem::path path_;
 };
 

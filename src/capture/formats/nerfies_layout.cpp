@@ -1,6 +1,7 @@
 #include "capture/formats/nerfies_layout.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "base/error.h"

@@ -1,5 +1,7 @@
 #include "serve/audience/messages.h"
 
+#include <nlohmann/json.hpp>
+
 #include "files/json_document.h"
 
 namespace traceflow::serve {

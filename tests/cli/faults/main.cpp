@@ -6,6 +6,7 @@
 #include "cli/program.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/standard_streams.h"
+#include "support/process_folder.h"
 
 // The tests, or, where the first argument is `traceflow`, the program that they watch.
 int main(int argc, char** argv) {
@@ -16,5 +17,6 @@ int main(int argc, char** argv) {
     return traceflow::cli::run(argc - 1, argv + 1);
   }
   ::testing::InitGoogleTest(&argc, argv);
+  const traceflow::ProcessFolder folder;
   return RUN_ALL_TESTS();
 }

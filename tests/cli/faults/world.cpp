@@ -10,6 +10,7 @@
 #include <array>
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -21,7 +22,7 @@ namespace {
 constexpr uid_t nobody = 65534;
 
 std::string new_file() {
-  std::string name = "/tmp/traceflow-said-XXXXXX";
+  std::string name = (std::filesystem::temp_directory_path() / "said-XXXXXX").string();
   const int descriptor = ::mkstemp(name.data());
   if (descriptor < 0) throw std::runtime_error("no temporary file");
   ::fchmod(descriptor, 0666);
