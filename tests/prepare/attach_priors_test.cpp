@@ -199,13 +199,15 @@ TEST_F(AttachPriors, WhatAKilledOnePutAsideComesBack) {
 }
 
 TEST_F(AttachPriors, WithoutFfmpegSaysHowToGetIt) {
-  const std::string path = std::getenv("PATH");
   AttachOptions options;
   options.masks = *made / "capture/mask/1x";
   options.force = true;
+  // NOLINTBEGIN(concurrency-mt-unsafe): no other thread asks for it meanwhile
+  const std::string path = std::getenv("PATH");
   ::setenv("PATH", "/nowhere", 1);
   EXPECT_THAT(refusal(options), HasSubstr("install it with `scripts/setup --prepare`"));
   ::setenv("PATH", path.c_str(), 1);
+  // NOLINTEND(concurrency-mt-unsafe)
 }
 
 TEST_F(AttachPriors, WhatDoesNotFitIsRefusedAndTheCaptureLeftAsItWas) {

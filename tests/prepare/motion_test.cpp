@@ -122,9 +122,9 @@ TEST(TwoView, LargerPixelsSeeTheSame) {
   const Cameras cameras;
   Cameras turning;
   turning.b.position = turning.a.position;
-  std::vector<Track> turned;
+  std::vector<Track> turned(30);
   Random random(6);
-  for (int i = 0; i < 30; ++i) turned.push_back(turning.track_of(point_in_room(random)));
+  for (Track& t : turned) t = turning.track_of(point_in_room(random));
   const TwoView lines = in_larger_pixels(epipolar_lines(cameras.a, cameras.b), factor),
                 plane = in_larger_pixels(fit_homography(turned), factor);
   for (int i = 0; i < 30; ++i) {
