@@ -32,7 +32,7 @@ class ScratchFolder {
  public:
   const std::filesystem::path& path() const { return folder_.path(); }
   std::filesystem::path write(const std::filesystem::path& name, std::string_view bytes) const {
-    const std::filesystem::path path = folder_.path() / name;
+    std::filesystem::path path = folder_.path() / name;
     const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     promise(descriptor >= 0, "there is room for the input");
     promise(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
