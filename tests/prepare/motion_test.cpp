@@ -158,6 +158,23 @@ TEST(TwoView, FindsTheLinesAmongTracksThatMove) {
   EXPECT_LT(worst, 0.5);
 }
 
+// The first samples, which hardly a track obeys, must not end the search.
+TEST(TwoView, FindsTheLinesWhereverTheSearchBegins) {
+  const Cameras cameras;
+  Random random(3);
+  std::vector<Track> tracks;
+  for (int i = 0; i < 300; ++i) {
+    tracks.push_back(cameras.track_of(point_in_room(random)));
+    if (i % 2 == 0) tracks.back().to += Vec2<double>(random.uniform(-400, 400), random.uniform(-400, 400));
+  }
+  for (uint64_t seed = 0; seed < 12; ++seed) {
+    const TwoView found = fit_two_view(tracks, 1, seed);
+    int obeying = 0;
+    for (const Track& track : tracks) obeying += found.distance(track) < 0.5 ? 1 : 0;
+    EXPECT_GE(obeying, 140) << seed;
+  }
+}
+
 TEST(TwoView, FindsThePlaneOfACameraThatTurns) {
   Cameras cameras;
   cameras.b.position = cameras.a.position;

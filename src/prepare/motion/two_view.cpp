@@ -98,8 +98,8 @@ TwoView fit(Kind kind, const std::vector<Track>& tracks) {
 
 // Samples until one without a track that disobeys was drawn with 99.9 %.
 TwoView sample_consensus(Kind kind, const std::vector<Track>& tracks, double tolerance, Random& random) {
-  constexpr int most = 1500, least = 30, refinements = 4;
-  constexpr double missed = 1e-3;
+  constexpr int refinements = 4;
+  constexpr double most = 1500, least = 30, missed = 1e-3;
   const size_t needed = kind == Kind::homography ? 4 : 8;
   TwoView best{kind};
   double best_cost = std::numeric_limits<double>::infinity();
@@ -110,13 +110,13 @@ TwoView sample_consensus(Kind kind, const std::vector<Track>& tracks, double tol
     best = model;
     return true;
   };
-  int wanted = most;
+  double wanted = most;
   for (int i = 0; i < wanted; ++i) {
     if (!keep_if_better(fit(kind, draw(tracks, needed, random)))) continue;
     const double share =
         static_cast<double>(obeying(best, tracks, tolerance).size()) / static_cast<double>(tracks.size());
     const double all_obey = std::clamp(std::pow(share, static_cast<double>(needed)), 1e-9, 1 - 1e-9);
-    wanted = std::clamp(static_cast<int>(std::log(missed) / std::log(1 - all_obey)), least, most);
+    wanted = std::clamp(std::log(missed) / std::log1p(-all_obey), least, most);
   }
   for (int i = 0; i < refinements; ++i) {
     const std::vector<Track> agreeing = obeying(best, tracks, tolerance);
