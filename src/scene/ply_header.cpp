@@ -71,7 +71,7 @@ class HeaderParser {
     std::string line;
     std::getline(lines, line);
     while (std::getline(lines, line)) {
-      if (!line.empty() && line.back() == '\r') line.pop_back();
+      line.erase(line.find_last_not_of('\r') + 1);
       take(line);
     }
     if (!format_seen_) fail("format", "none", "binary_little_endian 1.0");

@@ -162,6 +162,16 @@ TEST_F(Ply, ReadsOtherScalarTypesAndWindowsLineEnds) {
   EXPECT_EQ(read_ply(file_).surfels.position(0, 2), 1.0F);
 }
 
+TEST_F(Ply, NotesEndBeforeAllCarriageReturns) {
+  std::string text = file_of(degree_0, 1);
+  text.insert(text.find("element"), "comment traceflow extent 2.5 \r3\r\r\n");
+  write(text);
+  const PlyScene scene = read_ply(file_);
+  EXPECT_EQ(scene.notes.at("extent"), "2.5 \r3");
+  write_ply(file_, scene);
+  EXPECT_EQ(read_ply(file_).notes, scene.notes);
+}
+
 TEST_F(Ply, RefusesThreeScalesWithAWordOn3dgs) {
   std::vector<std::string> names = degree_0;
   names.emplace_back("scale_2");
