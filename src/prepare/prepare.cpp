@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "files/options_json.h"
 #include "prepare/capture_folder.h"
 #include "prepare/frames.h"
@@ -48,10 +50,12 @@ class Preparation {
   fs::path frame_list() const { return work_ / "frames.list.json"; }
   PoseFolder poses() const { return {work_ / "colmap"}; }
 
-  // Before hours go into steps whose capture would find its place taken.
-  void before_work() const {
+  // Before hours go into steps whose capture would find its place taken, or into ones that another process
+  // does as well.
+  void before_work() {
     if (options_.until == Step::capture) check_place(capture_);
     fs::create_directories(work_);
+    if (!lock_) lock_.emplace(work_ / "lock", work_, "preparing");
   }
 
   void run_step(Step step) {
@@ -145,6 +149,7 @@ class Preparation {
   fs::path input_, capture_, work_;
   const PrepareOptions& options_;
   const std::atomic<bool>* stop_;
+  std::optional<FolderLock> lock_;
   Steps steps_;
   Frames frames_;
 };

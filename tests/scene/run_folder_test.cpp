@@ -2,12 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <fstream>
 
 #include "base/error.h"
-#include "scene/run_lock.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -148,26 +146,6 @@ TEST_F(RunFolderTest, VersionsOlderAndNewer) {
   newer.write(run_.checkpoint());
   // Not damaged: going back behind it would lose work.
   EXPECT_THAT(refusal(run_), AllOf(HasSubstr("found 3, expected at most 2"), HasSubstr("newer traceflow")));
-}
-
-TEST_F(RunFolderTest, ALockKeepsOthersOutUntilItGoes) {
-  fs::create_directory(run_.folder);
-  {
-    const RunLock lock(run_);
-    try {
-      const RunLock second(run_);
-      FAIL() << "accepted";
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), AllOf(HasSubstr(run_.folder.string()),
-                                      HasSubstr("process " + std::to_string(::getpid()) + " on ")));
-    }
-  }
-  EXPECT_FALSE(fs::exists(run_.lock()));
-  EXPECT_NO_THROW(RunLock{run_});
-  // What a killed training left holds nothing.
-  std::ofstream(run_.lock()) << "process 1 on elsewhere";
-  EXPECT_NO_THROW(RunLock{run_});
-  EXPECT_THROW(RunLock(RunFolder{folder_ / "nowhere"}), InputError);
 }
 
 }  // namespace

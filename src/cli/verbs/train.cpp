@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "base/folder_lock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
 #include "cli/arguments/server_arguments.h"
@@ -15,7 +16,6 @@
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
 #include "files/options_json.h"
-#include "scene/run_lock.h"
 #include "serve/live_view.h"
 #include "train/event_log.h"
 #include "train/log_history.h"
@@ -78,12 +78,12 @@ class HeldFolder {
     if (!arguments_->resume) std::filesystem::create_directories(arguments_->output);
     const RunFolder run{arguments_->output};
     if (arguments_->resume && !run.holds_a_run()) return;  // refused when it is read
-    lock_.emplace(run);
+    lock_.emplace(run.lock(), run.folder, "training");
     refuse_another_run(*arguments_);
   }
 
   const TrainArguments* arguments_;
-  std::optional<RunLock> lock_;
+  std::optional<FolderLock> lock_;
 };
 
 // A quiet run still says why it ended early.

@@ -1,4 +1,4 @@
-#include "scene/run_lock.h"
+#include "base/folder_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -48,21 +48,23 @@ bool leads_to(const std::filesystem::path& path, int descriptor) {
 
 }  // namespace
 
-RunLock::RunLock(const RunFolder& run) : path_(run.lock()) {
+FolderLock::FolderLock(const std::filesystem::path& file, const std::filesystem::path& folder,
+                       const std::string& work)
+    : file_(file) {
   while (descriptor_ < 0) {
-    const int file = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-    if (file < 0) fail(path_);
+    const int opened = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    if (opened < 0) fail(file_);
     // A file system that knows no locks has none to refuse.
-    if (::flock(file, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-      const std::string who = holder(file);
-      ::close(file);
-      throw InputError(run.folder.string(), "", who + " training in it", "a folder of its own",
-                       "wait for that training or stop it, or choose another folder");
+    if (::flock(opened, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+      const std::string who = holder(opened);
+      ::close(opened);
+      throw InputError(folder.string(), "", who + " " + work + " in it", "a folder of its own",
+                       "wait for that process or stop it, or choose another folder");
     }
-    if (leads_to(path_, file)) {
-      descriptor_ = file;
+    if (leads_to(file_, opened)) {
+      descriptor_ = opened;
     } else {
-      ::close(file);
+      ::close(opened);
     }
   }
   const std::string who = myself();
@@ -70,8 +72,8 @@ RunLock::RunLock(const RunFolder& run) : path_(run.lock()) {
   if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, who.data(), who.size(), 0) < 0) return;
 }
 
-RunLock::~RunLock() {
-  if (leads_to(path_, descriptor_)) ::unlink(path_.c_str());
+FolderLock::~FolderLock() {
+  if (leads_to(file_, descriptor_)) ::unlink(file_.c_str());
   ::close(descriptor_);
 }
 

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace traceflow {
+
+// Keeps a second program out of a folder's work for as long as this stands. Readers are free. The system lets
+// go of it when the program ends, however it ends.
+class FolderLock {
+ public:
+  // file: the lock, in the folder or beside it, in a folder that is there. work: what is being done, as in
+  // "training", for who is kept out. Throws InputError, naming the folder and who holds it, when another
+  // process does, and when the file cannot be written.
+  FolderLock(const std::filesystem::path& file, const std::filesystem::path& folder, const std::string& work);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
+
+ private:
+  std::filesystem::path file_;
+  int descriptor_ = -1;
+};
+
+}  // namespace traceflow
