@@ -2,6 +2,17 @@
 
 namespace traceflow {
 
+Tensor<uint8_t> grey_of(const Tensor<uint8_t>& picture) {
+  const int64_t channels = picture.dim(2);
+  if (channels < 3) return picture;
+  Tensor<uint8_t> grey({picture.dim(0), picture.dim(1), 1});
+  for (int64_t i = 0; i < grey.size(); ++i) {
+    const uint8_t* c = picture.data() + i * channels;
+    grey[i] = static_cast<uint8_t>((77 * c[0] + 150 * c[1] + 29 * c[2] + 128) >> 8);
+  }
+  return grey;
+}
+
 double sharpness(const Tensor<uint8_t>& grey) {
   const int64_t height = grey.dim(0), width = grey.dim(1);
   if (height < 3 || width < 3) return 0;

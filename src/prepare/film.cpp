@@ -76,7 +76,7 @@ std::vector<double> decode_film(const Film& film, const std::filesystem::path& l
                    "-"},
                   {.output = pipe.writing.number(), .error = told.number()});
   pipe.writing.close();
-  NetpbmStream pictures(std::move(pipe.reading), film.path.string());
+  NetpbmStream pictures(std::move(pipe.reading), film.path.string(), stop);
   int64_t count = 0;
   bool wanted = true;
   while (wanted) {
@@ -86,7 +86,9 @@ std::vector<double> decode_film(const Film& film, const std::filesystem::path& l
     wanted = take(count++, std::move(*picture));
   }
   if (!wanted) process.end();
-  if ((wanted && !process.wait()) || count == 0) {
+  const bool ended_well = !wanted || process.wait(stop);
+  if (stop) throw Stopped{};
+  if (!ended_well || count == 0) {
     throw InputError(film.path.string(), "", "what ffmpeg cannot read: " + last_line(log),
                      "a film or picture", "see " + log.string());
   }

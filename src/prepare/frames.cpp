@@ -30,9 +30,9 @@ std::vector<Candidate> look_at(const PictureSource& source) {
 }
 
 void check_enough(const fs::path& input, size_t found) {
-  constexpr size_t fewest = 3;
-  if (found >= fewest) return;
-  throw InputError(input.string(), "pictures", std::to_string(found), "at least 3 between --start and --end");
+  if (found >= static_cast<size_t>(fewest_frames)) return;
+  throw InputError(input.string(), "pictures", std::to_string(found),
+                   fmt::format("at least {} between --start and --end", fewest_frames));
 }
 
 // Every n-th of the first camera's times, and what the second camera saw then.
@@ -146,17 +146,6 @@ Frames read_frames(const fs::path& path) {
                              f["width"].whole(1, 16384), f["height"].whole(1, 16384)});
   }
   return frames;
-}
-
-Tensor<uint8_t> grey_of(const Tensor<uint8_t>& colour) {
-  const int64_t channels = colour.dim(2);
-  if (channels < 3) return colour;
-  Tensor<uint8_t> grey({colour.dim(0), colour.dim(1), 1});
-  for (int64_t i = 0; i < grey.size(); ++i) {
-    const uint8_t* c = colour.data() + i * channels;
-    grey[i] = static_cast<uint8_t>((77 * c[0] + 150 * c[1] + 29 * c[2] + 128) >> 8);
-  }
-  return grey;
 }
 
 }  // namespace traceflow::prepare

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "base/tensor.h"
 #include "prepare/choose_frames.h"
 #include "prepare/options.h"
 
@@ -28,6 +28,9 @@ struct Frames {
   std::vector<int64_t> source_frames;  // by camera: how many pictures there were to choose from
 };
 
+// Fewer make no scene.
+constexpr int64_t fewest_frames = 10;
+
 // Takes pictures as the options say, of `input` and of --test-video; writes them as ID.png into `folder`,
 // which is emptied first. Throws InputError, and Stopped.
 Frames take_frames(const std::filesystem::path& input, const PrepareOptions& options,
@@ -36,8 +39,5 @@ Frames take_frames(const std::filesystem::path& input, const PrepareOptions& opt
 
 void write_frames(const std::filesystem::path& file, const Frames& frames);
 Frames read_frames(const std::filesystem::path& path);
-
-// The picture of a file written here, H×W×1: its luminance.
-Tensor<uint8_t> grey_of(const Tensor<uint8_t>& colour);
 
 }  // namespace traceflow::prepare

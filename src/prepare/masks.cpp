@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "capture/lens/resample.h"
+#include "capture/sharpness.h"
 #include "files/png.h"
 #include "prepare/motion/moving_mask.h"
 #include "prepare/picture_source.h"

@@ -1,5 +1,6 @@
 #include "prepare/netpbm.h"
 
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <cerrno>
 
 #include "base/error.h"
+#include "prepare/programs.h"
 
 namespace traceflow::prepare {
 
@@ -22,6 +24,11 @@ void NetpbmStream::fail(const std::string& found) const {
 }
 
 bool NetpbmStream::fill() {
+  constexpr int glance = 100;  // ms
+  pollfd pipe{pipe_.number(), POLLIN, 0};
+  while (::poll(&pipe, 1, glance) == 0 || *stop_) {
+    if (*stop_) throw Stopped{};
+  }
   buffer_.resize(piece);
   begin_ = 0;
   ssize_t n = 0;

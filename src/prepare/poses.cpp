@@ -20,7 +20,6 @@ namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
 
 constexpr size_t exhaustive_up_to = 80;  // frames
-constexpr int64_t fewest_registered = 10;
 
 std::string colmap_name(CameraModel model) {
   switch (model) {
@@ -166,20 +165,20 @@ std::string find_poses(const PrepareOptions& options, const Frames& frames, cons
   fs::remove_all(folder.models());
   fs::create_directories(folder.models());
   try {
-    run_program(
-        {"colmap", "mapper", "--database_path", folder.matches().string(), "--image_path", pictures.string(),
-         "--output_path", folder.models().string(), "--Mapper.num_threads", std::to_string(thread_count())},
-        folder.top / "mapper.log", stop);
+    run_program({"colmap", "mapper", "--database_path", folder.matches().string(), "--image_path",
+                 pictures.string(), "--output_path", folder.models().string(), "--Mapper.num_threads",
+                 std::to_string(thread_count()), "--Mapper.min_model_size", "3"},
+                folder.top / "mapper.log", stop);
   } catch (const InputError&) {
     if (!found_nothing(folder)) throw;
   }
   const Registered best = largest_model(folder.models());
   const auto all = static_cast<int64_t>(frames.frames.size());
-  if (best.frames < fewest_registered ||
+  if (best.frames < fewest_frames ||
       static_cast<double>(best.frames) < options.least_registered * static_cast<double>(all)) {
     throw InputError(folder.models().string(), "poses",
                      fmt::format("{} of {} frames registered", best.frames, all),
-                     fmt::format("at least {} and {:g}% (--least-registered)", fewest_registered,
+                     fmt::format("at least {} and {:g}% (--least-registered)", fewest_frames,
                                  100 * options.least_registered),
                      advice(options, frames));
   }

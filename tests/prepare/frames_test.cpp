@@ -4,17 +4,17 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <fstream>
 
 #include "base/error.h"
 #include "base/process.h"
-#include "base/random.h"
-#include "capture/sharpness.h"
 #include "prepare/frames.h"
 #include "prepare/masks.h"
 #include "prepare/netpbm.h"
 #include "prepare/picture_source.h"
+#include "prepare/programs.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::prepare {
@@ -28,32 +28,6 @@ std::vector<Candidate> film(int count, double rate, const std::function<double(i
   candidates.reserve(static_cast<size_t>(count));
   for (int i = 0; i < count; ++i) candidates.push_back({i / rate, sharp(i)});
   return candidates;
-}
-
-TEST(Sharpness, FallsWhenAPictureIsBlurred) {
-  Random random(7);
-  Tensor<uint8_t> picture({24, 32, 1});
-  for (uint8_t& value : picture.values()) value = static_cast<uint8_t>(random.below(256));
-  Tensor<uint8_t> blurred = picture;
-  for (int64_t y = 1; y < 23; ++y) {
-    for (int64_t x = 1; x < 31; ++x) {
-      int sum = 0;
-      for (int64_t j = -1; j <= 1; ++j) {
-        for (int64_t i = -1; i <= 1; ++i) sum += picture(y + j, x + i, 0);
-      }
-      blurred(y, x, 0) = static_cast<uint8_t>(sum / 9);
-    }
-  }
-  EXPECT_GT(sharpness(picture), 5 * sharpness(blurred));
-}
-
-TEST(Sharpness, IsTheVarianceOfTheLaplacian) {
-  Tensor<uint8_t> picture({3, 4, 1});
-  picture.fill(10);
-  EXPECT_EQ(sharpness(picture), 0);
-  picture(1, 1, 0) = 12;  // Laplacians −8 and 2: mean −3, variance 25
-  EXPECT_DOUBLE_EQ(sharpness(picture), 25);
-  EXPECT_EQ(sharpness(Tensor<uint8_t>({2, 9, 1})), 0);
 }
 
 TEST(ChooseFrames, TakesTheSharpestOfEachInterval) {
@@ -116,11 +90,13 @@ TEST(PicturesIn, CountAsPeopleDo) {
   EXPECT_THAT(names, ElementsAre("f1.tiff", "f9.JPG", "f09b.png", "f10.png", "g.png"));
 }
 
+const std::atomic<bool> never = false;
+
 NetpbmStream stream_of(const std::string& bytes) {
   Pipe pipe = make_pipe();
   EXPECT_EQ(::write(pipe.writing.number(), bytes.data(), bytes.size()), static_cast<ssize_t>(bytes.size()));
   pipe.writing.close();
-  return {std::move(pipe.reading), "film"};
+  return {std::move(pipe.reading), "film", never};
 }
 
 TEST(Netpbm, ReadsPicturesOneAfterTheOther) {
@@ -142,6 +118,13 @@ TEST(Netpbm, RefusesWhatIsCutShortOrElse) {
     NetpbmStream stream = stream_of(bytes);
     EXPECT_THROW(stream.next(), InputError) << bytes;
   }
+}
+
+TEST(Netpbm, AStopEndsTheWaitForASilentProgram) {
+  Pipe pipe = make_pipe();
+  const std::atomic<bool> stop = true;
+  NetpbmStream stream(std::move(pipe.reading), "film", stop);
+  EXPECT_THROW(stream.next(), Stopped);
 }
 
 Frames some_frames() {

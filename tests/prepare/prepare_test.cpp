@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
 #include "capture/capture.h"
 #include "capture/synth/synth.h"
 #include "files/eight_bit.h"
@@ -39,6 +40,7 @@ while [ $# -gt 0 ]; do
   shift
 done
 echo "ffmpeg $kind" >> "$CALLS"
+[ "$FAIL" != silent ] || sleep 1000
 [ -e "$film.$kind" ] || { echo "$film: Invalid data found when processing input" >&2; exit 1; }
 cat "$film.times" >&2
 cat "$film.$kind"
@@ -297,6 +299,30 @@ TEST_F(PrepareTest, AStopEndsTheProgramAndTheNextCallGoesOn) {
   stop_ = false;
   ASSERT_TRUE(prepare(options()));
   EXPECT_THAT(calls(), ElementsAre("colmap mapper"));
+}
+
+TEST_F(PrepareTest, AStopEndsAnFfmpegThatSaysNothing) {
+  set_variable("FAIL", "silent");
+  std::thread other([this] {
+    while (calls().empty()) std::this_thread::yield();
+    stop_ = true;
+  });
+  const bool ended = prepare(options());
+  other.join();
+  EXPECT_FALSE(ended);
+}
+
+TEST_F(PrepareTest, ASecondOneIsRefusedWhileTheFirstWorks) {
+  const fs::path work = work_folder(capture());
+  fs::create_directory(work);
+  {
+    const FolderLock first(work / "lock", work, "preparing");
+    EXPECT_THAT(refusal(options()),
+                testing::AllOf(HasSubstr("capture.prepare: found process "), HasSubstr(" preparing in it")));
+    EXPECT_THAT(calls(), IsEmpty());
+  }
+  EXPECT_TRUE(prepare(options()));
+  EXPECT_FALSE(fs::exists(work / "lock"));
 }
 
 TEST_F(PrepareTest, AbsentProgramsAreNamed) {

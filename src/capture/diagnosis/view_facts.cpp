@@ -94,14 +94,6 @@ void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& fa
 
 }  // namespace
 
-Tensor<uint8_t> grey_of(const Tensor<uint8_t>& rgb) {
-  Tensor<uint8_t> grey({rgb.dim(0), rgb.dim(1)});
-  for (int64_t i = 0; i < grey.size(); ++i) {
-    grey[i] = static_cast<uint8_t>((77 * rgb[3 * i] + 150 * rgb[3 * i + 1] + 29 * rgb[3 * i + 2]) / 256);
-  }
-  return grey;
-}
-
 std::optional<double> exposure_of(const Tensor<uint8_t>& grey) {
   constexpr uint8_t darkest = 8;       // below it is the black of a background, or noise
   constexpr int64_t least_share = 50;  // one pixel of so many must be brighter

@@ -25,7 +25,6 @@ struct ViewFacts {
 ViewFacts measure_view(const Capture& capture, const View& view, const SurfacePoints& surface);
 
 // For tests and for what has pixels already.
-Tensor<uint8_t> grey_of(const Tensor<uint8_t>& rgb);
 std::optional<double> exposure_of(const Tensor<uint8_t>& grey);
 
 }  // namespace traceflow

@@ -51,7 +51,8 @@ int guarded(const std::function<int()>& work, std::ostream& err) {
   } catch (const memory::OutOfMemory& e) {
     return report(err, "", e.what(), "; try a higher --downscale, or --device cpu", exit_memory);
   } catch (const std::bad_alloc&) {
-    return report(err, "", "out of memory", "; try a higher --downscale or a lower --memory-budget",
+    return report(err, "", "out of memory",
+                  "; try a higher --downscale (of prepare: a lower --size) or a lower --memory-budget",
                   exit_memory);
   } catch (const std::exception& e) {
     return report(err, "internal error: ", e.what(), bug, exit_internal);
