@@ -1,5 +1,6 @@
 #include "emulation/device.h"
 
+#include <sanitizer/asan_interface.h>
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -41,15 +42,17 @@ class Region {
     blocks_[place] = size;
     allocated_ += size;
     const DeviceAccess access;
-    used_ = std::max(used_, (place + size + huge_page - 1) / huge_page * huge_page);
-    protect(PROT_READ | PROT_WRITE);
+    grow(place + size);
+    ASAN_UNPOISON_MEMORY_REGION(begin_ + place, size);
     std::memset(begin_ + place, 0xff, size);
+    ASAN_POISON_MEMORY_REGION(begin_ + place + bytes, size - bytes);
     return begin_ + place;
   }
   void release(void* memory) {
     const auto found = blocks_.find(static_cast<size_t>(static_cast<std::byte*>(memory) - begin_));
     require(found != blocks_.end(), "memory is given back once");
     allocated_ -= found->second;
+    ASAN_POISON_MEMORY_REGION(memory, found->second);
     blocks_.erase(found);
   }
   void open() {
@@ -66,6 +69,14 @@ class Region {
   static constexpr size_t region_bytes = size_t{4} << 30;
   static constexpr size_t page = 4096, huge_page = size_t{2} << 20;
 
+  // Under the address sanitizer a kernel that leaves its tensors is found at once: what is not allocated is
+  // poisoned.
+  void grow(size_t end) {
+    const size_t used = std::max(used_, (end + huge_page - 1) / huge_page * huge_page);
+    ASAN_POISON_MEMORY_REGION(begin_ + used_, used - used_);
+    used_ = used;
+    protect(PROT_READ | PROT_WRITE);
+  }
   void protect(int access) {
     if (used_ > 0)
       require(mprotect(begin_, used_, access) == 0, "the emulated device's memory opens and closes");

@@ -26,8 +26,15 @@ namespace context = boost::context;
 // Stacks of fibers that have ended, for those to come.
 class StackPool {
  public:
+  StackPool() = default;
+  ~StackPool() {
+    for (context::stack_context& stack : free_) stacks_.deallocate(stack);
+  }
+  StackPool(const StackPool&) = delete;
+  StackPool& operator=(const StackPool&) = delete;
+
   context::stack_context allocate() {
-    if (free_.empty()) return context::fixedsize_stack(stack_bytes).allocate();
+    if (free_.empty()) return stacks_.allocate();
     const context::stack_context stack = free_.back();
     free_.pop_back();
     return stack;
@@ -36,6 +43,7 @@ class StackPool {
 
  private:
   static constexpr size_t stack_bytes = size_t{128} << 10;
+  context::fixedsize_stack stacks_{stack_bytes};
   std::vector<context::stack_context> free_;
 };
 

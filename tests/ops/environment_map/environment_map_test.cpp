@@ -34,7 +34,7 @@ TEST(CubeMap, NeighbouringFacesMeetAlongTheirEdges) {
   // The two faces beside every edge direction see it on their own borders.
   Random random(1);
   for (int i = 0; i < 200; ++i) {
-    Vec3<double> d(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1));
+    Vec3<double> d{random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 1)};
     const int axis = i % 3;
     d[axis] = d[axis] < 0 ? -1 : 1;
     d[(axis + 1) % 3] = d[(axis + 1) % 3] < 0 ? -1 : 1;

@@ -282,7 +282,8 @@ TEST_P(Orders, survive_extreme_surfels) {
     auto scene = scene_of(seed);
     auto& s = scene.surfels;
     const auto extreme = [&] {
-      return static_cast<float>((random.uniform() < 0.5 ? -1 : 1) * std::exp(random.uniform(-85, 85)));
+      const double sign = random.uniform() < 0.5 ? -1 : 1;
+      return static_cast<float>(sign * std::exp(random.uniform(-85, 85)));
     };
     for (int64_t i = 0; i < s.count(); ++i) {
       switch (random.below(6)) {

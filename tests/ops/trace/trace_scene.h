@@ -53,7 +53,9 @@ inline TestScene blank_scene(int64_t surfels, int sh_degree, int64_t rays) {
 }
 
 inline Vec3<double> random_direction(Random& random) {
-  return glm::normalize(Vec3<double>(random.normal(), random.normal(), random.normal()));
+  // One after the other: compilers evaluate arguments in orders of their own.
+  const double z = random.normal(), y = random.normal(), x = random.normal();
+  return glm::normalize(Vec3<double>(x, y, z));
 }
 
 inline TestScene random_scene(uint64_t seed, const SceneOptions& options = {}) {

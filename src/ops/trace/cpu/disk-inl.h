@@ -67,9 +67,11 @@ HWY_INLINE DiskHit meet_disk(const RayVec& ray, const DiskRules& rules, Vec far,
   return {t, exponent, mask};
 }
 
+// Of lanes without a hit, whose exponent may be anything, it is not to be used.
 HWY_INLINE Vec disk_alpha(const DiskHit& hit, const DiskRules& rules) {
   const Tag d;
-  return hn::Min(hn::Exp(d, hit.exponent), hn::Set(d, rules.blend.alpha_max));
+  const Vec exponent = hn::IfThenElseZero(hit.mask, hit.exponent);
+  return hn::Min(hn::Exp(d, exponent), hn::Set(d, rules.blend.alpha_max));
 }
 
 }  // namespace traceflow::trace::HWY_NAMESPACE
