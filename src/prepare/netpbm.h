@@ -18,7 +18,7 @@ class NetpbmStream {
       : pipe_(std::move(pipe)), source_(std::move(source)), stop_(&stop) {}
 
   // The next picture, H×W×1 or H×W×3; nothing at the end. Throws InputError for anything else, for sides of
-  // more than 16,384 pixels, and for a stream that ends within a picture;
+  // more than 16,384 pixels, and for a stream that ends within a picture. Throws
   // Stopped.
   std::optional<Tensor<uint8_t>> next();
 
