@@ -7,13 +7,12 @@
 #include "files/exif.h"
 #include "files/jpeg.h"
 #include "files/jpeg_exit.h"
+#include "files/limits.h"
 
 namespace traceflow {
 
 namespace {
 
-constexpr int64_t max_side = 32768;
-constexpr int64_t max_pixels = int64_t{1} << 28;
 // All coefficients of a picture in several scans are held at once, two bytes each beside the pixels.
 constexpr int64_t max_pixels_in_scans = int64_t{1} << 27;
 // A picture has a few scans; a file of thousands keeps a decoder busy for hours.
@@ -148,7 +147,8 @@ class JpegReader {
       fail(std::to_string(jpeg_.num_components) + " colour components");
     // Its codes say no fewest number of bytes.
     if (jpeg_.arith_code != 0) fail("arithmetic coding");
-    if (size.width > max_side || size.height > max_side || int64_t{size.width} * size.height > max_pixels) {
+    if (size.width > max_image_side || size.height > max_image_side ||
+        int64_t{size.width} * size.height > max_image_pixels) {
       fail(size_text(size));
     }
     if (jpeg_has_multiple_scans(&jpeg_) != 0 && int64_t{size.width} * size.height > max_pixels_in_scans)

@@ -9,16 +9,16 @@ namespace traceflow {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using OrderedJson = nlohmann::ordered_json;
 
-constexpr int max_nesting = 16;
+constexpr int deepest_option = 16;
 
-Json json_value(const OptionValue& value) {
-  return std::visit([](const auto& v) { return Json(v); }, value);
+OrderedJson json_value(const OptionValue& value) {
+  return std::visit([](const auto& v) { return OrderedJson(v); }, value);
 }
 
-Json& member(Json& root, const std::string& path) {
-  Json* node = &root;
+OrderedJson& member(OrderedJson& root, const std::string& path) {
+  OrderedJson* node = &root;
   size_t begin = 0;
   for (size_t dot = path.find('.'); dot != std::string::npos; dot = path.find('.', begin)) {
     node = &(*node)[path.substr(begin, dot - begin)];
@@ -27,7 +27,7 @@ Json& member(Json& root, const std::string& path) {
   return (*node)[path.substr(begin)];
 }
 
-std::optional<OptionValue> option_value(const Json& json) {
+std::optional<OptionValue> option_value(const OrderedJson& json) {
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_unsigned() && json.get<uint64_t>() > static_cast<uint64_t>(INT64_MAX))
     return std::nullopt;
@@ -36,14 +36,14 @@ std::optional<OptionValue> option_value(const Json& json) {
   if (json.is_string()) return json.get<std::string>();
   if (!json.is_array()) return std::nullopt;
   std::vector<double> list;
-  for (const Json& element : json) {
+  for (const OrderedJson& element : json) {
     if (!element.is_number()) return std::nullopt;
     list.push_back(element.get<double>());
   }
   return list;
 }
 
-void read_object(const Json& object, const std::string& prefix, const std::vector<OptionField>& fields,
+void read_object(const OrderedJson& object, const std::string& prefix, const std::vector<OptionField>& fields,
                  const std::string& where) {
   for (const auto& [key, node] : object.items()) {
     const std::string path = prefix + key;
@@ -54,21 +54,21 @@ void read_object(const Json& object, const std::string& prefix, const std::vecto
     const OptionField& field = find_option(fields, path, where);
     const auto value = option_value(node);
     if (!value) {
-      throw InputError(where, path, node.dump(-1, ' ', false, Json::error_handler_t::replace),
+      throw InputError(where, path, node.dump(-1, ' ', false, OrderedJson::error_handler_t::replace),
                        field.expected());
     }
     set_option(field, *value, where);
   }
 }
 
-Json parse(const std::string& text, const std::string& where) {
-  const auto check = [&](int depth, Json::parse_event_t, Json&) {
-    if (depth > max_nesting) throw InputError(where, "", "JSON nested too deep", "an object of options");
+OrderedJson parse(const std::string& text, const std::string& where) {
+  const auto check = [&](int depth, OrderedJson::parse_event_t, OrderedJson&) {
+    if (depth > deepest_option) throw InputError(where, "", "JSON nested too deep", "an object of options");
     return true;
   };
   try {
-    return Json::parse(text, check);
-  } catch (const Json::exception&) {
+    return OrderedJson::parse(text, check);
+  } catch (const OrderedJson::exception&) {
     throw InputError(where, "", "text that is not JSON", "an object of options");
   }
 }
@@ -76,14 +76,14 @@ Json parse(const std::string& text, const std::string& where) {
 }  // namespace
 
 std::string options_to_json(const std::vector<OptionField>& fields) {
-  Json root = Json::object();
+  OrderedJson root = OrderedJson::object();
   for (const OptionField& field : fields) member(root, field.path) = json_value(field.get());
-  return root.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return root.dump(-1, ' ', false, OrderedJson::error_handler_t::replace);
 }
 
 void options_from_json(const std::string& text, const std::vector<OptionField>& fields,
                        const std::string& where) {
-  const Json root = parse(text, where);
+  const OrderedJson root = parse(text, where);
   if (!root.is_object()) throw InputError(where, "", "JSON that is no object", "an object of options");
   read_object(root, "", fields, where);
 }

@@ -9,13 +9,12 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "files/limits.h"
 #include "files/png_exit.h"
 
 namespace traceflow {
 
 namespace {
-
-constexpr png_uint_32 max_side = 32768;
 
 struct PngSink : PngExit {
   std::string bytes;
@@ -34,7 +33,7 @@ void write_bytes(png_structp png, png_bytep bytes, size_t count) {
 bool encode(png_structp png, png_infop info, png_uint_32 width, png_uint_32 height, int bits, int colour_type,
             png_bytepp rows) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
-  png_set_user_limits(png, max_side, max_side);
+  png_set_user_limits(png, max_image_side, max_image_side);
   png_set_IHDR(png, info, width, height, bits, colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);

@@ -8,18 +8,13 @@
 #include <vector>
 
 #include "base/error.h"
+#include "files/limits.h"
 #include "files/png.h"
 #include "files/png_exit.h"
 
 namespace traceflow {
 
 namespace {
-
-constexpr int64_t max_side = 32768;
-constexpr int64_t max_pixels = int64_t{1} << 28;
-// Deflate cannot grow data by more than this; a header that promises more than the file can hold is refused
-// before its memory is taken.
-constexpr int64_t max_inflation = 1032;
 
 struct PngSource : PngExit {
   explicit PngSource(const InputFile& from) : file(from) {}
@@ -63,7 +58,7 @@ class PngReader {
     const PngSize size{static_cast<int>(png_get_image_width(png_, info_)),
                        static_cast<int>(png_get_image_height(png_, info_)),
                        static_cast<int>(png_get_channels(png_, info_)), stored_bits_};
-    if (int64_t{size.width} * size.height > max_pixels) fail(size_text(size));
+    if (int64_t{size.width} * size.height > max_image_pixels) fail(size_text(size));
     return size;
   }
   template <class T>
@@ -87,7 +82,7 @@ class PngReader {
   bool try_header() {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
     png_set_read_fn(png_, &source_, read_bytes);
-    png_set_user_limits(png_, max_side, max_side);
+    png_set_user_limits(png_, max_image_side, max_image_side);
     png_set_chunk_cache_max(png_, 128);
     png_set_chunk_malloc_max(png_, 8U << 20);
     // Text, profiles and the like are not wanted, and each may unpack to those 8 MiB.

@@ -26,7 +26,7 @@ using Json = nlohmann::json;
 constexpr uint64_t length_bytes = 8;
 constexpr uint64_t max_header_bytes = 100'000'000;  // the format's own limit
 constexpr size_t max_rank = 4;
-constexpr int max_nesting = 8;
+constexpr int deepest_header = 8;
 constexpr const char* metadata_key = "__metadata__";
 constexpr const char* checksums_key = "traceflow.crc32";
 
@@ -99,7 +99,7 @@ void read_bytes(std::ifstream& file, const std::string& origin, const std::strin
 Json parse_header(const std::string& text, const std::string& origin) {
   std::set<std::string> names;
   const auto check = [&](int depth, Json::parse_event_t event, Json& value) {
-    if (depth > max_nesting)
+    if (depth > deepest_header)
       throw InputError(origin, "header", "JSON nested too deep", "a safetensors header");
     if (event == Json::parse_event_t::key && depth == 1 && !names.insert(value.get<std::string>()).second) {
       throw InputError(origin, "header", "the name " + shown(value) + " twice", "every tensor once");

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "base/error.h"
+#include "files/limits.h"
 
 namespace traceflow {
 
@@ -21,8 +22,6 @@ constexpr uint32_t end64_locator_signature = 0x07064b50;
 constexpr uint32_t end64_signature = 0x06064b50;
 constexpr uint32_t directory_signature = 0x02014b50;
 constexpr uint32_t local_signature = 0x04034b50;
-// Deflate cannot grow data by more than this.
-constexpr int64_t max_inflation = 1032;
 constexpr uint32_t in_zip64_16 = 0xffff;
 constexpr uint32_t in_zip64_32 = 0xffffffff;
 

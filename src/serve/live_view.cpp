@@ -10,7 +10,7 @@ using namespace std::chrono_literals;
 
 constexpr auto between_events = 200ms;
 constexpr auto refresh = 500ms;
-constexpr auto nap = 100ms;
+constexpr auto longest_wait = 100ms;
 
 double seconds(std::chrono::steady_clock::duration d) { return std::chrono::duration<double>(d).count(); }
 
@@ -95,7 +95,7 @@ void LiveView::serve_while_paused() {
   hooks_.emit(events::Paused{state_.iteration, true});
   while (pause_ && !stop_ && !*hooks_.interrupted) {
     if (save_.exchange(false)) save();
-    if (audience_.wait(nap)) serve({});
+    if (audience_.wait(longest_wait)) serve({});
   }
   pause_ = false;
   state_.paused = false;
@@ -138,7 +138,7 @@ bool LiveView::is_wanted() { return audience_.viewers() > 0 && !*hooks_.interrup
 
 void LiveView::stay() {
   while (is_wanted()) {
-    if (audience_.wait(nap)) serve({});
+    if (audience_.wait(longest_wait)) serve({});
   }
 }
 

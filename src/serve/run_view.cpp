@@ -8,7 +8,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto nap = 200ms;
+constexpr auto between_looks = 200ms;
 // What troubles are about.
 constexpr const char* about_run = "the run";
 constexpr const char* about_device = "the device";
@@ -100,7 +100,7 @@ void RunView::turn(Audience::Clock::duration most) {
 }
 
 void RunView::run(const std::atomic<bool>& stop) {
-  while (!stop) turn(nap);
+  while (!stop) turn(between_looks);
 }
 
 }  // namespace traceflow::serve

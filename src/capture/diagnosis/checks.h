@@ -9,6 +9,9 @@ namespace traceflow {
 
 using Findings = std::vector<Finding>;
 
+// Fewer do not tell what is usual.
+constexpr size_t fewest_views = 5;
+
 // Cameras far from where the others are.
 void check_positions(const Capture& capture, Findings& findings);
 // Cameras that do not look where the others look.

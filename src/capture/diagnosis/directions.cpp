@@ -11,12 +11,10 @@ namespace traceflow {
 
 namespace {
 
-constexpr size_t fewest_cameras = 5;
 // Where so many cameras have the place that they look at in their pictures, a camera looks away when the
 // angle between its axis and that place exceeds so many of its picture's half diagonals.
 constexpr double agreeing_share = 0.9;
 constexpr double away_half_diagonals = 1.5;
-constexpr double degrees = 180 / std::numbers::pi;
 
 Vec3<double> axis_of(const View& view) {
   return Vec3<double>(Vec3<float>(0, 0, 1) * view.camera.camera_from_world);
@@ -74,7 +72,7 @@ Vec3<double> place_looked_at(const std::vector<View>& views) {
 }  // namespace
 
 void check_directions(const Capture& capture, Findings& findings) {
-  if (capture.train.size() < fewest_cameras) return;
+  if (capture.train.size() < fewest_views) return;
   const Vec3<double> place = place_looked_at(capture.train);
   const auto seeing = std::count_if(capture.train.begin(), capture.train.end(), [&](const View& view) {
     return angle_to(view, place) <= half_diagonal(view.camera);
@@ -96,11 +94,11 @@ void check_directions(const Capture& capture, Findings& findings) {
   Finding& finding = findings.emplace_back(
       fmt::format("{} ({}), by up to {:.0f}°, from where the others look",
                   away.size() == 1 ? "a camera looks away" : fmt::format("{} cameras look away", away.size()),
-                  ids_text(away), worst * degrees),
+                  ids_text(away), glm::degrees(worst)),
       "looks-away");
   finding.views = std::move(away);
-  finding.value = worst * degrees;
-  finding.threshold = threshold * degrees;
+  finding.value = glm::degrees(worst);
+  finding.threshold = glm::degrees(threshold);
 }
 
 }  // namespace traceflow

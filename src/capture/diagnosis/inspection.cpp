@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <set>
 
 #include "base/parallel.h"
@@ -14,7 +13,6 @@ namespace traceflow {
 
 namespace {
 
-constexpr double degrees = 180 / std::numbers::pi;
 constexpr int64_t quick_views = 32;
 
 Inspection::Split inspect_split(const Capture& capture, const std::vector<View>& views) {
@@ -56,7 +54,7 @@ void inspect_cameras(const Capture& capture, Inspection& result) {
   const Camera<float>& camera = capture.train.front().camera;
   const double left = camera.centre_x / camera.focal_x;
   const double right = (static_cast<double>(camera.width) - camera.centre_x) / camera.focal_x;
-  result.field_of_view_degrees = (std::atan(left) + std::atan(right)) * degrees;
+  result.field_of_view_degrees = glm::degrees(std::atan(left) + std::atan(right));
 
   result.camera_low = result.camera_high = Vec3<double>(camera.position);
   double least = 1;
@@ -69,7 +67,7 @@ void inspect_cameras(const Capture& capture, Inspection& result) {
       least = std::min(least, dot(axis_a, axis_b));
     }
   }
-  result.camera_turn_degrees = std::acos(std::clamp(least, -1.0, 1.0)) * degrees;
+  result.camera_turn_degrees = glm::degrees(std::acos(std::clamp(least, -1.0, 1.0)));
 }
 
 void inspect_points(const Capture& capture, Inspection& result) {

@@ -13,7 +13,6 @@ namespace traceflow {
 
 namespace {
 
-constexpr size_t fewest_views = 5;
 constexpr size_t reach = 3;         // neighbours on either side that a picture's sharpness is compared with
 constexpr double film_share = 0.6;  // of the difference between far pictures, from one to the next
 constexpr double blur_share = 0.4;  // of their median sharpness

@@ -14,7 +14,6 @@ constexpr int64_t sample_size = 4000;
 // Many are healthy: what is beside and behind the cameras is seen in mirrors, and helps there.
 constexpr double unseen_share = 0.8;
 constexpr double behind_share = 0.4;
-constexpr size_t fewest_views = 5;
 // A view sees hardly anything below this share of what the median view sees.
 constexpr double few_share = 0.1;
 // From the middle of the points, in distances of the median point.

@@ -11,14 +11,13 @@ namespace traceflow {
 
 namespace {
 
-constexpr size_t fewest_cameras = 5;
 // From the middle: in distances of the median camera, and beyond it in deviations.
 constexpr double apart_distance = 3;
 constexpr double apart_deviations = 6;
 // A way that leads out step by step is no outlier: in steps of the path.
 constexpr double connected_steps = 3;
 // More than this share of the cameras is a second group.
-constexpr double largest_share = 0.1;
+constexpr double group_share = 0.1;
 
 using Positions = std::vector<Vec3<double>>;
 
@@ -77,7 +76,7 @@ std::string extent_text(const Capture& capture, const std::vector<std::string>& 
 }  // namespace
 
 void check_positions(const Capture& capture, Findings& findings) {
-  if (capture.train.size() < fewest_cameras) return;
+  if (capture.train.size() < fewest_views) return;
   std::vector<const View*> views;
   Positions train, all;
   for (const View& view : capture.train) views.push_back(&view), train.emplace_back(view.camera.position);
@@ -104,7 +103,7 @@ void check_positions(const Capture& capture, Findings& findings) {
     worst = std::max(worst, distance(all[i], middle) / usual);
   }
   if (apart.empty() ||
-      static_cast<double>(apart.size()) > std::max(1.0, largest_share * static_cast<double>(all.size())))
+      static_cast<double>(apart.size()) > std::max(1.0, group_share * static_cast<double>(all.size())))
     return;
   Finding& finding = findings.emplace_back(
       fmt::format(

@@ -14,7 +14,7 @@ namespace {
 constexpr size_t fewest_times = 5;
 constexpr double gap_steps = 5;  // in median steps between training times
 // Where more views than this share a time with another, there are several cameras that nobody told apart.
-constexpr double largest_share = 0.5;
+constexpr double repeated_share = 0.5;
 
 void check_gaps(const Capture& capture, Findings& findings) {
   std::vector<const View*> views;
@@ -57,7 +57,7 @@ void check_repeats(const Capture& capture, const std::vector<View>& views, const
     if (ids.size() > 1) repeated.insert(repeated.end(), ids.begin(), ids.end());
   }
   if (repeated.empty() ||
-      static_cast<double>(repeated.size()) > largest_share * static_cast<double>(views.size()))
+      static_cast<double>(repeated.size()) > repeated_share * static_cast<double>(views.size()))
     return;
   Finding& finding =
       findings.emplace_back(fmt::format("{} {} views share their time with another of the same camera ({})",

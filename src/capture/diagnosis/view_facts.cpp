@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "base/error.h"
 #include "capture/decode.h"
@@ -76,7 +75,7 @@ void measure_prior(const Capture& capture, const Tensor<uint8_t>& mask, const Su
     sum += std::acos(std::clamp(dot(direction, normal), -1.0, 1.0));
     ++samples;
   });
-  if (samples >= enough) facts.prior_angle = sum / static_cast<double>(samples) * 180 / std::numbers::pi;
+  if (samples >= enough) facts.prior_angle = glm::degrees(sum / static_cast<double>(samples));
 }
 
 void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& facts) {

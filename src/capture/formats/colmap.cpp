@@ -29,9 +29,9 @@ std::string in_folder(const std::string& folder, const std::string& name) {
 }
 
 // Reads step by step into `found_`.
-class Reader {
+class ColmapReader {
  public:
-  Reader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
+  ColmapReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
       : tree_(std::move(tree)), options_(options), folder_(model_folder(*tree_)) {
     model_ = read_colmap_model(*tree_, folder_);
     for (ColmapImage& image : model_.images) image.name = tidy_path(image.name);
@@ -146,7 +146,7 @@ bool is_colmap(const FileTree& tree) {
 }
 
 FoundCapture read_colmap(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
-  return Reader(tree, options).read();
+  return ColmapReader(tree, options).read();
 }
 
 }  // namespace traceflow

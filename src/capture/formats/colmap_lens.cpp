@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "capture/formats/lens_limits.h"
 
 namespace traceflow {
 
@@ -95,16 +96,15 @@ Lens colmap_lens(const ColmapLensModel& model, std::span<const double> parameter
     throw InputError(where, field + ".params", std::to_string(parameters.size()) + " numbers",
                      std::to_string(model.parameters) + " (" + name + ")");
   }
-  constexpr double largest = 1e9, smallest = 1e-6;
-  check(width > 0 && width < largest, width, "width", "a number of pixels above zero");
-  check(height > 0 && height < largest, height, "height", "a number of pixels above zero");
+  check(width > 0 && width < largest_pixels, width, "width", "a number of pixels above zero");
+  check(height > 0 && height < largest_pixels, height, "height", "a number of pixels above zero");
   for (size_t i = 0; i < parameters.size(); ++i) {
-    check(std::abs(parameters[i]) < largest, parameters[i], "params[" + std::to_string(i) + "]",
+    check(std::abs(parameters[i]) < largest_pixels, parameters[i], "params[" + std::to_string(i) + "]",
           "a finite number");
   }
   const size_t focals = has_one_focal(name) ? 1 : 2;
   for (size_t i = 0; i < focals; ++i) {
-    check(parameters[i] > smallest, parameters[i], "params[" + std::to_string(i) + "]",
+    check(parameters[i] > smallest_pixels, parameters[i], "params[" + std::to_string(i) + "]",
           "a focal length above zero");
   }
   Lens lens;

@@ -18,9 +18,9 @@ bool is_wanted_as_dycheck(const FileTree& tree, CaptureFormat format) {
 std::string camera_path(const std::string& id) { return "camera/" + id + ".json"; }
 
 // Reads step by step into `found`.
-class Reader {
+class NerfiesReader {
  public:
-  Reader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
+  NerfiesReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
       : tree_(std::move(tree)),
         layout_(is_wanted_as_dycheck(*tree_, options.format) ? read_dycheck_layout(*tree_, found_.warnings)
                                                              : read_nerfies_layout(*tree_, found_.warnings)) {
@@ -106,7 +106,7 @@ class Reader {
 bool is_nerfies(const FileTree& tree) { return tree.has("dataset.json") || tree.has("metadata.json"); }
 
 FoundCapture read_nerfies(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
-  return Reader(tree, options).read();
+  return NerfiesReader(tree, options).read();
 }
 
 }  // namespace traceflow

@@ -2,24 +2,22 @@
 
 #include <vector>
 
+#include "capture/formats/lens_limits.h"
 #include "files/json_document.h"
 
 namespace traceflow {
 
 namespace {
 
-// Of pixels, and of what multiplies them: numbers that single precision holds after some arithmetic.
-constexpr double largest = 1e9;
-constexpr double smallest = 1e-6;
-
 double length_in_pixels(const JsonField& field) {
   field.positive();
-  return field.number(smallest, largest);
+  return field.number(smallest_pixels, largest_pixels);
 }
 
 std::vector<double> bounded(const JsonField& field, size_t count) {
   std::vector<double> result;
-  for (const JsonField& number : field.elements(count)) result.push_back(number.number(-largest, largest));
+  for (const JsonField& number : field.elements(count))
+    result.push_back(number.number(-largest_pixels, largest_pixels));
   return result;
 }
 
@@ -39,7 +37,7 @@ CapturedCamera read_nerfies_camera(const InputFile& input) {
   lens.focal = {focal, focal * aspect};
   const std::vector<double> centre = bounded(file["principal_point"], 2);
   lens.centre = {centre[0], centre[1]};
-  if (file.has("skew")) lens.skew = file["skew"].number(-largest, largest);
+  if (file.has("skew")) lens.skew = file["skew"].number(-largest_pixels, largest_pixels);
   if (file.has("radial_distortion"))
     lens.radial = load3<double>(bounded(file["radial_distortion"], 3).data());
   const char* tangential = file.has("tangential") ? "tangential" : "tangential_distortion";

@@ -29,9 +29,9 @@ std::string at_scale(const std::string& path, int stored) {
 }
 
 // Reads step by step into `found_`.
-class Reader {
+class TransformsReader {
  public:
-  Reader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
+  TransformsReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
       : tree_(std::move(tree)), options_(options) {}
 
   FoundCapture read() {
@@ -251,7 +251,7 @@ class Reader {
 bool is_transforms(const FileTree& tree) { return tree.has(whole_file) || tree.has(train_file); }
 
 FoundCapture read_transforms(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
-  return Reader(tree, options).read();
+  return TransformsReader(tree, options).read();
 }
 
 }  // namespace traceflow

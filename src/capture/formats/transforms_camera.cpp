@@ -4,22 +4,22 @@
 #include <array>
 #include <cmath>
 
+#include "capture/formats/lens_limits.h"
+
 namespace traceflow {
 
 namespace {
 
 constexpr double pi = 3.14159265358979323846;
-constexpr double largest = 1e9;
-constexpr double smallest = 1e-6;
 
 void take_number(const JsonField& field, const char* key, double& value) {
-  if (field.has(key)) value = field[key].number(-largest, largest);
+  if (field.has(key)) value = field[key].number(-largest_pixels, largest_pixels);
 }
 
 void take_positive(const JsonField& field, const char* key, std::optional<double>& value) {
   if (!field.has(key)) return;
   field[key].positive();
-  value = field[key].number(smallest, largest);
+  value = field[key].number(smallest_pixels, largest_pixels);
 }
 
 // The names of nerfstudio, and those of COLMAP that mean the same with its k1 to k4, p1 and p2.
@@ -48,7 +48,7 @@ void TransformsLens::take(const JsonField& field) {
     if (field.has(key) && !(**angle < pi)) field[key].expect("an angle below π");
   }
   for (const auto& [key, centre] : {std::pair{"cx", &centre_x}, {"cy", &centre_y}}) {
-    if (field.has(key)) *centre = field[key].number(-largest, largest);
+    if (field.has(key)) *centre = field[key].number(-largest_pixels, largest_pixels);
   }
   take_number(field, "k1", k1);
   take_number(field, "k2", k2);
@@ -59,10 +59,11 @@ void TransformsLens::take(const JsonField& field) {
   if (field.has("K")) {
     const std::vector<JsonField> rows = field["K"].elements(3);
     const std::vector<double> x = rows[0].numbers(3), y = rows[1].numbers(3);
-    if (!(x[0] > smallest && x[0] < largest && y[1] > smallest && y[1] < largest && std::abs(x[1]) < largest))
+    if (!(x[0] > smallest_pixels && x[0] < largest_pixels && y[1] > smallest_pixels &&
+          y[1] < largest_pixels && std::abs(x[1]) < largest_pixels))
       field["K"].expect("focal lengths above zero");
     for (const double place : {x[2], y[2]}) {
-      if (!(std::abs(place) < largest)) field["K"].expect("a principal point near the image");
+      if (!(std::abs(place) < largest_pixels)) field["K"].expect("a principal point near the image");
     }
     focal_x = x[0];
     focal_y = y[1];

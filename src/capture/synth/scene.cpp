@@ -11,8 +11,6 @@ namespace traceflow::synth {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
 double distance_to(const Sphere& sphere, const Ray& ray, double nearest) {
   const double b = dot(ray.origin, ray.direction);
   const double root2 = b * b - dot(ray.origin, ray.origin) + sphere.radius * sphere.radius;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <variant>
 #include <vector>
 
@@ -12,6 +13,9 @@
 namespace traceflow::synth {
 
 using Vector = Vec3<double>;
+
+// How far a ray that misses goes.
+constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // direction has unit length.
 struct Ray {

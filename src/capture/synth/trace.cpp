@@ -1,14 +1,12 @@
 #include "capture/synth/trace.h"
 
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace traceflow::synth {
 
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 // Metres by which rays start above the surface that they leave.
 constexpr double lift = 1e-7;
 

@@ -8,13 +8,6 @@
 
 namespace traceflow::cli {
 
-namespace {
-
-constexpr double redraw_seconds = 0.1;
-constexpr double line_seconds = 15;
-
-}  // namespace
-
 std::string frame_line(int64_t done, int64_t frames, double seconds) {
   std::string count = fmt::format("{}/{} frames", done, frames);
   if (done <= 0 || !(seconds > 0)) return count;

@@ -14,8 +14,6 @@ namespace traceflow::cli {
 namespace {
 
 constexpr int bar_cells = 20;
-constexpr double redraw_seconds = 0.1;
-constexpr double line_seconds = 15;
 constexpr int64_t line_percent = 5;
 
 int64_t percent_of(const events::Step& step) {

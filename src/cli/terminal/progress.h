@@ -8,6 +8,10 @@
 
 namespace traceflow::cli {
 
+// How often a line is drawn again on a terminal, and a new one written elsewhere.
+constexpr double redraw_seconds = 0.1;
+constexpr double line_seconds = 15;
+
 // A listener that shows a run to a person. On a terminal one line is redrawn; elsewhere a line is written
 // every five percent or fifteen seconds. It keeps no clock of its own: time is what the events say.
 class Progress {

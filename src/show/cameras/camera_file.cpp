@@ -7,12 +7,11 @@
 
 #include "base/error.h"
 #include "files/json_document.h"
+#include "files/limits.h"
 
 namespace traceflow::show {
 
 namespace {
-
-constexpr int longest_side = 32768;  // pixels
 
 std::vector<JsonField> cameras_in(const JsonFile& file) {
   if (!file.json().is_array()) file.expect("a list of cameras");
@@ -34,8 +33,8 @@ Shot read_shot(const JsonField& entry, const SceneNormalisation& normalisation) 
   Shot shot;
   if (entry.has("time")) shot.time = static_cast<float>(entry["time"].number(0, 1));
   Camera<double> camera;
-  camera.width = static_cast<int>(entry["width"].whole(1, longest_side));
-  camera.height = static_cast<int>(entry["height"].whole(1, longest_side));
+  camera.width = static_cast<int>(entry["width"].whole(1, max_image_side));
+  camera.height = static_cast<int>(entry["height"].whole(1, max_image_side));
   camera.focal_x = entry["fx"].positive();
   camera.focal_y = entry["fy"].positive();
   camera.centre_x = entry.has("cx") ? entry["cx"].number() : camera.width / 2.0;

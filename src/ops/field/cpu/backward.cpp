@@ -55,7 +55,7 @@ struct Pass {
 };
 
 // Working memory of one thread, kept between calls.
-struct Scratch {
+struct BackwardScratch {
   void resize(const Layout& layout, int64_t rows) {
     encoding.resize({rows, layout.padded_encoding});
     grad_output.resize({rows, layout.padded_outputs});
@@ -85,7 +85,7 @@ void load_grad_output(const Layout& layout, const float* points, const float* gr
 }
 
 // The activations of a block, from forward's memory or computed again.
-Block restore(const Pass& pass, int64_t index, int64_t count, int64_t rows, Scratch& scratch) {
+Block restore(const Pass& pass, int64_t index, int64_t count, int64_t rows, BackwardScratch& scratch) {
   const Layout& layout = pass.layout;
   Block block{.points = count,
               .rows = rows,
@@ -108,7 +108,7 @@ Block restore(const Pass& pass, int64_t index, int64_t count, int64_t rows, Scra
 // Adds one block's gradients to the group's sums, from the last layer to the first.
 void backward_block(const Pass& pass, int64_t index, const float* points, const float* grad_output,
                     int64_t count, float* sums) {
-  thread_local Scratch scratch;
+  thread_local BackwardScratch scratch;
   const Layout& layout = pass.layout;
   const GradientLayout& at = pass.gradients;
   const int64_t rows = layout.padded_rows(count);

@@ -11,7 +11,7 @@ namespace traceflow::field {
 namespace {
 
 // Working memory of one thread, kept between calls.
-struct Scratch {
+struct ForwardScratch {
   Tensor<float> encoding;
   Tensor<float> fp32;
   Tensor<float> head;
@@ -28,7 +28,7 @@ void reserve(const Layout& layout, int64_t points, Precision precision, Saved& s
 
 void forward_block(const Layout& layout, const ForwardWeights& weights, const float* points, int64_t count,
                    std::byte* keep, float* output) {
-  thread_local Scratch scratch;
+  thread_local ForwardScratch scratch;
   const int64_t rows = layout.padded_rows(count);
   scratch.encoding.resize({rows, layout.padded_encoding});
   scratch.fp32.resize({rows, layout.width});

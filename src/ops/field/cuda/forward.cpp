@@ -23,16 +23,16 @@ void reserve(const DeviceLayout& layout, Precision precision, Saved& saved) {
 // The heads' product.
 void forward_heads(const DeviceLayout& layout, const Segment& segment, const std::byte* hidden,
                    const std::byte* weights, float* sums) {
-  cuda::multiply({.m = segment.rows,
-                  .k = layout.width,
-                  .n = layout.padded_outputs,
-                  .transposed_b = true,
-                  .stride_a = layout.width,
-                  .stride_b = layout.width,
-                  .stride_c = layout.padded_outputs,
-                  .operands = layout.hidden,
-                  .result = Number::fp32},
-                 {.a = hidden, .b = weights, .c = sums});
+  traceflow::cuda::multiply({.m = segment.rows,
+                             .k = layout.width,
+                             .n = layout.padded_outputs,
+                             .transposed_b = true,
+                             .stride_a = layout.width,
+                             .stride_b = layout.width,
+                             .stride_c = layout.padded_outputs,
+                             .operands = layout.hidden,
+                             .result = Number::fp32},
+                            {.a = hidden, .b = weights, .c = sums});
 }
 
 }  // namespace

@@ -9,9 +9,9 @@ namespace traceflow::field::device {
 
 namespace {
 
-using cuda::Mask;
-using cuda::ProductAddresses;
-using cuda::ProductDescription;
+using traceflow::cuda::Mask;
+using traceflow::cuda::ProductAddresses;
+using traceflow::cuda::ProductDescription;
 
 // Rows are padded to a multiple of this.
 int64_t row_quantum(int64_t points) { return points > 8192 ? 1024 : 128; }
@@ -146,8 +146,8 @@ Tensor<std::byte>& passing_memory() {
 
 bool masks_supported(const DeviceLayout& layout, int64_t rows) {
   for (int layer = 0; layer < layout.depth; ++layer) {
-    if (!cuda::supported(forward_product(layout, layer, rows, true)) ||
-        !cuda::supported(backward_product(layout, layer + 1, rows, true))) {
+    if (!traceflow::cuda::supported(forward_product(layout, layer, rows, true)) ||
+        !traceflow::cuda::supported(backward_product(layout, layer + 1, rows, true))) {
       return false;
     }
   }
@@ -168,11 +168,11 @@ void forward_hidden(const DeviceLayout& layout, const std::byte* weights, const 
           .bias = product.bias ? weights + places.bias[layer] : nullptr,
           .mask = segment.masks ? activations.mask(layer, segment.memory) : nullptr,
       };
-      if (cuda::supported(product)) {
-        cuda::multiply(product, at);
+      if (traceflow::cuda::supported(product)) {
+        traceflow::cuda::multiply(product, at);
         continue;
       }
-      cuda::multiply(without_epilogue(product), at);
+      traceflow::cuda::multiply(without_epilogue(product), at);
       const int groups = layout.width / Numbers<T>::count;
       parallel_for(
           Device::cuda, "field: bias and ReLU", segment.rows * groups,
@@ -186,11 +186,11 @@ void backward_hidden(const DeviceLayout& layout, int layer, const std::byte* wei
                      std::byte* grad_input) {
   const int64_t hidden_column = layout.sees_encoding(layer) ? layout.parts * layout.padded_encoding : 0;
   const ProductDescription product = backward_product(layout, layer, segment.rows, segment.masks);
-  cuda::multiply(product,
-                 {.a = gradient,
-                  .b = weights + PackedWeights(layout).weight[layer] + hidden_column * layout.number_bytes,
-                  .c = grad_input,
-                  .mask = segment.masks ? activations.mask(layer - 1, segment.memory) : nullptr});
+  traceflow::cuda::multiply(
+      product, {.a = gradient,
+                .b = weights + PackedWeights(layout).weight[layer] + hidden_column * layout.number_bytes,
+                .c = grad_input,
+                .mask = segment.masks ? activations.mask(layer - 1, segment.memory) : nullptr});
   if (segment.masks) return;
   with_number(layout, [&]<class T>(T) {
     const std::byte* const input = activations.output(layout, layer - 1, segment.memory);
@@ -205,7 +205,7 @@ Precision precision_on_device(const Field& field, Precision wanted) {
   if (wanted == Precision::fp32) return wanted;
   const DeviceLayout layout(field, wanted, 1024);
   const ProductDescription product = forward_product(layout, 0, 1024, false);
-  return cuda::supported(without_epilogue(product)) ? wanted : Precision::fp32;
+  return traceflow::cuda::supported(without_epilogue(product)) ? wanted : Precision::fp32;
 }
 
 }  // namespace traceflow::field::device
