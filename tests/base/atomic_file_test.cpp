@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <fstream>
 #include <iterator>
 
-#include "base/error.h"
+#include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -15,18 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string contents(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::string refusal(const fs::path& path) {
-  try {
-    write_atomically(path, "text");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return refusal_of([&] { write_atomically(path, "text"); });
 }
 
 int64_t entries(const fs::path& folder) {
@@ -37,13 +27,13 @@ TEST(AtomicFile, HoldsExactlyTheBytesGiven) {
   const TempFolder folder;
   const std::array<std::byte, 4> bytes{std::byte{0}, std::byte{255}, std::byte{10}, std::byte{13}};
   write_atomically(folder / "bytes", std::span<const std::byte>(bytes));
-  EXPECT_EQ(contents(folder / "bytes"), std::string("\0\xFF\n\r", 4));
+  EXPECT_EQ(bytes_of(folder / "bytes"), std::string("\0\xFF\n\r", 4));
   write_atomically(folder / "empty", "");
-  EXPECT_EQ(contents(folder / "empty"), "");
+  EXPECT_EQ(bytes_of(folder / "empty"), "");
   EXPECT_TRUE(fs::exists(folder / "empty"));
   const std::string large(3'000'000, 'x');
   write_atomically(folder / "large", large);
-  EXPECT_EQ(contents(folder / "large"), large);
+  EXPECT_EQ(bytes_of(folder / "large"), large);
 }
 
 TEST(AtomicFile, WritesPartsInOrder) {
@@ -51,14 +41,14 @@ TEST(AtomicFile, WritesPartsInOrder) {
   const std::string first = "one ", second, third = "three";
   write_atomically(folder / "parts", {std::as_bytes(std::span(first)), std::as_bytes(std::span(second)),
                                       std::as_bytes(std::span(third))});
-  EXPECT_EQ(contents(folder / "parts"), "one three");
+  EXPECT_EQ(bytes_of(folder / "parts"), "one three");
 }
 
 TEST(AtomicFile, ReplacesTheOldFileAndLeavesNothingElse) {
   const TempFolder folder;
   write_atomically(folder / "file", "a long first version");
   write_atomically(folder / "file", "second");
-  EXPECT_EQ(contents(folder / "file"), "second");
+  EXPECT_EQ(bytes_of(folder / "file"), "second");
   EXPECT_EQ(entries(folder.path()), 1);
 }
 
@@ -82,8 +72,8 @@ TEST(AtomicFile, ARefusalKeepsTheOldFile) {
   const TempFolder folder;
   write_atomically(folder / "file", "old");
   fs::create_directory(folder / "file.partial");  // stands where the temporary file would
-  EXPECT_NE(refusal(folder / "file"), "");
-  EXPECT_EQ(contents(folder / "file"), "old");
+  EXPECT_NE(refusal(folder / "file"), "accepted");
+  EXPECT_EQ(bytes_of(folder / "file"), "old");
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <array>
 #include <bit>
 
+#include "support/refusal.h"
+
 namespace traceflow {
 namespace {
 
@@ -52,15 +54,6 @@ struct Outer {
   }
 };
 
-std::string refusal(const std::function<void()>& f) {
-  try {
-    f();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TEST(OptionFields, ListsEveryFieldWithItsPathAndText) {
   Outer options;
   std::vector<std::string> lines;
@@ -93,7 +86,7 @@ TEST(OptionFields, RefusesWhatAFieldCannotHoldAndLeavesItAlone) {
   Outer options;
   const auto fields = option_fields(options);
   const auto message = [&](const std::string& assignment) {
-    return refusal([&] { set_option_assignment(fields, assignment, "--set"); });
+    return refusal_of([&] { set_option_assignment(fields, assignment, "--set"); });
   };
   EXPECT_EQ(message("count=3.5"), "--set: count: found 3.5, expected a whole number");
   EXPECT_EQ(message("count="), "--set: count: found nothing, expected a whole number");
@@ -114,7 +107,7 @@ TEST(OptionFields, SuggestsTheNearestName) {
   Outer options;
   const auto fields = option_fields(options);
   const auto message = [&](const std::string& path) {
-    return refusal([&] { find_option(fields, path, "--set"); });
+    return refusal_of([&] { find_option(fields, path, "--set"); });
   };
   EXPECT_THAT(message("conut"), HasSubstr("conut: found no option of this name"));
   EXPECT_THAT(message("conut"), HasSubstr("did you mean count?"));
@@ -141,9 +134,9 @@ TEST(OptionFields, ValuesOfAnotherTypeAreRefused) {
 }
 
 TEST(CheckOption, ShowsSmallNumbersAsWritten) {
-  EXPECT_EQ(refusal([] { check_option(false, "rate", 1e-9F, "more"); }),
+  EXPECT_EQ(refusal_of([] { check_option(false, "rate", 1e-9F, "more"); }),
             "option: rate: found 1e-09, expected more");
-  EXPECT_EQ(refusal([] { check_option(false, "count", -3, "more"); }),
+  EXPECT_EQ(refusal_of([] { check_option(false, "count", -3, "more"); }),
             "option: count: found -3, expected more");
 }
 

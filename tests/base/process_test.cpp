@@ -4,19 +4,14 @@
 #include <gtest/gtest.h>
 #include <csignal>
 
-#include <fstream>
 #include <thread>
 
 #include "base/error.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
 namespace {
-
-std::string text_of(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 TEST(Process, TellsWhetherTheProgramEndedWell) {
   EXPECT_TRUE(Process({"sh", "-c", "exit 0"}, {}).wait());
@@ -32,15 +27,15 @@ TEST(Process, ConnectsTheStreamsAndAddsToTheEnvironment) {
                   {input.reading.number(), out.number(), error.number(), {"WORD=there"}});
   ASSERT_EQ(::write(input.writing.number(), "hello\n", 6), 6);
   EXPECT_TRUE(process.wait());
-  EXPECT_EQ(text_of(folder / "out"), "hello there\n");
-  EXPECT_EQ(text_of(folder / "error"), "bad\n");
+  EXPECT_EQ(bytes_of(folder / "out"), "hello there\n");
+  EXPECT_EQ(bytes_of(folder / "error"), "bad\n");
 }
 
 TEST(Process, ArgumentsAreNoShellWords) {
   const TempFolder folder;
   const Descriptor out = open_log(folder / "out");
   EXPECT_TRUE(Process({"echo", "$HOME; ls *", "a  b"}, {.output = out.number()}).wait());
-  EXPECT_EQ(text_of(folder / "out"), "$HOME; ls * a  b\n");
+  EXPECT_EQ(bytes_of(folder / "out"), "$HOME; ls * a  b\n");
 }
 
 TEST(Process, AProgramThatIsNotThereIsNamed) {
@@ -58,13 +53,13 @@ TEST(Process, AStopEndsTheProgramAndWhatItHasStarted) {
   const TempFolder folder;
   const Descriptor out = open_log(folder / "out");
   Process process({"sh", "-c", "sleep 1000 & echo $!; wait"}, {.output = out.number()});
-  while (text_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
+  while (bytes_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
   const std::atomic<bool> stop = true;
   EXPECT_FALSE(process.wait(stop));
-  const pid_t child = std::stoi(text_of(folder / "out"));
+  const pid_t child = std::stoi(bytes_of(folder / "out"));
   // Init may take a moment to bury it.
   while (::kill(child, 0) == 0 &&
-         text_of("/proc/" + std::to_string(child) + "/stat").find(" Z ") == std::string::npos) {
+         bytes_of("/proc/" + std::to_string(child) + "/stat").find(" Z ") == std::string::npos) {
     std::this_thread::yield();
   }
 }
@@ -75,8 +70,8 @@ TEST(Process, WhatIsLeftIsEnded) {
     const TempFolder folder;
     const Descriptor out = open_log(folder / "out");
     Process process({"sh", "-c", "echo $$; exec sleep 1000"}, {.output = out.number()});
-    while (text_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
-    id = std::stoi(text_of(folder / "out"));
+    while (bytes_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
+    id = std::stoi(bytes_of(folder / "out"));
   }
   EXPECT_NE(::kill(id, 0), 0);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "capture/capture.h"
 #include "files/png.h"
 #include "support/temp_folder.h"
 
@@ -151,5 +153,11 @@ struct NerfiesCapture : FakeCapture {
         {"count", frames}, {"num_exemplars", 3}, {"ids", all}, {"train_ids", train}, {"val_ids", test}};
   }
 };
+
+// Whether the capture warns of what has this in its text.
+inline bool has_warning(const Capture& capture, const std::string& part) {
+  return std::any_of(capture.warnings.begin(), capture.warnings.end(),
+                     [&](const Finding& found) { return found.text.find(part) != std::string::npos; });
+}
 
 }  // namespace traceflow

@@ -1,13 +1,13 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "fake_capture.h"
 #include "files/jpeg.h"
 #include "support/colmap_writer.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 #include "support/zip_writer.h"
 
@@ -19,11 +19,10 @@ inline std::filesystem::path zipped(const std::filesystem::path& folder,
   std::vector<std::pair<std::string, std::string>> members;
   for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
     if (!entry.is_regular_file()) continue;
-    std::ifstream file(entry.path(), std::ios::binary);
     members.emplace_back("capture/" + std::filesystem::relative(entry.path(), folder).string(),
-                         std::string(std::istreambuf_iterator<char>(file), {}));
+                         bytes_of(entry.path()));
   }
-  std::ofstream(archive, std::ios::binary) << zip_archive(members, true);
+  write_bytes(archive, zip_archive(members, true));
   return archive;
 }
 

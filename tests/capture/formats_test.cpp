@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <functional>
 
-#include "base/error.h"
 #include "capture/capture.h"
 #include "capture/image_cache.h"
 #include "fake_formats.h"
+#include "support/refusal.h"
 
 namespace traceflow {
 namespace {
@@ -35,12 +35,7 @@ std::vector<std::string> ids(const std::vector<View>& views) {
 }
 
 std::string refusal(const std::filesystem::path& path, const CaptureOptions& options = {}) {
-  try {
-    load_capture(path, options);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return refusal_of([&] { load_capture(path, options); });
 }
 
 void expect_pixels(const Capture& capture, const View& view, const Tensor<uint8_t>& expected,

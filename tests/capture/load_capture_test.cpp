@@ -19,11 +19,6 @@ std::vector<std::string> ids_of(const std::vector<View>& views) {
 }
 using Ids = std::vector<std::string>;
 
-bool has_warning(const Capture& capture, const std::string& part) {
-  return std::any_of(capture.warnings.begin(), capture.warnings.end(),
-                     [&](const Finding& found) { return found.text.find(part) != std::string::npos; });
-}
-
 TEST(Layouts, nerf_ds) {
   NerfDsCapture fake;
   fake.write_image("resized_mask/1x/000001_left.png.png", Tensor<uint8_t>({8, 12}));

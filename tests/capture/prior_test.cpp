@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -9,20 +8,11 @@
 #include "capture/prior_axes.h"
 #include "fake_capture.h"
 #include "files/npy.h"
+#include "support/file_bytes.h"
 #include "support/zip_writer.h"
 
 namespace traceflow {
 namespace {
-
-bool has_warning(const Capture& capture, const std::string& part) {
-  return std::any_of(capture.warnings.begin(), capture.warnings.end(),
-                     [&](const Finding& found) { return found.text.find(part) != std::string::npos; });
-}
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // World axes of a camera turned about y by 90° (x_camera = −z_world, z_camera = x_world) for a prior whose
 // own axes are OpenGL's: (x, y, z) → camera (x, −y, −z) → world.

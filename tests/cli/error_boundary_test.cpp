@@ -14,32 +14,32 @@
 namespace traceflow::cli {
 namespace {
 
-struct Outcome {
+struct Guarded {
   int code;
   std::string line;
 };
 
-Outcome outcome(const std::function<int()>& work) {
+Guarded outcome(const std::function<int()>& work) {
   std::ostringstream err;
   const int code = guarded(work, err);
   return {code, err.str()};
 }
 
 TEST(ErrorBoundary, PassesTheCodeOfWhatSucceeds) {
-  const Outcome o = outcome([] { return 0; });
+  const Guarded o = outcome([] { return 0; });
   EXPECT_EQ(o.code, 0);
   EXPECT_EQ(o.line, "");
 }
 
 TEST(ErrorBoundary, InputErrorsAreOneLineAndCode2) {
-  const Outcome o =
+  const Guarded o =
       outcome([]() -> int { throw InputError("a.json", "scale", "x\ny", "a number", "mend it"); });
   EXPECT_EQ(o.code, 2);
   EXPECT_EQ(o.line, "traceflow: a.json: scale: found x?y, expected a number; mend it\n");
 }
 
 TEST(ErrorBoundary, StreamsAndThreadsThatTheSystemRefusesAreNoBugs) {
-  const Outcome o = outcome([]() -> int {
+  const Guarded o = outcome([]() -> int {
     throw std::system_error(std::make_error_code(std::errc::no_space_on_device), "standard output");
   });
   EXPECT_EQ(o.code, 2);
@@ -47,13 +47,13 @@ TEST(ErrorBoundary, StreamsAndThreadsThatTheSystemRefusesAreNoBugs) {
 }
 
 TEST(ErrorBoundary, FilesThatTheSystemRefusesAreInputErrors) {
-  const Outcome o = outcome([]() -> int { return std::filesystem::file_size("/nowhere") != 0; });
+  const Guarded o = outcome([]() -> int { return std::filesystem::file_size("/nowhere") != 0; });
   EXPECT_EQ(o.code, 2);
   EXPECT_NE(o.line.find("/nowhere"), std::string::npos);
 }
 
 TEST(ErrorBoundary, BrokenPromisesAreCalledBugsAndCode3) {
-  const Outcome o = outcome([]() -> int { throw InternalError("count is 3"); });
+  const Guarded o = outcome([]() -> int { throw InternalError("count is 3"); });
   EXPECT_EQ(o.code, 3);
   EXPECT_NE(o.line.find("internal error: count is 3; this is a bug"), std::string::npos);
   EXPECT_EQ(outcome([]() -> int { throw std::out_of_range("at"); }).code, 3);
@@ -61,13 +61,13 @@ TEST(ErrorBoundary, BrokenPromisesAreCalledBugsAndCode3) {
 }
 
 TEST(ErrorBoundary, AVerbThatHasSaidEverythingOnlyGivesItsCode) {
-  const Outcome o = outcome([]() -> int { throw Exit{exit_interrupted}; });
+  const Guarded o = outcome([]() -> int { throw Exit{exit_interrupted}; });
   EXPECT_EQ(o.code, 130);
   EXPECT_EQ(o.line, "");
 }
 
 TEST(ErrorBoundary, MemoryIsCode4AndOneLine) {
-  const Outcome o = outcome([]() -> int { throw std::bad_alloc(); });
+  const Guarded o = outcome([]() -> int { throw std::bad_alloc(); });
   EXPECT_EQ(o.code, 4);
   EXPECT_EQ(std::count(o.line.begin(), o.line.end(), '\n'), 1);
 }

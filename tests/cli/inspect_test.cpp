@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "capture/synth/synth.h"
-#include "cli/program.h"
+#include "cli/program_call.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/png.h"
 #include "support/temp_folder.h"
@@ -16,21 +16,6 @@ namespace {
 
 using testing::HasSubstr;
 using Json = nlohmann::json;
-
-struct Result {
-  int code;
-  std::string out, error;
-};
-Result run_verb(std::vector<std::string> words) {
-  words.insert(words.begin(), "traceflow");
-  std::vector<const char*> arguments;
-  arguments.reserve(words.size());
-  for (const std::string& word : words) arguments.push_back(word.c_str());
-  testing::internal::CaptureStderr();
-  testing::internal::CaptureStdout();
-  const int code = run(static_cast<int>(arguments.size()), arguments.data());
-  return {code, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
-}
 
 class InspectVerb : public testing::Test {
  protected:
@@ -60,8 +45,8 @@ const Json& finding(const Json& report, const std::string& kind) {
 }
 
 TEST_F(InspectVerb, says_each_problem_in_a_line_with_its_paths) {
-  const Result told = run_verb({"inspect", "-d", capture()});
-  EXPECT_EQ(told.code, exit_done) << told.error;
+  const Outcome told = run_with({"inspect", "-d", capture()});
+  EXPECT_EQ(told.code, exit_done) << told.err;
   EXPECT_THAT(told.out,
               HasSubstr("\nproblem         1 of 5 training views have no image (000001_left): left out\n"
                         "                rgb/1x/000001_left.png\n"));
@@ -72,8 +57,8 @@ TEST_F(InspectVerb, says_each_problem_in_a_line_with_its_paths) {
 }
 
 TEST_F(InspectVerb, says_them_for_programs) {
-  const Result told = run_verb({"inspect", "-d", capture(), "--json", "--preset", "demo"});
-  ASSERT_EQ(told.code, exit_done) << told.error;
+  const Outcome told = run_with({"inspect", "-d", capture(), "--json", "--preset", "demo"});
+  ASSERT_EQ(told.code, exit_done) << told.err;
   const Json report = Json::parse(told.out);
   EXPECT_EQ(finding(report, "missing-image")["severity"], "problem");
   EXPECT_EQ(finding(report, "missing-image")["files"], Json({"rgb/1x/000001_left.png"}));
@@ -83,27 +68,27 @@ TEST_F(InspectVerb, says_them_for_programs) {
 
   // Fewer surfels take less memory; the preset is the one that was asked for.
   const Json small = Json::parse(
-      run_verb({"inspect", "-d", capture(), "--json", "--preset", "demo", "--set", "density.max_surfels=100"})
+      run_with({"inspect", "-d", capture(), "--json", "--preset", "demo", "--set", "density.max_surfels=100"})
           .out);
-  const Json paper = Json::parse(run_verb({"inspect", "-d", capture(), "--json", "--quick"}).out);
+  const Json paper = Json::parse(run_with({"inspect", "-d", capture(), "--json", "--quick"}).out);
   EXPECT_LT(small["memory"]["training_cpu_bytes"], report["memory"]["training_cpu_bytes"]);
   EXPECT_GT(paper["memory"]["training_cuda_bytes"], report["memory"]["training_cuda_bytes"]);
 }
 
 TEST_F(InspectVerb, draws_a_picture) {
   const std::string picture = (folder_ / "picture.png").string();
-  ASSERT_EQ(run_verb({"inspect", "-d", capture(), "--picture", picture}).code, exit_done);
+  ASSERT_EQ(run_with({"inspect", "-d", capture(), "--picture", picture}).code, exit_done);
   EXPECT_EQ(read_png_size(picture).width, 1200);
 }
 
 TEST_F(InspectVerb, training_says_and_logs_what_loading_found) {
   const std::string run = (folder_ / "run").string();
-  const Result trained = run_verb(
+  const Outcome trained = run_with(
       {"train", "-d", capture(), "-o", run, "--preset", "demo", "-i", "1", "--set", "deform.network.width=16",
        "--set", "deform.environment_network.width=16", "--set", "initial.environment_cells=4"});
-  ASSERT_EQ(trained.code, exit_done) << trained.error;
-  EXPECT_THAT(trained.error, HasSubstr("warning: 1 of 5 training views have no image (000001_left)"));
-  EXPECT_THAT(trained.error, HasSubstr("warning: 1 of 4 training views have no mask (000002_left)"));
+  ASSERT_EQ(trained.code, exit_done) << trained.err;
+  EXPECT_THAT(trained.err, HasSubstr("warning: 1 of 5 training views have no image (000001_left)"));
+  EXPECT_THAT(trained.err, HasSubstr("warning: 1 of 4 training views have no mask (000002_left)"));
   std::ifstream log(folder_ / "run/log.jsonl");
   std::vector<std::string> warnings;
   for (std::string line; std::getline(log, line);) {

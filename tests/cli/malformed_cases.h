@@ -42,7 +42,8 @@ MalformedKind malformed_archives();
 MalformedKind malformed_options();
 MalformedKind malformed_folders();
 
-std::string read_bytes(const std::filesystem::path& path);
+// A command that most of the captures' cases are of.
+inline const std::vector<std::string> inspect_capture = {"inspect", "-d", "capture"};
 
 // Edits of good files.
 std::function<void(Files&)> put(const std::string& file, const std::string& bytes);

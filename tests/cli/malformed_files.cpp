@@ -1,10 +1,9 @@
-#include <fstream>
-
 #include "cli/malformed_cases.h"
 #include "cli/program.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "scene/ply.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::cli {
@@ -14,7 +13,7 @@ namespace {
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
-std::string photograph() {
+std::string picture_bytes() {
   Tensor<uint8_t> pixels({16, 24, 3});
   for (int64_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<uint8_t>(37 * i);
   return png_bytes(pixels);
@@ -29,14 +28,14 @@ Files capture() {
   Files files{{"capture/dataset.json", R"({"ids":["a","b"],"train_ids":["a"],"val_ids":["b"]})"},
               {"capture/metadata.json", R"({"a":{"time_id":0},"b":{"time_id":1}})"},
               {"capture/scene.json", R"({"scale":0.5,"center":[0,0,1],"near":0.1,"far":2})"},
-              {"capture/rgb/1x/a.png", photograph()},
-              {"capture/rgb/1x/b.png", photograph()},
-              {"capture/normal/1x/a.png", photograph()}};
+              {"capture/rgb/1x/a.png", picture_bytes()},
+              {"capture/rgb/1x/b.png", picture_bytes()},
+              {"capture/normal/1x/a.png", picture_bytes()}};
   files["capture/camera/a.json"] = camera.dump();
   camera["position"] = {0.1, 0, -1};
   files["capture/camera/b.json"] = camera.dump();
   for (const char* format : {"colmap", "transforms"}) {
-    for (const char* id : {"a", "b"}) files[std::string(format) + "/images/" + id + ".png"] = photograph();
+    for (const char* id : {"a", "b"}) files[std::string(format) + "/images/" + id + ".png"] = picture_bytes();
   }
   files["colmap/sparse/0/cameras.txt"] = "1 PINHOLE 24 16 20 20 12 8\n";
   files["colmap/sparse/0/images.txt"] = "1 1 0 0 0 0 0 1 1 a.png\n\n2 1 0 0 0 0.1 0 1 1 b.png\n\n";
@@ -57,7 +56,7 @@ void add_written(const fs::path& folder, Files& files) {
   write_npy(folder / "rays.npy", Tensor<float>({1, 6}));
   write_npy(folder / "capture/points.npy", Tensor<float>({2, 3}));
   for (const char* name : {"scene.ply", "rays.npy", "capture/points.npy"})
-    files[name] = read_bytes(folder / name);
+    files[name] = bytes_of(folder / name);
 }
 
 // By training for one iteration.
@@ -66,15 +65,10 @@ void add_run(const fs::path& folder, Files& files) {
   const char* command[] = {"traceflow", "train",    "-d",   data.c_str(), "-o", run.c_str(),
                            "-q",        "--preset", "demo", "-i",         "1"};
   cli::run(static_cast<int>(std::size(command)), command);
-  files["run/checkpoint.safetensors"] = read_bytes(folder / "run/checkpoint.safetensors");
+  files["run/checkpoint.safetensors"] = bytes_of(folder / "run/checkpoint.safetensors");
 }
 
 }  // namespace
-
-std::string read_bytes(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 const Files& good_files() {
   static const Files files = [] {
@@ -82,7 +76,7 @@ const Files& good_files() {
     Files made = capture();
     for (const auto& [name, bytes] : made) {
       fs::create_directories((folder / name).parent_path());
-      std::ofstream(folder / name, std::ios::binary) << bytes;
+      write_bytes(folder / name, bytes);
     }
     add_written(folder.path(), made);
     add_run(folder.path(), made);

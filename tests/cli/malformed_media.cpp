@@ -8,7 +8,6 @@ namespace traceflow::cli {
 
 namespace {
 
-const std::vector<std::string> inspect = {"inspect", "-d", "capture"};
 const std::vector<std::string> inspect_zip = {"inspect", "-d", "capture.zip"};
 const std::string photograph = "capture/rgb/1x/a.png", prior = "capture/normal/1x/a.png",
                   archive = "capture.zip";
@@ -69,23 +68,24 @@ std::function<void(std::string&)> in_directory(size_t at, const std::string& byt
 MalformedKind malformed_images() {
   const std::string cmyk = jpeg(JCS_CMYK, 4), whole = jpeg(JCS_YCbCr, 3);
   return {"Images",
-          {{"an empty photograph", inspect, put(photograph, ""),
+          {{"an empty photograph", inspect_capture, put(photograph, ""),
             "capture/rgb/1x/a.png: found an empty file, expected a PNG or JPEG image; convert it"},
-           {"text in the place of a photograph", inspect, put(photograph, "<html>"),
+           {"text in the place of a photograph", inspect_capture, put(photograph, "<html>"),
             "capture/rgb/1x/a.png: found a file that begins with \"<html>\", expected a PNG or JPEG image; "
             "convert it"},
-           {"a photograph of a kind that is not read", inspect, put(photograph, "GIF89a\1\1"),
+           {"a photograph of a kind that is not read", inspect_capture, put(photograph, "GIF89a\1\1"),
             "capture/rgb/1x/a.png: found a GIF image, expected a PNG or JPEG image; convert it"},
-           {"a photograph cut short in its header", inspect, cut(photograph, 20),
+           {"a photograph cut short in its header", inspect_capture, cut(photograph, 20),
             "capture/rgb/1x/a.png: found the file is cut short, expected a PNG image of at most 32,768 "
             "pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a photograph of no width", inspect, put(photograph, png_of_size(0, 16)),
+           {"a photograph of no width", inspect_capture, put(photograph, png_of_size(0, 16)),
             "capture/rgb/1x/a.png: found Invalid IHDR data, expected a PNG image of at most 32,768 pixels a "
             "side and 2²⁸ in all; write or copy the file again"},
-           {"a photograph wider than is read", inspect, put(photograph, png_of_size(40000, 16)),
+           {"a photograph wider than is read", inspect_capture, put(photograph, png_of_size(40000, 16)),
             "capture/rgb/1x/a.png: found Invalid IHDR data, expected a PNG image of at most 32,768 pixels a "
             "side and 2²⁸ in all; write or copy the file again"},
-           {"a photograph of more pixels than is read", inspect, put(photograph, png_of_size(32768, 32768)),
+           {"a photograph of more pixels than is read", inspect_capture,
+            put(photograph, png_of_size(32768, 32768)),
             "capture/rgb/1x/a.png: found 32768×32768, expected a PNG image of at most 32,768 pixels a side "
             "and 2²⁸ in all; write or copy the file again"},
            {"a photograph smaller than it is to be",
@@ -93,25 +93,25 @@ MalformedKind malformed_images() {
             [](Files&) {},
             "capture/rgb/1x/a.png: size: found 24×16, expected at least 32 pixels a side; use a smaller "
             "--downscale"},
-           {"a PNG that promises more than it holds", inspect, put(prior, png_of_size(16384, 16384)),
+           {"a PNG that promises more than it holds", inspect_capture, put(prior, png_of_size(16384, 16384)),
             "capture/normal/1x/a.png: found a file too short for an image of 16384×16384, expected a PNG "
             "image of at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a PNG cut short", inspect, cut(prior, 300),
+           {"a PNG cut short", inspect_capture, cut(prior, 300),
             "capture/normal/1x/a.png: found the file is cut short, expected a PNG image of at most 32,768 "
             "pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a PNG with a byte changed", inspect, [](Files& files) { files.at(prior)[100] ^= 1; },
+           {"a PNG with a byte changed", inspect_capture, [](Files& files) { files.at(prior)[100] ^= 1; },
             "capture/normal/1x/a.png: found IDAT: incorrect data check, expected a PNG image of at most "
             "32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a PNG of grey in the place of normals", inspect,
+           {"a PNG of grey in the place of normals", inspect_capture,
             [](Files& files) { files.at(prior) = jpeg(JCS_GRAYSCALE, 1); },
             "capture/normal/1x/a.png: channels: found 1, expected 3 (normals as 2v - 1)"},
-           {"a JPEG cut short", inspect, jpeg_prior(whole.substr(0, whole.size() - 40)),
+           {"a JPEG cut short", inspect_capture, jpeg_prior(whole.substr(0, whole.size() - 40)),
             "capture/normal/1x/a.png: found a file that is cut short, expected a JPEG image, grey or RGB, of "
             "at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a JPEG in the colours of print", inspect, jpeg_prior(cmyk),
+           {"a JPEG in the colours of print", inspect_capture, jpeg_prior(cmyk),
             "capture/normal/1x/a.png: found the colours of print (CMYK), expected a JPEG image, grey or RGB, "
             "of at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a JPEG with its picture missing", inspect, jpeg_prior(whole.substr(0, 30)),
+           {"a JPEG with its picture missing", inspect_capture, jpeg_prior(whole.substr(0, 30)),
             "capture/normal/1x/a.png: found a file that is cut short, expected a JPEG image, grey or RGB, of "
             "at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"}}};
 }

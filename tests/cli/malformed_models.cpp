@@ -1,13 +1,13 @@
 #include "base/atomic_file.h"
 #include "cli/malformed_cases.h"
 #include "files/safetensors.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::cli {
 
 namespace {
 
-const std::vector<std::string> inspect = {"inspect", "-d", "capture"};
 const std::vector<std::string> trace = {"trace", "scene.ply", "--rays", "rays.npy", "-o", "out"};
 const std::vector<std::string> export_run = {"export", "run", "-o", "out"};
 const std::string rays = "rays.npy", ply = "scene.ply", checkpoint = "run/checkpoint.safetensors";
@@ -28,7 +28,7 @@ std::function<void(Files&)> edit(const std::function<void(Safetensors&)>& change
     Safetensors file = Safetensors::read(path);
     change(file);
     file.write(path);
-    files[checkpoint] = read_bytes(path);
+    files[checkpoint] = bytes_of(path);
   };
 }
 
@@ -72,9 +72,9 @@ MalformedKind malformed_arrays() {
         "rays.npy: found a file that does not start as one, expected a .npy array; save the array again"},
        {"rays of three numbers", trace, put(rays, npy("'<f4'", "(2, 3)", 24)),
         "rays.npy: shape: found 2x3, expected Nx6: origin and direction of each ray"},
-       {"points in the plane", inspect, put(points, npy("'<f4'", "(3, 2)", 24)),
+       {"points in the plane", inspect_capture, put(points, npy("'<f4'", "(3, 2)", 24)),
         "capture/points.npy: shape: found 3x2, expected P×3"},
-       {"priors for another number of views", inspect,
+       {"priors for another number of views", inspect_capture,
         [=](Files& files) {
           files.erase("capture/normal/1x/a.png");
           files["capture/normal.npy"] = npy("'<f4'", "(7, 1, 1, 3)", 84);

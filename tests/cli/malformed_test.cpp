@@ -5,8 +5,9 @@
 #include <fstream>
 
 #include "cli/malformed_cases.h"
-#include "cli/program.h"
+#include "cli/program_call.h"
 #include "cli/terminal/error_boundary.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::cli {
@@ -28,7 +29,7 @@ class Workplace {
     wrong.spoil(files);
     for (const auto& [name, bytes] : files) {
       fs::create_directories((folder_ / name).parent_path());
-      std::ofstream(folder_ / name, std::ios::binary) << bytes;
+      write_bytes(folder_ / name, bytes);
     }
     if (wrong.arrange) wrong.arrange(folder_.path());
     fs::current_path(folder_.path());
@@ -42,7 +43,7 @@ class Workplace {
     Files found;
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder_.path())) {
       std::error_code error;
-      found[entry.path().string()] = entry.is_regular_file(error) ? read_bytes(entry.path()) : "";
+      found[entry.path().string()] = entry.is_regular_file(error) ? bytes_of(entry.path()) : "";
     }
     return found;
   }
@@ -58,22 +59,6 @@ class Workplace {
   TempFolder folder_;
   fs::path before_;
 };
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
-Outcome run_with(const std::vector<std::string>& command) {
-  std::vector<const char*> arguments{"traceflow"};
-  for (const std::string& word : command) arguments.push_back(word.c_str());
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  Outcome result{run(static_cast<int>(arguments.size()), arguments.data()), "", ""};
-  result.out = testing::internal::GetCapturedStdout();
-  result.err = testing::internal::GetCapturedStderr();
-  return result;
-}
 
 TEST(Malformed, InputIsOneLineThatNamesWhatIsWrongAndNothingIsWritten) {
   for (const MalformedKind& kind : all_kinds()) {
@@ -135,7 +120,7 @@ TEST(Malformed, ThePageIsOfTheseCases) {
   const fs::path path = TRACEFLOW_SOURCE_FOLDER "/docs/malformed.md";
   // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes there
   if (std::getenv("TRACEFLOW_WRITE_PAGES") != nullptr) std::ofstream(path) << page();
-  EXPECT_EQ(read_bytes(path), page())
+  EXPECT_EQ(bytes_of(path), page())
       << "run: TRACEFLOW_WRITE_PAGES=1 build/release/test_cli --gtest_filter=Malformed.ThePage*";
 }
 

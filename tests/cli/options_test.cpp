@@ -10,6 +10,7 @@
 #include "cli/arguments/option_page.h"
 #include "cli/arguments/option_toml.h"
 #include "files/options_json.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 #include "train/options.h"
 
@@ -25,16 +26,6 @@ std::filesystem::path toml_file(const std::string& text) {
   return path;
 }
 
-template <class F>
-std::string refusal(F&& f) {
-  try {
-    f();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
-}
-
 TrainOptions parsed(std::vector<std::string> arguments) {
   std::reverse(arguments.begin(), arguments.end());
   CLI::App verb;
@@ -48,7 +39,7 @@ TrainOptions parsed(std::vector<std::string> arguments) {
 std::string toml_refusal(const std::string& text) {
   TrainOptions options;
   const auto path = toml_file(text);
-  std::string message = refusal([&] { options_from_toml(path, option_fields(options)); });
+  std::string message = refusal_of([&] { options_from_toml(path, option_fields(options)); });
   const size_t at = message.find(path.string());
   return at == std::string::npos ? message : message.replace(at, path.string().size(), "FILE");
 }
@@ -87,7 +78,7 @@ TEST(OptionToml, RefusalsNameFileAndLine) {
             "FILE:1: iterations: found a value of type date, expected a whole number");
   EXPECT_EQ(toml_refusal("loss = 3\n").substr(0, 52), "FILE:1: loss: found a group of options, expected one");
   EXPECT_THAT(toml_refusal("a = 1\nb = \n"), HasSubstr("FILE:2"));
-  EXPECT_THAT(refusal([] { options_from_toml("/nowhere.toml", {}); }), HasSubstr("/nowhere.toml"));
+  EXPECT_THAT(refusal_of([] { options_from_toml("/nowhere.toml", {}); }), HasSubstr("/nowhere.toml"));
 }
 
 // The parser walks tables in tables by recursion, and asserts what a table's name begins with.
@@ -144,12 +135,12 @@ TEST(OptionArguments, TheFileComesFirstThenSetThenFlags) {
 }
 
 TEST(OptionArguments, RefusalsNameTheFlag) {
-  EXPECT_EQ(refusal([] {
+  EXPECT_EQ(refusal_of([] {
               parsed({"--iterations", "many"});
             }),
             "--iterations: iterations: found many, expected a whole number");
-  EXPECT_THAT(refusal([] { parsed({"--set", "los.normal=1"}); }), HasSubstr("did you mean loss.normal?"));
-  EXPECT_THAT(refusal([] { parsed({"--set", "loss.normal"}); }), HasSubstr("expected an assignment"));
+  EXPECT_THAT(refusal_of([] { parsed({"--set", "los.normal=1"}); }), HasSubstr("did you mean loss.normal?"));
+  EXPECT_THAT(refusal_of([] { parsed({"--set", "loss.normal"}); }), HasSubstr("expected an assignment"));
 }
 
 struct Switch {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "cli/program.h"
+#include "cli/program_call.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
 #include "files/png.h"
@@ -46,16 +46,9 @@ class Pictures : public testing::Test {
   }
 
   int run_verb(std::vector<std::string> words) {
-    words.insert(words.begin(), "traceflow");
-    std::vector<const char*> arguments;
-    arguments.reserve(words.size());
-    for (const std::string& word : words) arguments.push_back(word.c_str());
-    testing::internal::CaptureStderr();
-    testing::internal::CaptureStdout();
-    const int code = run(static_cast<int>(arguments.size()), arguments.data());
-    testing::internal::GetCapturedStdout();
-    error_ = testing::internal::GetCapturedStderr();
-    return code;
+    Outcome outcome = run_with(std::move(words));
+    error_ = std::move(outcome.err);
+    return outcome.code;
   }
 
   std::filesystem::path folder_ =

@@ -1,4 +1,4 @@
-#include "cli/program.h"
+#include "cli/program_call.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,21 +18,6 @@ namespace traceflow::cli {
 namespace {
 
 using ::testing::HasSubstr;
-
-struct Outcome {
-  int code;
-  std::string out, err;
-};
-
-Outcome run_with(std::vector<const char*> arguments) {
-  arguments.insert(arguments.begin(), "traceflow");
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  Outcome result{run(static_cast<int>(arguments.size()), arguments.data()), "", ""};
-  result.out = testing::internal::GetCapturedStdout();
-  result.err = testing::internal::GetCapturedStderr();
-  return result;
-}
 
 int lines(const std::string& text) { return static_cast<int>(std::count(text.begin(), text.end(), '\n')); }
 
@@ -54,8 +39,8 @@ TEST(Program, HelpNamesEveryVerbAndEveryVerbHasHelp) {
 }
 
 TEST(Program, ArgumentsThatCannotBeUsedAreOneLineAndCode2) {
-  for (const std::vector<const char*>& arguments :
-       std::vector<std::vector<const char*>>{{"fly"},
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"fly"},
                                              {"--threads", "many"},
                                              {"train"},
                                              {"train", "-o", "x", "--no-such-flag"},
@@ -82,12 +67,11 @@ TEST(Program, CudaWhereThereIsNoneIsOneLineAndAutoSaysWhatRuns) {
   surfels.rotation(0, 0) = 1;
   write_ply(ply, {surfels, {}});
   write_npy(rays, Tensor<float>({1, 6}));
-  const Outcome refused =
-      run_with({"trace", ply.c_str(), "--rays", rays.c_str(), "-o", output.c_str(), "--device", "cuda"});
+  const Outcome refused = run_with({"trace", ply, "--rays", rays, "-o", output, "--device", "cuda"});
   EXPECT_EQ(refused.code, exit_input);
   EXPECT_EQ(lines(refused.err), 1) << refused.err;
   EXPECT_THAT(refused.err, HasSubstr("built without CUDA"));
-  const Outcome taken = run_with({"trace", ply.c_str(), "--rays", rays.c_str(), "-o", output.c_str()});
+  const Outcome taken = run_with({"trace", ply, "--rays", rays, "-o", output});
   EXPECT_EQ(taken.code, exit_done);
   EXPECT_THAT(taken.err, HasSubstr("device: cpu, "));
   EXPECT_THAT(taken.err, HasSubstr("no CUDA: this program was built without CUDA"));

@@ -9,10 +9,11 @@
 #include <thread>
 
 #include "capture/synth/synth.h"
-#include "cli/program.h"
+#include "cli/program_call.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/frame_progress.h"
 #include "files/png.h"
+#include "support/file_bytes.h"
 
 // `report`, `eval`'s page and the films of `render`, from a run's folder to the files they leave.
 namespace traceflow::cli {
@@ -28,28 +29,8 @@ const fs::path& folder() {
 }
 std::string path(const std::string& name) { return (folder() / name).string(); }
 
-struct Result {
-  int code;
-  std::string out, error;
-};
-Result run_verb(std::vector<std::string> words) {
-  words.insert(words.begin(), "traceflow");
-  std::vector<const char*> arguments;
-  arguments.reserve(words.size());
-  for (const std::string& word : words) arguments.push_back(word.c_str());
-  testing::internal::CaptureStderr();
-  testing::internal::CaptureStdout();
-  const int code = run(static_cast<int>(arguments.size()), arguments.data());
-  return {code, testing::internal::GetCapturedStdout(), testing::internal::GetCapturedStderr()};
-}
-
-std::string text_of(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 Json data_of(const fs::path& page) {
-  const std::string html = text_of(page), before = R"(id="report">)";
+  const std::string html = bytes_of(page), before = R"(id="report">)";
   const size_t begin = html.find(before) + before.size();
   return Json::parse(html.substr(begin, html.find('<', begin) - begin));
 }
@@ -89,17 +70,17 @@ class See : public testing::Test {
                                       "-q",
                                       "-i"};
     train.emplace_back("11");
-    ASSERT_EQ(run_verb(train).code, exit_done);
+    ASSERT_EQ(run_with(train).code, exit_done);
     train.back() = "14";
     train.emplace_back("--resume");
-    ASSERT_EQ(run_verb(train).code, exit_done);
+    ASSERT_EQ(run_with(train).code, exit_done);
   }
   static void TearDownTestSuite() { fs::remove_all(folder()); }
 };
 
 TEST_F(See, ReportTellsAllThatIsKnownOfTheRun) {
-  const Result made = run_verb({"report", path("run") + "/", "-o", path("pages/page.html")});
-  ASSERT_EQ(made.code, exit_done) << made.error;
+  const Outcome made = run_with({"report", path("run") + "/", "-o", path("pages/page.html")});
+  ASSERT_EQ(made.code, exit_done) << made.err;
   EXPECT_THAT(made.out, HasSubstr("page.html"));
   const Json data = data_of(folder() / "pages/page.html");
   EXPECT_EQ(data["run"], "run");
@@ -142,8 +123,8 @@ TEST_F(See, ReportTellsAllThatIsKnownOfTheRun) {
 }
 
 TEST_F(See, EvalLeavesTheSamePage) {
-  ASSERT_EQ(run_verb({"eval", path("run"), "--layers", "none"}).code, exit_done);
-  ASSERT_EQ(run_verb({"report", path("run")}).code, exit_done);
+  ASSERT_EQ(run_with({"eval", path("run"), "--layers", "none"}).code, exit_done);
+  ASSERT_EQ(run_with({"report", path("run")}).code, exit_done);
   Json eval = data_of(folder() / "run/eval/test/report.html"), report = data_of(folder() / "run/report.html");
   for (Json* page : {&eval, &report}) {
     page->erase("made");
@@ -155,12 +136,12 @@ TEST_F(See, EvalLeavesTheSamePage) {
 TEST_F(See, AReportOfARunWithoutALogHasNoEvents) {
   fs::copy(folder() / "run", folder() / "silent", fs::copy_options::recursive);
   fs::remove(folder() / "silent/log.jsonl");
-  ASSERT_EQ(run_verb({"report", path("silent")}).code, exit_done);
+  ASSERT_EQ(run_with({"report", path("silent")}).code, exit_done);
   EXPECT_TRUE(data_of(folder() / "silent/report.html")["events"].empty());
 }
 
 TEST_F(See, CompareStandsBesideThePhotograph) {
-  ASSERT_EQ(run_verb({"render", path("run"), "--compare", "-o", path("compared")}).code, exit_done);
+  ASSERT_EQ(run_with({"render", path("run"), "--compare", "-o", path("compared")}).code, exit_done);
   const std::set<std::string> names = names_in(folder() / "compared/compare");
   ASSERT_EQ(names.size(), 2U);
   EXPECT_EQ(names, names_in(folder() / "compared/rgb"));
@@ -174,19 +155,19 @@ TEST_F(See, CompareStandsBesideThePhotograph) {
 
 TEST_F(See, AFrozenCameraSeesEveryTimeOnce) {
   for (const std::string& which : {std::string("1"), std::string("000003_right")}) {
-    ASSERT_EQ(run_verb({"render", path("run"), "--freeze-camera", which, "--compare", "-o",
+    ASSERT_EQ(run_with({"render", path("run"), "--freeze-camera", which, "--compare", "-o",
                         path("frozen_" + which)})
                   .code,
               exit_done);
     EXPECT_EQ(names_in(folder() / ("frozen_" + which) / "compare").size(), 5U);
   }
   // The same camera by either name, and the photograph of the fourth time is its own.
-  const auto picture = [](const std::string& name) { return text_of(folder() / name); };
+  const auto picture = [](const std::string& name) { return bytes_of(folder() / name); };
   EXPECT_EQ(picture("frozen_1/compare/00003.png"), picture("frozen_000003_right/compare/00003.png"));
-  ASSERT_EQ(run_verb({"render", path("run"), "--compare", "-o", path("own")}).code, exit_done);
+  ASSERT_EQ(run_with({"render", path("run"), "--compare", "-o", path("own")}).code, exit_done);
   EXPECT_EQ(picture("frozen_1/compare/00003.png"), picture("own/compare/000003_right.png"));
 
-  ASSERT_EQ(run_verb({"render", path("run"), "--freeze-camera", "0", "--frames", "3", "--size", "20x12", "-o",
+  ASSERT_EQ(run_with({"render", path("run"), "--freeze-camera", "0", "--frames", "3", "--size", "20x12", "-o",
                       path("three")})
                 .code,
             exit_done);
@@ -203,8 +184,8 @@ TEST_F(See, PathsOfEveryKind) {
   const auto frames = [](std::vector<std::string> flags) {
     fs::remove_all(folder() / "path");
     flags.insert(flags.begin(), {"render", path("run"), "-o", path("path")});
-    const Result made = run_verb(flags);
-    EXPECT_EQ(made.code, exit_done) << made.error;
+    const Outcome made = run_with(flags);
+    EXPECT_EQ(made.code, exit_done) << made.err;
     return names_in(folder() / "path/rgb").size();
   };
   const auto shape = [] { return read_png(folder() / "path/rgb/00000.png").shape(); };
@@ -241,15 +222,15 @@ TEST_F(See, FlagsThatContradictEachOtherAreRefusedInWords) {
   };
   for (auto [words, part] : cases) {
     words.insert(words.begin(), {"render", path("run"), "-o", path("refused")});
-    const Result refused = run_verb(words);
+    const Outcome refused = run_with(words);
     EXPECT_EQ(refused.code, exit_input) << part;
-    EXPECT_THAT(refused.error, HasSubstr(part));
-    EXPECT_EQ(std::count(refused.error.begin(), refused.error.end(), '\n'), 1) << refused.error;
+    EXPECT_THAT(refused.err, HasSubstr(part));
+    EXPECT_EQ(std::count(refused.err.begin(), refused.err.end(), '\n'), 1) << refused.err;
   }
   EXPECT_FALSE(fs::exists(folder() / "refused"));
-  const Result directory = run_verb({"report", path("run"), "-o", path("run")});
+  const Outcome directory = run_with({"report", path("run"), "-o", path("run")});
   EXPECT_EQ(directory.code, exit_input);
-  EXPECT_THAT(directory.error, HasSubstr("a folder"));
+  EXPECT_THAT(directory.err, HasSubstr("a folder"));
 }
 
 TEST_F(See, CtrlCEndsTheWorkAndSaysWhatThereIs) {
@@ -257,23 +238,23 @@ TEST_F(See, CtrlCEndsTheWorkAndSaysWhatThereIs) {
     while (!fs::exists(folder() / "stopped/rgb/00001.png")) std::this_thread::yield();
     std::raise(SIGINT);
   });
-  const Result stopped = run_verb(
+  const Outcome stopped = run_with(
       {"render", path("run"), "--orbit", "--frames", "20000", "--size", "8x8", "-o", path("stopped")});
   other.join();
   EXPECT_EQ(stopped.code, exit_interrupted);
-  EXPECT_THAT(stopped.error, HasSubstr("stopped after "));
-  EXPECT_THAT(stopped.error, HasSubstr(" of 20000 frames: " + path("stopped")));
+  EXPECT_THAT(stopped.err, HasSubstr("stopped after "));
+  EXPECT_THAT(stopped.err, HasSubstr(" of 20000 frames: " + path("stopped")));
 }
 
 TEST_F(See, AFilmIsMadeWhereFfmpegIs) {
-  const Result made =
-      run_verb({"render", path("run"), "--spiral", "--frames", "3", "--video", path("films/a.mp4")});
+  const Outcome made =
+      run_with({"render", path("run"), "--spiral", "--frames", "3", "--video", path("films/a.mp4")});
   if (made.code == exit_input) {
-    EXPECT_THAT(made.error, HasSubstr("ffmpeg"));
-    GTEST_SKIP() << made.error;
+    EXPECT_THAT(made.err, HasSubstr("ffmpeg"));
+    GTEST_SKIP() << made.err;
   }
-  ASSERT_EQ(made.code, exit_done) << made.error;
-  EXPECT_THAT(text_of(folder() / "films/a.mp4").substr(0, 12), HasSubstr("ftyp"));
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  EXPECT_THAT(bytes_of(folder() / "films/a.mp4").substr(0, 12), HasSubstr("ftyp"));
 }
 
 TEST(FrameProgress, TellsRateAndWhatIsLeft) {

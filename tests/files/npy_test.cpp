@@ -4,23 +4,15 @@
 #include <rapidcheck/gtest.h>
 
 #include <cstring>
-#include <fstream>
 
 #include "base/error.h"
 #include "base/random.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 #include "support/zip_writer.h"
 
 namespace traceflow {
 namespace {
-
-void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
-}
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // A .npy as numpy writes it, byte by byte.
 std::string npy(const std::string& dictionary, const std::string& data, int version = 1) {

@@ -7,6 +7,8 @@
 #include <array>
 #include <bit>
 
+#include "support/refusal.h"
+
 namespace traceflow {
 namespace {
 
@@ -49,14 +51,9 @@ struct Settings {
   }
 };
 
-std::string refusal(const std::string& text) {
+std::string options_refusal(const std::string& text) {
   Settings settings;
-  try {
-    options_from_json(text, option_fields(settings), "state.safetensors");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return refusal_of([&] { options_from_json(text, option_fields(settings), "state.safetensors"); });
 }
 
 TEST(OptionsJson, KeepsOrderGroupsAndShortNumbers) {
@@ -74,16 +71,16 @@ TEST(OptionsJson, ReadsWhatIsNamedAndLeavesTheRest) {
 }
 
 TEST(OptionsJson, RefusalsNameFilePathAndValue) {
-  EXPECT_EQ(refusal(R"({"inner":{"rate":"fast"}})"),
+  EXPECT_EQ(options_refusal(R"({"inner":{"rate":"fast"}})"),
             "state.safetensors: inner.rate: found fast, expected a number");
-  EXPECT_EQ(refusal(R"({"on":null})"), "state.safetensors: on: found null, expected true or false");
-  EXPECT_THAT(refusal(R"({"inner":{"rates":1}})"), HasSubstr("did you mean inner.rate?"));
-  EXPECT_THAT(refusal(R"({"inner":1})"), HasSubstr("a group of options"));
-  EXPECT_THAT(refusal(R"({"count":18446744073709551615})"), HasSubstr("found 18446744073709551615"));
-  EXPECT_THAT(refusal(R"({"inner":{"tone":[1,"a",2]}})"), HasSubstr("three numbers"));
-  EXPECT_THAT(refusal("[1]"), HasSubstr("no object"));
-  EXPECT_THAT(refusal("{"), HasSubstr("not JSON"));
-  EXPECT_THAT(refusal(std::string(1'000'000, '[')), HasSubstr("nested too deep"));
+  EXPECT_EQ(options_refusal(R"({"on":null})"), "state.safetensors: on: found null, expected true or false");
+  EXPECT_THAT(options_refusal(R"({"inner":{"rates":1}})"), HasSubstr("did you mean inner.rate?"));
+  EXPECT_THAT(options_refusal(R"({"inner":1})"), HasSubstr("a group of options"));
+  EXPECT_THAT(options_refusal(R"({"count":18446744073709551615})"), HasSubstr("found 18446744073709551615"));
+  EXPECT_THAT(options_refusal(R"({"inner":{"tone":[1,"a",2]}})"), HasSubstr("three numbers"));
+  EXPECT_THAT(options_refusal("[1]"), HasSubstr("no object"));
+  EXPECT_THAT(options_refusal("{"), HasSubstr("not JSON"));
+  EXPECT_THAT(options_refusal(std::string(1'000'000, '[')), HasSubstr("nested too deep"));
 }
 
 RC_GTEST_PROP(OptionsJsonProperty, EveryValueSurvives,

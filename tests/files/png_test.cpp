@@ -8,11 +8,11 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <limits>
 
 #include "base/error.h"
 #include "base/random.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -28,14 +28,6 @@ Tensor<uint8_t> random_pixels(const Shape& shape, uint64_t seed) {
 void expect_equal(const Tensor<uint8_t>& a, const Tensor<uint8_t>& b) {
   ASSERT_EQ(a.shape(), b.shape());
   EXPECT_TRUE(std::equal(a.data(), a.data() + a.size(), b.data()));
-}
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-void write_bytes(const std::filesystem::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
 }
 
 // A file written by libpng directly, for kinds that write_png does not make.

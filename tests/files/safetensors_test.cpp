@@ -6,10 +6,11 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
 
 #include "files/half.h"
+#include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -22,15 +23,6 @@ std::filesystem::path scratch(const std::string& name) {
   return folder / (name + ".safetensors");
 }
 
-std::string contents(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-void put(const std::filesystem::path& path, const std::string& bytes) {
-  std::ofstream(path, std::ios::binary) << bytes;
-}
-
 // A file with the given header text and data, its length field right.
 std::string file_bytes(const std::string& header, const std::string& data) {
   std::string bytes(8, '\0');
@@ -41,13 +33,8 @@ std::string file_bytes(const std::string& header, const std::string& data) {
 // What() of the InputError that reading these bytes must end in.
 std::string refusal(const std::string& bytes) {
   const auto path = scratch("hostile");
-  put(path, bytes);
-  try {
-    Safetensors::read(path);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  write_bytes(path, bytes);
+  return refusal_of([&] { Safetensors::read(path); });
 }
 
 template <class T>
@@ -97,7 +84,7 @@ TEST(Safetensors, WritesTheDocumentedLayout) {
       R"("b":{"data_offsets":[0,8],"dtype":"F32","shape":[1,2]}})";
   header.resize((header.size() + 7) / 8 * 8, ' ');
   const std::string data("\x00\x00\xC0\x3F\x00\x00\x00\xC0\x01\x02\x03", 11);
-  EXPECT_EQ(contents(path), file_bytes(header, data));
+  EXPECT_EQ(bytes_of(path), file_bytes(header, data));
 }
 
 TEST(Safetensors, KeepsEveryTypeShapeAndBit) {
@@ -126,10 +113,10 @@ TEST(Safetensors, KeepsEveryTypeShapeAndBit) {
 
 TEST(Safetensors, WidensHalvesAndReadsScalars) {
   const auto path = scratch("halves");
-  put(path, file_bytes(R"({"h":{"dtype":"F16","shape":[2],"data_offsets":[0,4]},)"
-                       R"("b":{"dtype":"BF16","shape":[1],"data_offsets":[4,6]},)"
-                       R"("s":{"dtype":"F32","shape":[],"data_offsets":[6,10]}})",
-                       std::string("\x00\x3C\x00\xC0\x80\x3F\x00\x00\x80\x3F", 10)));
+  write_bytes(path, file_bytes(R"({"h":{"dtype":"F16","shape":[2],"data_offsets":[0,4]},)"
+                               R"("b":{"dtype":"BF16","shape":[1],"data_offsets":[4,6]},)"
+                               R"("s":{"dtype":"F32","shape":[],"data_offsets":[6,10]}})",
+                               std::string("\x00\x3C\x00\xC0\x80\x3F\x00\x00\x80\x3F", 10)));
   const Safetensors file = Safetensors::read(path);
   EXPECT_TRUE(same_bytes(file.tensor<float>("h"), tensor_of<float>({2}, {1, -2})));
   EXPECT_TRUE(same_bytes(file.tensor<float>("b"), tensor_of<float>({1}, {1})));
@@ -144,14 +131,7 @@ TEST(Safetensors, NamesTheTensorThatIsMissingOrOfAnotherType) {
   const Safetensors back = Safetensors::read(path);
   EXPECT_TRUE(back.has("weight"));
   EXPECT_FALSE(back.has("bias"));
-  const auto message = [](auto&& f) -> std::string {
-    try {
-      f();
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
+  const auto message = [](auto&& f) -> std::string { return refusal_of([&] { f(); }); };
   EXPECT_THAT(message([&] { back.tensor<float>("bias"); }), HasSubstr(path.string() + ": tensor bias"));
   EXPECT_THAT(message([&] { back.tensor<double>("weight"); }), HasSubstr("found type F32, expected F64"));
 }
@@ -235,7 +215,7 @@ TEST(Safetensors, ADamagedSectionIsRefusedByItsName) {
   const auto path = scratch("sound");
   file.write(path);
   EXPECT_TRUE(Safetensors::read(path).has_checksums());
-  const std::string bytes = contents(path);
+  const std::string bytes = bytes_of(path);
   const size_t data = bytes.size() - 19;
   for (size_t at = data; at < bytes.size(); ++at) {
     const std::string tensor = at < data + 16 ? "tensor scene/position" : "tensor scene/seen";
@@ -266,18 +246,18 @@ TEST(Safetensors, NoBitFlipChangesWhatIsRead) {
   file.add("b", tensor_of<uint8_t>({3}, {7, 8, 9}));
   const auto path = scratch("flips"), again = scratch("again");
   file.write(path);
-  const std::string bytes = contents(path);
+  const std::string bytes = bytes_of(path);
   for (size_t at = 0; at < bytes.size(); ++at) {
     for (int bit = 0; bit < 8; ++bit) {
       std::string changed = bytes;
       changed[at] = static_cast<char>(changed[at] ^ (1 << bit));
-      put(path, changed);
+      write_bytes(path, changed);
       try {
         const Safetensors back = Safetensors::read(path);
         if (!back.has_checksums())
           continue;  // the name of the checksums' entry: what needs them refuses this
         back.write(again);
-        EXPECT_EQ(contents(again), bytes) << "byte " << at << ", bit " << bit;
+        EXPECT_EQ(bytes_of(again), bytes) << "byte " << at << ", bit " << bit;
       } catch (const InputError&) {
       }
     }
@@ -286,7 +266,8 @@ TEST(Safetensors, NoBitFlipChangesWhatIsRead) {
 
 TEST(Safetensors, FilesWithoutChecksumsAreRead) {
   const auto path = scratch("foreign");
-  put(path,
+  write_bytes(
+      path,
       file_bytes(R"({"__metadata__":{"k":"v"},"b":{"dtype":"U8","shape":[1],"data_offsets":[0,1]}})", "x"));
   const Safetensors file = Safetensors::read(path);
   EXPECT_FALSE(file.has_checksums());
@@ -342,8 +323,8 @@ RC_GTEST_PROP(SafetensorsProperty, RoundTripKeepsBytesAndIsStable, ()) {
   back.write(second);
   RC_ASSERT(back.names() == file.names());
   RC_ASSERT(back.metadata == file.metadata);
-  RC_ASSERT(contents(first) == contents(second));
-  RC_ASSERT(contents(first)[0] % 8 == 0);
+  RC_ASSERT(bytes_of(first) == bytes_of(second));
+  RC_ASSERT(bytes_of(first)[0] % 8 == 0);
 }
 
 RC_GTEST_PROP(SafetensorsProperty, DamagedFilesAreReadOrRefusedButNeverCrash, ()) {
@@ -353,12 +334,12 @@ RC_GTEST_PROP(SafetensorsProperty, DamagedFilesAreReadOrRefusedButNeverCrash, ()
   file.add("b", tensor_of<uint8_t>({3}, {7, 8, 9}));
   const auto path = scratch("damaged");
   file.write(path);
-  std::string bytes = contents(path);
+  std::string bytes = bytes_of(path);
   const auto changes = *rc::gen::inRange(1, 4);
   for (int i = 0; i < changes; ++i)
     bytes[*rc::gen::inRange<size_t>(0, bytes.size())] = *rc::gen::arbitrary<char>();
   if (*rc::gen::arbitrary<bool>()) bytes.resize(*rc::gen::inRange<size_t>(0, bytes.size()));
-  put(path, bytes);
+  write_bytes(path, bytes);
   try {
     const Safetensors back = Safetensors::read(path);
     for (const std::string& name : back.names()) RC_ASSERT(back.has(name));

@@ -3,6 +3,7 @@
 
 #include "fuzz/scratch_file.h"
 #include "scene/ply.h"
+#include "support/file_bytes.h"
 
 using namespace traceflow;
 using fuzz::promise;
@@ -32,8 +33,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   write_ply(again, scene);
   const PlyScene read = read_ply(again);
   promise(read.notes == scene.notes, "notes are kept");
-  const std::string bytes = fuzz::read_all(again);
+  const std::string bytes = bytes_of(again);
   write_ply(again, read);
-  promise(fuzz::read_all(again) == bytes, "what is written reads back");
+  promise(bytes_of(again) == bytes, "what is written reads back");
   return 0;
 }

@@ -3,6 +3,7 @@
 
 #include "fuzz/scratch_file.h"
 #include "scene/scene_file.h"
+#include "support/file_bytes.h"
 
 using namespace traceflow;
 using fuzz::promise;
@@ -72,11 +73,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   check_tensors(file, size);
   const auto again = folder.path() / "b.safetensors";
   file.write(again);
-  const std::string bytes = fuzz::read_all(again);
+  const std::string bytes = bytes_of(again);
   const Safetensors read = Safetensors::read(again);
   promise(read.metadata == file.metadata && read.names() == file.names(), "what is written reads back");
   read.write(again);
-  promise(fuzz::read_all(again) == bytes, "equal contents are equal bytes");
+  promise(bytes_of(again) == bytes, "equal contents are equal bytes");
 
   Scene scene;
   if (!fuzz::accepts(path.string(), [&] { scene = get_scene(file); })) return 0;
@@ -85,8 +86,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   put_scene(scene, put);
   put_scene(get_scene(put), twice);
   put.write(again);
-  const std::string once = fuzz::read_all(again);
+  const std::string once = bytes_of(again);
   twice.write(again);
-  promise(fuzz::read_all(again) == once, "a scene that is kept is the same scene");
+  promise(bytes_of(again) == once, "a scene that is kept is the same scene");
   return 0;
 }

@@ -2,13 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include "base/random.h"
 #include "math/finite_differences.h"
+#include "math/random_vector.h"
 
 namespace traceflow {
 namespace {
-
-Vec3<double> random_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 // The wall z = 3 before a camera at the origin: x(right) − x(left) points right, x(below) − x(above) down.
 TEST(PseudoNormal, FacesTheCamera) {

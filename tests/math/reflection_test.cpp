@@ -4,13 +4,11 @@
 
 #include <limits>
 
-#include "base/random.h"
 #include "math/finite_differences.h"
+#include "math/random_vector.h"
 
 namespace traceflow {
 namespace {
-
-Vec3<double> random_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 TEST(Reflection, OfARayThatMeetsAFloor) {
   EXPECT_LT(

@@ -2,15 +2,13 @@
 
 #include <gtest/gtest.h>
 
-#include "base/random.h"
 #include "math/finite_differences.h"
+#include "math/random_vector.h"
 #include "math/rotation.h"
 #include "math/surfel_projection.h"
 
 namespace traceflow {
 namespace {
-
-Vec3<double> random_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
 SurfelFrame<double> random_frame(Random& random) {
   return {random_vector(random),

@@ -11,12 +11,13 @@
 #include <sstream>
 #include <thread>
 
-#include "base/error.h"
 #include "base/folder_lock.h"
 #include "capture/capture.h"
 #include "capture/synth/synth.h"
 #include "files/eight_bit.h"
 #include "files/png.h"
+#include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 // The whole of `prepare`, with small scripts in the place of ffmpeg and colmap that give out what was
@@ -170,12 +171,7 @@ class PrepareTest : public testing::Test {
         film(), capture(), options, [this](const std::string& line) { lines_.push_back(line); }, stop_);
   }
   std::string refusal(const PrepareOptions& options) {
-    try {
-      prepare(options);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return refusal_of([&] { prepare(options); });
   }
   // Which programs were called: "ffmpeg pgm", "colmap mapper".
   std::vector<std::string> calls() const {
@@ -243,8 +239,7 @@ TEST_F(PrepareTest, EstimatesMasksAndKeepsFeaturesOffThem) {
   estimate.masks = "estimate";
   ASSERT_TRUE(prepare(estimate));
   EXPECT_TRUE(load_capture(capture(), {}).has_masks);
-  std::ifstream calls(folder_ / "calls");
-  const std::string text{std::istreambuf_iterator<char>(calls), {}};
+  const std::string text = bytes_of(folder_ / "calls");
   const fs::path masks = work_folder(capture()) / "colmap/masks";
   EXPECT_THAT(text, HasSubstr("--ImageReader.mask_path " + masks.string()));
   EXPECT_EQ(read_png_size(masks / "000000.png.png").width, 64);

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "base/random.h"
+#include "support/refusal.h"
 
 namespace traceflow {
 namespace {
@@ -33,12 +34,7 @@ class Ply : public testing::Test {
   }
   // The message of the InputError that reading the file throws; empty when it throws none.
   std::string refusal() const {
-    try {
-      read_ply(file_);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return refusal_of([&] { read_ply(file_); });
   }
 
   std::filesystem::path folder_, file_;
@@ -232,7 +228,7 @@ TEST_F(Ply, EveryTruncationAndEveryFlippedHeaderByteIsReadOrRefusedButNeverMore)
   const std::string good = file_of(degree_0, 2);
   for (size_t n = 0; n < good.size(); ++n) {
     write(good.substr(0, n));
-    EXPECT_NE(refusal(), "") << n;
+    EXPECT_NE(refusal(), "accepted") << n;
   }
   for (size_t i = 0; i < good.find("end_header"); ++i) {
     std::string text = good;

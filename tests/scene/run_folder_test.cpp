@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -33,13 +34,10 @@ void flip_last_byte(const fs::path& path) {
 }
 
 std::string refusal(const RunFolder& run) {
-  try {
+  return refusal_of([&] {
     std::string note;
     read_checkpoint(run, note);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  });
 }
 
 class RunFolderTest : public testing::Test {

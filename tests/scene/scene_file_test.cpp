@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "scene/rows.h"
+#include "support/refusal.h"
 
 namespace traceflow {
 namespace {
@@ -111,12 +112,7 @@ std::string refusal(const std::string& pointer, const nlohmann::json& value) {
   nlohmann::json json = nlohmann::json::parse(file.metadata["scene"]);
   json[nlohmann::json::json_pointer(pointer)] = value;
   file.metadata["scene"] = json.dump();
-  try {
-    get_scene(file);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return refusal_of([&] { get_scene(file); });
 }
 
 TEST(SceneFile, MetadataThatPromisesWhatIsNotThereIsRefusedBeforeMemoryIsTaken) {

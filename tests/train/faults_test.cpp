@@ -5,6 +5,8 @@
 
 #include "train/small_run.h"
 
+#include "support/file_bytes.h"
+
 // What happens to a training when the disk refuses and when photographs vanish (docs/faults.md). The program
 // as a whole: tests/cli/faults.
 namespace traceflow {
@@ -102,14 +104,13 @@ TEST(TrainingFaults, ACheckpointOfAnEarlierVersionIsResumed) {
   }
   // The same file without its checksums and of version 1: both stand in the header alone.
   const RunFolder folder{run};
-  std::ifstream in(folder.checkpoint(), std::ios::binary);
-  std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  std::string bytes = bytes_of(folder.checkpoint());
   const size_t name = bytes.find("traceflow.crc32"), version = bytes.find(R"("version":"2")");
   ASSERT_NE(name, std::string::npos);
   ASSERT_NE(version, std::string::npos);
   bytes[name] = 'T';
   bytes[version + 11] = '1';
-  std::ofstream(folder.checkpoint(), std::ios::binary) << bytes;
+  write_bytes(folder.checkpoint(), bytes);
   ASSERT_FALSE(Safetensors::read(folder.checkpoint()).has_checksums());
 
   Trainer resumed(options, load_capture(capture_folder(), options.capture), run);

@@ -10,24 +10,20 @@
 
 #include "support/temp_folder.h"
 #include "train/event_log.h"
+#include "train/log_lines.h"
 
 namespace traceflow {
 namespace {
 
-std::string line(const events::Event& event) { return to_json_line(event) + "\n"; }
+using testing::log_line;
+using testing::start_line;
 
 std::string step_line(int64_t iteration, const std::string& phase = "diffuse") {
   events::Step step;
   step.iteration = iteration;
   step.phase = phase;
   step.seconds = 0.5 * static_cast<double>(iteration);
-  return line(step);
-}
-
-std::string start_line(int64_t iteration) {
-  events::Started start;
-  start.iteration = iteration;
-  return line(start);
+  return log_line(step);
 }
 
 std::vector<LoggedEvent> read(const std::string& text) {
@@ -44,27 +40,27 @@ std::string told(const std::vector<LoggedEvent>& events) {
 }
 
 TEST(LogHistory, AResumedRunGoesBackToItsCheckpoint) {
-  const std::string first = start_line(0) + line(events::PhaseEntered{0, "diffuse"}) + step_line(1) +
-                            step_line(2) + line(events::Measured{2, "diffuse", 2, {}}) +
-                            line(events::Saved{2, "c", 1}) + line(events::PhaseEntered{2, "joint"}) +
+  const std::string first = start_line(0) + log_line(events::PhaseEntered{0, "diffuse"}) + step_line(1) +
+                            step_line(2) + log_line(events::Measured{2, "diffuse", 2, {}}) +
+                            log_line(events::Saved{2, "c", 1}) + log_line(events::PhaseEntered{2, "joint"}) +
                             step_line(3, "joint") +
-                            line(events::Finished{events::Ending::diverged, 2, 1, 2, {}, "why"});
-  const std::string second = start_line(2) + line(events::PhaseEntered{2, "joint"}) + step_line(3, "joint") +
-                             step_line(4, "joint") + line(events::Finished{});
+                            log_line(events::Finished{events::Ending::diverged, 2, 1, 2, {}, "why"});
+  const std::string second = start_line(2) + log_line(events::PhaseEntered{2, "joint"}) +
+                             step_line(3, "joint") + step_line(4, "joint") + log_line(events::Finished{});
   EXPECT_EQ(told(read(first + second)),
             "started 0, phase_entered 0, step 1, step 2, measured 2, saved 2, started 2, phase_entered 2, "
             "step 3, step 4, finished 0");
 }
 
 TEST(LogHistory, ARunBegunAnewDropsWhatCameBefore) {
-  EXPECT_EQ(told(read(start_line(0) + line(events::Warning{0, "w"}) + step_line(1) + start_line(0) +
-                      line(events::Warning{0, "w"}) + step_line(1))),
+  EXPECT_EQ(told(read(start_line(0) + log_line(events::Warning{0, "w"}) + step_line(1) + start_line(0) +
+                      log_line(events::Warning{0, "w"}) + step_line(1))),
             "started 0, warning 0, step 1");
 }
 
 TEST(LogHistory, WarningsOfEverySessionAreToldOnce) {
-  EXPECT_EQ(told(read(start_line(0) + line(events::Warning{0, "a"}) + step_line(5) + start_line(5) +
-                      line(events::Warning{5, "a"}) + line(events::Warning{5, "b"}))),
+  EXPECT_EQ(told(read(start_line(0) + log_line(events::Warning{0, "a"}) + step_line(5) + start_line(5) +
+                      log_line(events::Warning{5, "a"}) + log_line(events::Warning{5, "b"}))),
             "started 0, warning 0, step 5, started 5, warning 5");
 }
 
@@ -154,11 +150,11 @@ RC_GTEST_PROP(LogHistory, thinning_keeps_first_last_and_all_that_is_no_step, ())
 
 TEST(LogHistory, PhasesAddUpTimeAndSteps) {
   const std::string text =
-      start_line(0) + line(events::PhaseEntered{0, "diffuse"}) + step_line(10) + step_line(20) +
-      line(events::Measured{25, "diffuse", 25, {{"raster", 50, 4}, {"loss", 25, 5}}}) +
-      line(events::PhaseEntered{25, "joint"}) + step_line(30, "joint") +
-      line(events::Measured{30, "joint", 5, {{"trace", 5, 1}}}) + step_line(40, "joint") +
-      line(events::Measured{40, "joint", 1, {{"trace", 1, 0.25}, {"raster", 2, 4}}});
+      start_line(0) + log_line(events::PhaseEntered{0, "diffuse"}) + step_line(10) + step_line(20) +
+      log_line(events::Measured{25, "diffuse", 25, {{"raster", 50, 4}, {"loss", 25, 5}}}) +
+      log_line(events::PhaseEntered{25, "joint"}) + step_line(30, "joint") +
+      log_line(events::Measured{30, "joint", 5, {{"trace", 5, 1}}}) + step_line(40, "joint") +
+      log_line(events::Measured{40, "joint", 1, {{"trace", 1, 0.25}, {"raster", 2, 4}}});
   const auto phases = phases_of(read(text));
   ASSERT_EQ(phases.size(), 2U);
   EXPECT_EQ(phases[0].name, "diffuse");

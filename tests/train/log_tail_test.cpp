@@ -7,21 +7,19 @@
 
 #include "support/temp_folder.h"
 #include "train/event_log.h"
+#include "train/log_lines.h"
 
 namespace traceflow {
 namespace {
 
-std::string step_line(int64_t iteration, double loss = 0) {
+using testing::log_line;
+using testing::start_line;
+
+std::string loss_line(int64_t iteration, double loss = 0) {
   events::Step step;
   step.iteration = iteration;
   step.loss = loss;
-  return to_json_line(step) + "\n";
-}
-
-std::string start_line(int64_t iteration) {
-  events::Started start;
-  start.iteration = iteration;
-  return to_json_line(start) + "\n";
+  return log_line(step);
 }
 
 // A log, one who follows it, and what that one knows.
@@ -50,17 +48,17 @@ struct Followed {
 TEST(LogTail, TellsWhatCameSince) {
   Followed log;
   EXPECT_EQ(log.next(), "");
-  log.write(start_line(0) + step_line(1));
+  log.write(start_line(0) + loss_line(1));
   EXPECT_EQ(log.next(), "new started 0 step 1");
   EXPECT_EQ(log.next(), "");
-  log.write(step_line(2) + step_line(3));
+  log.write(loss_line(2) + loss_line(3));
   EXPECT_EQ(log.next(), "step 2 step 3");
 }
 
 TEST(LogTail, ALineIsToldWhenItIsWhole) {
   Followed log;
-  const std::string line = step_line(2);
-  log.write(step_line(1) + line.substr(0, 20));
+  const std::string line = loss_line(2);
+  log.write(loss_line(1) + line.substr(0, 20));
   EXPECT_EQ(log.next(), "new step 1");
   log.write(line.substr(20, line.size() - 21));
   EXPECT_EQ(log.next(), "") << "all but its end is there";
@@ -70,24 +68,24 @@ TEST(LogTail, ALineIsToldWhenItIsWhole) {
 
 TEST(LogTail, AResumedRunIsToldAnew) {
   Followed log;
-  log.write(start_line(0) + step_line(1) + step_line(2) + step_line(3));
+  log.write(start_line(0) + loss_line(1) + loss_line(2) + loss_line(3));
   log.next();
-  log.write(start_line(2) + step_line(3));
+  log.write(start_line(2) + loss_line(3));
   EXPECT_EQ(log.next(), "new started 0 step 1 step 2 started 2 step 3");
-  log.write(step_line(4));
+  log.write(loss_line(4));
   EXPECT_EQ(log.next(), "step 4");
   // Its start is damaged: the steps tell.
-  log.write("{\"event\":\"star\n" + step_line(4, 0.5));
+  log.write("{\"event\":\"star\n" + loss_line(4, 0.5));
   EXPECT_EQ(log.next(), "new started 0 step 1 step 2 started 2 step 3 step 4");
 }
 
 TEST(LogTail, AnotherFileIsToldAnew) {
   Followed log;
-  log.write(step_line(1) + step_line(2) + step_line(3));
+  log.write(loss_line(1) + loss_line(2) + loss_line(3));
   log.next();
-  log.write(step_line(1), std::ios::trunc);
+  log.write(loss_line(1), std::ios::trunc);
   EXPECT_EQ(log.next(), "new step 1") << "shorter";
-  log.write(step_line(1, 0.25) + step_line(2), std::ios::trunc);
+  log.write(loss_line(1, 0.25) + loss_line(2), std::ios::trunc);
   EXPECT_EQ(log.next(), "new step 1 step 2") << "longer, and no continuation";
   log.write("", std::ios::trunc);
   EXPECT_EQ(log.next(), "new") << "empty";
@@ -95,20 +93,20 @@ TEST(LogTail, AnotherFileIsToldAnew) {
 
 TEST(LogTail, AFileThatWasAwayGoesOn) {
   Followed log;
-  log.write(step_line(1));
+  log.write(loss_line(1));
   log.next();
   std::filesystem::rename(log.path, log.folder / "away");
   EXPECT_EQ(log.next(), "");
   std::filesystem::rename(log.folder / "away", log.path);
-  log.write(step_line(2));
+  log.write(loss_line(2));
   EXPECT_EQ(log.next(), "step 2");
 }
 
 TEST(LogTail, DamagedLinesAreLeftOut) {
   Followed log;
-  log.write(step_line(1));
+  log.write(loss_line(1));
   log.next();
-  log.write("\n[]\n\xff\n" + std::string(2000, '[') + "\n" + step_line(2));
+  log.write("\n[]\n\xff\n" + std::string(2000, '[') + "\n" + loss_line(2));
   EXPECT_EQ(log.next(), "step 2");
 }
 
@@ -118,7 +116,7 @@ RC_GTEST_PROP(LogTail, knows_what_read_log_knows, ()) {
   int64_t at = 0;
   for (int session = *rc::gen::inRange(0, 4); session >= 0; --session) {
     const int64_t stop = at + *rc::gen::inRange(0, 12);
-    for (int64_t i = at + 1; i <= stop; ++i) text += step_line(i, static_cast<double>(session));
+    for (int64_t i = at + 1; i <= stop; ++i) text += loss_line(i, static_cast<double>(session));
     at = *rc::gen::inRange<int64_t>(at, stop + 1);
     if (session > 0) text += start_line(at);
   }

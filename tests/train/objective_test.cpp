@@ -8,6 +8,7 @@
 
 #include "support/gradients.h"
 #include "support/narrow_lpips.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -70,12 +71,7 @@ TEST(Objective, WithoutItsNetworkTheImageHasNoPerceptualTerm) {
 }
 
 std::string refusal(const LossOptions& options, const Capture& capture) {
-  try {
-    perceptual_network(options, capture);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  return refusal_of([&] { perceptual_network(options, capture); });
 }
 
 TEST(PerceptualNetwork, IsReadWhereItHasAWeightAndRefusedByName) {

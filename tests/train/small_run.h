@@ -4,10 +4,10 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "capture/synth/synth.h"
 #include "scene/scene_file.h"
+#include "support/file_bytes.h"
 #include "train/trainer.h"
 
 // A training run that takes a moment, for the tests of training as a whole.
@@ -76,8 +76,7 @@ inline std::string scene_bytes(const Scene& scene) {
   put_scene(scene, file);
   const fs::path path = fs::path(::testing::TempDir()) / ("scene_" + std::to_string(::getpid()));
   file.write(path);
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
+  return bytes_of(path);
 }
 
 inline const std::atomic<bool> never{false};

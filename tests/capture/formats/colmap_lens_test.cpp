@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
 #include "base/random.h"
+#include "support/refusal.h"
 
 namespace traceflow {
 namespace {
@@ -149,12 +149,9 @@ TEST(ColmapLens, models_are_found_by_number_and_by_name) {
 }
 
 std::string refusal(const std::string& name, const Numbers& parameters, double width = 64) {
-  try {
+  return refusal_of([&] {
     colmap_lens(*find_colmap_lens_model(name), parameters, width, 48, "cameras.bin", "cameras[7]");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  });
 }
 
 TEST(ColmapLens, what_no_lens_can_be_is_refused_by_name) {

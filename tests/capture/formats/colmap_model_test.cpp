@@ -6,8 +6,8 @@
 #include <cmath>
 #include <functional>
 
-#include "base/error.h"
 #include "support/colmap_writer.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -69,12 +69,7 @@ ColmapModel read(const TempFolder& folder) {
 }
 
 std::string refusal(const TempFolder& folder) {
-  try {
-    read(folder);
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return refusal_of([&] { read(folder); });
 }
 
 TEST(ColmapModel, binary_and_text_say_the_same) {

@@ -8,6 +8,7 @@
 #include "capture/synth/synth.h"
 #include "files/npy.h"
 #include "files/png.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -24,13 +25,6 @@ SynthOptions tiny_options() {
   options.samples = 2;
   options.points = 50;
   return options;
-}
-
-std::string bytes_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
 }
 
 Json json_of(const fs::path& path) { return Json::parse(bytes_of(path)); }

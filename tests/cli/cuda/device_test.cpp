@@ -2,14 +2,14 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "capture/synth/synth.h"
-#include "cli/program.h"
+#include "cli/program_call.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "support/device.h"
+#include "support/file_bytes.h"
 
 // The verbs with --device cuda, from their arguments to the files they leave.
 namespace traceflow::cli {
@@ -39,16 +39,9 @@ class VerbsOnDevice : public traceflow::testing::OnDevice {
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
   int run_verb(std::vector<std::string> words) {
-    words.insert(words.begin(), "traceflow");
-    std::vector<const char*> arguments;
-    arguments.reserve(words.size());
-    for (const std::string& word : words) arguments.push_back(word.c_str());
-    ::testing::internal::CaptureStderr();
-    ::testing::internal::CaptureStdout();
-    const int code = run(static_cast<int>(arguments.size()), arguments.data());
-    ::testing::internal::GetCapturedStdout();
-    error_ = ::testing::internal::GetCapturedStderr();
-    return code;
+    Outcome outcome = run_with(std::move(words));
+    error_ = std::move(outcome.err);
+    return outcome.code;
   }
   int train(const std::string& run, const std::string& device, std::vector<std::string> more = {}) {
     std::vector<std::string> words{"train",
@@ -71,10 +64,7 @@ class VerbsOnDevice : public traceflow::testing::OnDevice {
     words.insert(words.end(), more.begin(), more.end());
     return run_verb(std::move(words));
   }
-  std::string text_of(const std::string& name) const {
-    std::ifstream in(path(name));
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
+  std::string text_of(const std::string& name) const { return bytes_of(path(name)); }
 
   std::filesystem::path folder_ =
       std::filesystem::path(::testing::TempDir()) / ("verbs_on_device_" + std::to_string(::getpid()));

@@ -36,13 +36,13 @@ TEST_F(Faults, ADiskThatIsFullFromTheStartLeavesNoPartOfACheckpoint) {
 
 TEST_F(Faults, ADiskThatIsFullWhenARunGoesOnLeavesItsCheckpointsAsTheyWere) {
   ASSERT_EQ(run(training("filled", {"-i", "6"})).code, 0);
-  const std::string current = text_of(run_in("filled").checkpoint()),
-                    previous = text_of(run_in("filled").previous_checkpoint());
+  const std::string current = bytes_of(run_in("filled").checkpoint()),
+                    previous = bytes_of(run_in("filled").previous_checkpoint());
   std::vector<std::string> words = resuming("filled");
   words.insert(words.end(), {"-i", "12"});
   expect_one_line(run(words, {.file_bytes = small_disk}), 2);
-  EXPECT_EQ(text_of(run_in("filled").checkpoint()), current);
-  EXPECT_EQ(text_of(run_in("filled").previous_checkpoint()), previous);
+  EXPECT_EQ(bytes_of(run_in("filled").checkpoint()), current);
+  EXPECT_EQ(bytes_of(run_in("filled").previous_checkpoint()), previous);
   EXPECT_EQ(files_in("filled"), (std::vector<std::string>{"checkpoint.previous.safetensors",
                                                           "checkpoint.safetensors", "log.jsonl"}));
 }
@@ -176,7 +176,7 @@ TEST_F(Faults, OutputThatFindsNoRoomIsAnError) {
 TEST_F(Faults, ADamagedCheckpointIsNamedByItsSectionAndTheOneBeforeServes) {
   fs::copy(path("whole"), path("damaged"), fs::copy_options::recursive);
   const RunFolder damaged = run_in("damaged");
-  std::string bytes = text_of(damaged.checkpoint());
+  std::string bytes = bytes_of(damaged.checkpoint());
   const size_t middle = bytes.size() - 5;
   bytes[middle] = static_cast<char>(bytes[middle] ^ 1);
   std::ofstream(damaged.checkpoint(), std::ios::binary) << bytes;
@@ -198,7 +198,7 @@ TEST_F(Faults, ADamagedCheckpointIsNamedByItsSectionAndTheOneBeforeServes) {
   const Outcome resumed = run(aloud);
   EXPECT_EQ(resumed.code, 0);
   EXPECT_THAT(resumed.error, says_so);
-  EXPECT_EQ(text_of(damaged.damaged_checkpoint()), bytes);
+  EXPECT_EQ(bytes_of(damaged.damaged_checkpoint()), bytes);
   EXPECT_TRUE(state_of(path("damaged")) == whole_state());
 
   // With no other to go back to, all say one line.

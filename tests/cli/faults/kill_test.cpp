@@ -89,7 +89,7 @@ class Kill : public Faults {
     for (std::string line; std::getline(log, line);) EXPECT_TRUE(nlohmann::json::accept(line)) << line;
     EXPECT_EQ(run({"export", run_.folder.string(), "-o", path("ply")}).code, 0);
     for (const char* name : {"main.ply", "environment.ply"})
-      EXPECT_EQ(text_of(fs::path(path("ply")) / name), text_of(fs::path(path("whole_ply")) / name));
+      EXPECT_EQ(bytes_of(fs::path(path("ply")) / name), bytes_of(fs::path(path("whole_ply")) / name));
     fs::remove_all(run_.folder);
     reached_ = 0;
     ++account_.runs;

@@ -5,23 +5,18 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "cli/faults/world.h"
 #include "scene/run_folder.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 // A training of a second or two, for worlds in which something goes wrong.
 namespace traceflow::faults {
 
 namespace fs = std::filesystem;
-
-inline std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // How often the long version of a test is to try.
 inline int number_from_environment(const char* name, int usual) {
@@ -41,7 +36,7 @@ inline std::string state_of(const fs::path& run) {
   file.metadata["train_seconds"] = "0";
   const TempFolder folder;
   file.write(folder / "state");
-  return text_of(folder / "state");
+  return bytes_of(folder / "state");
 }
 
 class Faults : public testing::Test {

@@ -10,12 +10,12 @@ namespace {
 using testing::central_differences;
 using testing::expect_close;
 
-constexpr NetworkOptions small{
+constexpr NetworkOptions smallest{
     .depth = 3, .width = 16, .skip = 2, .position_frequencies = 1, .time_frequencies = 1};
 
 TEST(DeformReference, AddsResidualsAndActivates) {
   BasicSurfels<double> stored = convert<double>(testing::random_surfels(2, true));
-  BasicField<double> field = convert<double>(testing::random_field(small, residual::main_outputs));
+  BasicField<double> field = convert<double>(testing::random_field(smallest, residual::main_outputs));
   field.head_weight.zero();  // every point gets the head's bias
   for (int k = 0; k < residual::main_outputs; ++k) field.head_bias[k] = 0.1 * (k + 1);
   BasicPosedSurfels<double> posed;
@@ -38,7 +38,7 @@ TEST(DeformReference, BackwardMatchesCentralDifferencesInEveryParameter) {
     BasicSurfels<double> stored = convert<double>(testing::random_surfels(4, tint));
     const Tensor<double> points = stored.position;
     const int outputs = tint ? residual::main_outputs : residual::environment_outputs;
-    BasicField<double> field = convert<double>(testing::random_field(small, outputs));
+    BasicField<double> field = convert<double>(testing::random_field(smallest, outputs));
     BasicPosedSurfels<double> posed;
     deform::forward_reference(stored, &field, points, 0.3, 2, posed);
     const BasicPosedSurfels<double> weights = testing::random_gradient_like(posed);

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "support/narrow_lpips.h"
+#include "support/refusal.h"
 
 namespace traceflow::lpips {
 namespace {
@@ -211,12 +212,7 @@ class LpipsWeights : public ::testing::Test {
  protected:
   void TearDown() override { std::filesystem::remove(file_); }
   std::string refusal() const {
-    try {
-      read_weights(file_);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+    return refusal_of([&] { read_weights(file_); });
   }
   std::filesystem::path file_ = std::filesystem::temp_directory_path() /
                                 ("traceflow-lpips-" + std::to_string(::getpid()) + ".safetensors");

@@ -9,8 +9,8 @@
 namespace traceflow::raster {
 namespace {
 
-constexpr int width = 7;
-constexpr int height = 6;
+constexpr int small_width = 7;
+constexpr int small_height = 6;
 
 double loss(const TestScene<double>& scene, const Options& options,
             const BasicOutputGradient<double>& weights) {
@@ -65,15 +65,15 @@ void expect_gradient(TestScene<double> scene, const Options& options,
   }
 }
 
-struct Case {
+struct GradientCase {
   const char* name;
   Options options;
   SceneOptions scene;
 
-  friend std::ostream& operator<<(std::ostream& to, const Case& c) { return to << c.name; }
+  friend std::ostream& operator<<(std::ostream& to, const GradientCase& c) { return to << c.name; }
 };
 
-std::vector<Case> cases() {
+std::vector<GradientCase> gradient_cases() {
   Options centre;
   centre.background = {0.3F, 0.6F, 0.1F};
   centre.far_plane = 20;
@@ -104,25 +104,25 @@ std::vector<Case> cases() {
           {"near_hit", hit, near}};
 }
 
-class ReferenceGradient : public testing::TestWithParam<Case> {};
+class ReferenceGradient : public testing::TestWithParam<GradientCase> {};
 
 TEST_P(ReferenceGradient, matches_central_differences_of_all_outputs_at_once) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
-    expect_gradient(random_scene(seed, width, height, GetParam().scene), GetParam().options,
-                    random_output_gradient<double>(seed + 100, width, height));
+    expect_gradient(random_scene(seed, small_width, small_height, GetParam().scene), GetParam().options,
+                    random_output_gradient<double>(seed + 100, small_width, small_height));
   }
 }
 
 TEST_P(ReferenceGradient, matches_central_differences_of_each_output) {
   for (unsigned output = 0; output < output_names.size(); ++output) {
     SCOPED_TRACE(output_names[output]);
-    expect_gradient(random_scene(7, width, height, GetParam().scene), GetParam().options,
-                    random_output_gradient<double>(8, width, height, 1U << output));
+    expect_gradient(random_scene(7, small_width, small_height, GetParam().scene), GetParam().options,
+                    random_output_gradient<double>(8, small_width, small_height, 1U << output));
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, ReferenceGradient, testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, ReferenceGradient, testing::ValuesIn(gradient_cases()),
                          [](const auto& test) { return test.param.name; });
 
 // One surfel that faces a camera at the origin, its centre on the ray through the pixel (2, 1).

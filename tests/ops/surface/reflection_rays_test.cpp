@@ -20,7 +20,7 @@ Rays rays_of(const SurfaceScene& s, const std::vector<int32_t>& pixels) {
 }
 
 template <class T>
-struct Gradients {
+struct RayGradients {
   Tensor<T> depth, median_depth, normal;
   CameraGradient<T> camera;
 
@@ -32,9 +32,9 @@ struct Gradients {
 };
 
 template <class T>
-Gradients<T> gradients_of(const SurfaceScene& s, const std::vector<int32_t>& pixels,
-                          const Tensor<double>& grad_origins, const Tensor<double>& grad_directions) {
-  Gradients<T> g{Tensor<T>(s.depth.shape()), Tensor<T>(s.depth.shape()), Tensor<T>(s.normal.shape()), {}};
+RayGradients<T> ray_gradients_of(const SurfaceScene& s, const std::vector<int32_t>& pixels,
+                                 const Tensor<double>& grad_origins, const Tensor<double>& grad_directions) {
+  RayGradients<T> g{Tensor<T>(s.depth.shape()), Tensor<T>(s.depth.shape()), Tensor<T>(s.normal.shape()), {}};
   reflection_rays_backward(convert<T>(s.camera), tensor_of(pixels), convert<T>(s.depth),
                            convert<T>(s.median_depth), convert<T>(s.normal), static_cast<T>(s.depth_ratio),
                            convert<T>(grad_origins), convert<T>(grad_directions), g.depth, g.median_depth,
@@ -85,8 +85,8 @@ TEST(ReflectionRays, FloatAgreesWithDouble) {
   Random random(3);
   const Tensor<double> a = random_tensor<double>(origins.shape(), random, -1, 1);
   const Tensor<double> b = random_tensor<double>(origins.shape(), random, -1, 1);
-  const auto fast = gradients_of<float>(s, pixels, a, b).tensors();
-  const auto truth = gradients_of<double>(s, pixels, a, b).tensors();
+  const auto fast = ray_gradients_of<float>(s, pixels, a, b).tensors();
+  const auto truth = ray_gradients_of<double>(s, pixels, a, b).tensors();
   for (size_t i = 0; i < fast.size(); ++i) expect_close(fast[i], truth[i], 1e-4, "gradient");
 }
 
@@ -101,7 +101,7 @@ TEST(ReflectionRays, GradientAgreesWithCentralDifferences) {
     const Rays rays = rays_of(s, pixels);
     return testing::dot(a, rays.origins) + testing::dot(b, rays.directions);
   };
-  const auto gradient = gradients_of<double>(s, pixels, a, b);
+  const auto gradient = ray_gradients_of<double>(s, pixels, a, b);
   expect_close(gradient.depth, central_differences(s.depth, value), 1e-7, "depth");
   expect_close(gradient.median_depth, central_differences(s.median_depth, value), 1e-7, "median depth");
   expect_close(gradient.normal, central_differences(s.normal, value, 1e-6), 1e-7, "normal");
@@ -117,7 +117,7 @@ TEST(ReflectionRays, HostilePixelsGiveNoDirectionAndNoGradient) {
   std::iota(pixels.begin(), pixels.end(), 0);
   Tensor<double> ones({42, 3});
   ones.fill(1);
-  const auto clean = gradients_of<double>(SurfaceScene(7, 6), pixels, ones, ones).tensors();
+  const auto clean = ray_gradients_of<double>(SurfaceScene(7, 6), pixels, ones, ones).tensors();
   for (const double bad : {nan, infinity, -infinity}) {
     SurfaceScene s(7, 6);
     s.depth[5] = bad;
@@ -126,14 +126,15 @@ TEST(ReflectionRays, HostilePixelsGiveNoDirectionAndNoGradient) {
     const Rays rays = rays_of(s, pixels);
     EXPECT_TRUE(all_finite(rays.origins) && all_finite(rays.directions));
     for (const int64_t i : {5, 10, 15}) EXPECT_EQ(load3<double>(rays.directions.row(i)), Vec3<double>(0));
-    const auto g = gradients_of<double>(s, pixels, ones, ones);
+    const auto g = ray_gradients_of<double>(s, pixels, ones, ones);
     for (const auto& tensor : g.tensors()) EXPECT_TRUE(all_finite(tensor));
     EXPECT_EQ(g.depth[5], 0);
     EXPECT_EQ(g.depth[6], clean[2][6]);
   }
   Tensor<double> bad_gradient = ones;
   bad_gradient[20] = nan;
-  for (const auto& tensor : gradients_of<double>(SurfaceScene(7, 6), pixels, bad_gradient, ones).tensors()) {
+  for (const auto& tensor :
+       ray_gradients_of<double>(SurfaceScene(7, 6), pixels, bad_gradient, ones).tensors()) {
     EXPECT_TRUE(all_finite(tensor));
   }
 }
@@ -143,7 +144,7 @@ TEST(ReflectionRays, NoPixelsNoRays) {
   const Rays rays = rays_of(s, {});
   EXPECT_EQ(rays.origins.shape(), Shape({0, 3}));
   EXPECT_EQ(rays.directions.shape(), Shape({0, 3}));
-  const auto g = gradients_of<double>(s, {}, rays.origins, rays.directions);
+  const auto g = ray_gradients_of<double>(s, {}, rays.origins, rays.directions);
   for (const double v : g.depth.values()) EXPECT_EQ(v, 0);
 }
 
@@ -160,7 +161,7 @@ TEST(ReflectionRays, SameBytesAtAnyThreadCount) {
   std::iota(pixels.begin(), pixels.end(), 0);
   Random random(11);
   const Tensor<double> a = random_tensor<double>({10800, 3}, random, -1, 1);
-  expect_same_bytes_at_any_thread_count([&] { return gradients_of<float>(s, pixels, a, a).tensors(); });
+  expect_same_bytes_at_any_thread_count([&] { return ray_gradients_of<float>(s, pixels, a, a).tensors(); });
 }
 
 }  // namespace

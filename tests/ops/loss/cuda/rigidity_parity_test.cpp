@@ -35,13 +35,13 @@ Cloud make_cloud(int64_t count, bool leave_some_out) {
   return c;
 }
 
-struct Result {
+struct RigidityResult {
   double value;
   Tensor<float> rest, posed;
 };
 
-Result run(const Cloud& c, Device device) {
-  Result r{0, Tensor<float>(c.rest.shape(), device), Tensor<float>(c.posed.shape(), device)};
+RigidityResult run(const Cloud& c, Device device) {
+  RigidityResult r{0, Tensor<float>(c.rest.shape(), device), Tensor<float>(c.posed.shape(), device)};
   const Neighbours edges{c.edges.index.on(device), c.edges.distance2.on(device)};
   r.value =
       rigidity(c.rest.on(device), c.posed.on(device), c.subset.on(device), edges, 0.2, 0.7, r.rest, r.posed);
@@ -49,7 +49,7 @@ Result run(const Cloud& c, Device device) {
 }
 
 void expect_agreement(const Cloud& c) {
-  const Result expected = run(c, Device::cpu), found = run(c, Device::cuda);
+  const RigidityResult expected = run(c, Device::cpu), found = run(c, Device::cuda);
   ASSERT_TRUE(all_finite(expected.rest) && all_finite(expected.posed));
   // A stretch is a difference of lengths that are alike.
   EXPECT_NEAR(found.value, expected.value, 1e-5);
@@ -84,7 +84,7 @@ TEST_F(RigidityOnDevice, WhatIsNotANumberIsLeftOut) {
 TEST_F(RigidityOnDevice, WithoutEdgesNothingPulls) {
   Cloud c = make_cloud(8, false);
   c.edges.index.fill(-1);
-  const Result lone = run(c, Device::cuda);
+  const RigidityResult lone = run(c, Device::cuda);
   EXPECT_EQ(lone.value, 0);
   EXPECT_EQ(list_of(lone.posed.on(Device::cpu)), std::vector<float>(24, 0));
   c.posed.resize({0, 3});
@@ -93,7 +93,7 @@ TEST_F(RigidityOnDevice, WithoutEdgesNothingPulls) {
 
 TEST_F(RigidityOnDevice, SameBytesTwice) {
   const Cloud c = make_cloud(300, true);
-  const Result first = run(c, Device::cuda), second = run(c, Device::cuda);
+  const RigidityResult first = run(c, Device::cuda), second = run(c, Device::cuda);
   EXPECT_EQ(first.value, second.value);
   EXPECT_EQ(list_of(first.rest.on(Device::cpu)), list_of(second.rest.on(Device::cpu)));
   EXPECT_EQ(list_of(first.posed.on(Device::cpu)), list_of(second.posed.on(Device::cpu)));
