@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <vector>
 
@@ -22,29 +23,30 @@ bool in_parallel_loop();
 
 namespace detail {
 
-// Carries the first exception out of an OpenMP region, which must not be left by one. What has not been run
-// by then is not run.
+// Carries an exception out of an OpenMP region, which must not be left by one: that of the first block that
+// fails, at any number of threads. What comes behind a block that has failed is not run.
 class ExceptionBridge {
  public:
   template <class F>
-  void run(F&& f) noexcept {
-    if (failed_.load(std::memory_order_relaxed)) return;
+  void run(int64_t block, F&& f) noexcept {
+    if (block > failed_.load(std::memory_order_relaxed)) return;
     try {
       f();
     } catch (...) {
       const std::lock_guard lock(mutex_);
-      if (!first_) first_ = std::current_exception();
-      failed_.store(true, std::memory_order_relaxed);
+      if (block >= failed_.load(std::memory_order_relaxed)) return;
+      exception_ = std::current_exception();
+      failed_.store(block, std::memory_order_relaxed);
     }
   }
   void rethrow() {
-    if (first_) std::rethrow_exception(first_);
+    if (exception_) std::rethrow_exception(exception_);
   }
 
  private:
-  std::atomic<bool> failed_{false};
+  std::atomic<int64_t> failed_{std::numeric_limits<int64_t>::max()};
   std::mutex mutex_;
-  std::exception_ptr first_;
+  std::exception_ptr exception_;
 };
 
 #ifdef __SANITIZE_THREAD__
@@ -57,7 +59,7 @@ void deal_to_plain_threads(int64_t blocks, const std::function<void(int64_t)>& r
 
 // f(begin, end) over [0, n) in blocks of `grain`, dealt to threads as they come free. Which elements share a
 // block never depends on the number of threads, so a sum kept per block and added in block order has the same
-// bytes at any count.
+// bytes at any count. What the first block that throws has thrown comes out.
 template <class F>
 void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
   if (n <= 0) return;
@@ -65,7 +67,7 @@ void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
   const int64_t blocks = (n + grain - 1) / grain;
   detail::ExceptionBridge bridge;
   const auto run = [&](int64_t block) {
-    bridge.run([&] { f(block * grain, std::min(n, (block + 1) * grain)); });
+    bridge.run(block, [&] { f(block * grain, std::min(n, (block + 1) * grain)); });
   };
 #ifdef __SANITIZE_THREAD__
   detail::deal_to_plain_threads(blocks, run);

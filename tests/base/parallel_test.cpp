@@ -1,5 +1,6 @@
 #include "base/parallel.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -8,6 +9,8 @@
 #include <numeric>
 #include <set>
 #include <stdexcept>
+#include <string>
+#include <thread>
 
 #include "base/indices.h"
 #include "base/random.h"
@@ -106,6 +109,30 @@ TEST(Parallel, AnExceptionComesOutOfTheLoop) {
           10);
     };
     EXPECT_THROW(run(), std::runtime_error);
+  }
+}
+
+// What a loop fails with must not hang on which thread came first: the same bad input has the same message.
+TEST(Parallel, TheFirstElementThatFailsIsTheOneThatIsTold) {
+  const ThreadsForOneTest restore;
+  for (int threads = 1; threads <= 4; ++threads) {
+    set_threads(threads);
+    std::atomic<bool> later_failed = false;
+    const auto run = [&] {
+      parallel_for(
+          "test", 100,
+          [&](int64_t i) {
+            if (i == 3 && threads > 1) {
+              for (int turn = 0; turn < 1'000'000 && !later_failed; ++turn) std::this_thread::yield();
+            }
+            if (i == 3 || i == 4) {
+              later_failed = i == 4;
+              throw std::runtime_error(std::to_string(i));
+            }
+          },
+          1);
+    };
+    EXPECT_THAT(run, testing::ThrowsMessage<std::runtime_error>("3"));
   }
 }
 
