@@ -1,11 +1,13 @@
 #include "base/atomic_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <string>
 #include <system_error>
+#include <utility>
 
 #include "base/error.h"
 
@@ -13,48 +15,79 @@ namespace traceflow {
 
 namespace {
 
+constexpr size_t longest_name = 255;  // of a file in its folder, in bytes
+
 [[noreturn]] void fail(const std::filesystem::path& path, const char* step) {
   throw InputError(path.string(), step, std::system_category().message(errno), "a writable file",
                    "check space and permissions");
 }
 
-// Closes the descriptor and removes the temporary file unless the write was completed.
-struct TemporaryFile {
-  std::string name;
-  int descriptor = -1;
-  bool renamed = false;
+std::filesystem::path beside(const std::filesystem::path& path, const std::string& ending) {
+  return path.parent_path() / (path.filename().string().substr(0, longest_name - ending.size()) + ending);
+}
 
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  explicit TemporaryFile(const std::filesystem::path& path) : name(path.string() + ".partial") {
-    descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-    if (descriptor < 0) fail(path, "open");
+// Until no other process holds it. A file system that knows no locks has none to wait for.
+void hold(const Descriptor& file, const std::filesystem::path& path, PartialFile::OtherWriter other) {
+  const int how = other == PartialFile::OtherWriter::refused ? LOCK_EX | LOCK_NB : LOCK_EX;
+  while (::flock(file.number(), how) != 0) {
+    if (errno == EINTR) continue;
+    if (errno != EWOULDBLOCK) return;
+    throw InputError(path.string(), "", "another program that writes it", "a file of its own",
+                     "wait for that program or stop it, or choose another name");
   }
-  ~TemporaryFile() {
-    if (descriptor >= 0) ::close(descriptor);
-    if (!renamed) ::unlink(name.c_str());
-  }
-};
+}
 
-void write_all(int descriptor, std::span<const std::byte> bytes, const std::filesystem::path& path) {
-  for (size_t written = 0; written < bytes.size();) {
-    const ssize_t n = ::write(descriptor, bytes.data() + written, bytes.size() - written);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) fail(path, "write");
-    written += static_cast<size_t>(n);
-  }
+// Whether a name, that of no link, is still this file's.
+bool is_name_of(const std::filesystem::path& name, const Descriptor& file) {
+  struct stat named {
+  }, open{};
+  return ::lstat(name.c_str(), &named) == 0 && ::fstat(file.number(), &open) == 0 &&
+         named.st_ino == open.st_ino && named.st_dev == open.st_dev;
+}
+
+// What a failed sync of a folder says where there is no such thing, or where only others may ask for it.
+bool means_no_sync(int error) {
+  return error == EINVAL || error == ENOTSUP || error == ENOSYS || error == EBADF || error == EACCES;
 }
 
 }  // namespace
 
+PartialFile::PartialFile(std::filesystem::path path, OtherWriter other, const std::string& ending)
+    : path_(std::move(path)), name_(beside(path_, ending)) {
+  // Whoever held it before may have put it in its place meanwhile.
+  do {
+    file_ = Descriptor(::open(name_.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
+    if (!file_) fail(path_, "open");
+    hold(file_, path_, other);
+  } while (!is_name_of(name_, file_));
+  if (::ftruncate(file_.number(), 0) != 0) fail(path_, "open");
+}
+
+PartialFile::~PartialFile() {
+  if (!in_place_) ::unlink(name_.c_str());
+}
+
+void PartialFile::write(std::span<const std::byte> bytes) {
+  for (size_t written = 0; written < bytes.size();) {
+    const ssize_t n = ::write(file_.number(), bytes.data() + written, bytes.size() - written);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) fail(path_, "write");
+    written += static_cast<size_t>(n);
+  }
+}
+
+void PartialFile::put_in_place() {
+  if (::fsync(file_.number()) != 0) fail(path_, "sync");
+  if (::rename(name_.c_str(), path_.c_str()) != 0) fail(path_, "rename");
+  in_place_ = true;
+  sync_folder(path_.parent_path());
+}
+
 void write_atomically(const std::filesystem::path& path,
                       const std::vector<std::span<const std::byte>>& parts) {
-  TemporaryFile file(path);
-  for (const std::span<const std::byte> part : parts) write_all(file.descriptor, part, path);
-  if (::fsync(file.descriptor) != 0) fail(path, "sync");
-  if (::rename(file.name.c_str(), path.c_str()) != 0) fail(path, "rename");
-  file.renamed = true;
-  sync_folder(path.parent_path());
+  PartialFile file(path);
+  for (const std::span<const std::byte> part : parts) file.write(part);
+  file.put_in_place();
 }
 
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
@@ -66,10 +99,21 @@ void write_atomically(const std::filesystem::path& path, std::string_view text) 
 }
 
 void sync_folder(const std::filesystem::path& folder) {
-  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
+  const Descriptor opened(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (opened && ::fsync(opened.number()) == 0) return;
+  if (!means_no_sync(errno)) fail(folder, "sync");
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (folder.empty() || std::filesystem::is_directory(folder, error)) return;
+  make_folder(folder.parent_path());
+  const bool made = std::filesystem::create_directory(folder, error);
+  if (error) {
+    throw InputError(folder.string(), "", error.message(), "a writable folder",
+                     "check space and permissions, or choose another folder");
+  }
+  if (made) sync_folder(folder.parent_path());
 }
 
 }  // namespace traceflow

@@ -6,7 +6,8 @@
 namespace traceflow {
 
 // Keeps a second program out of a folder's work for as long as this stands. Readers are free. The system lets
-// go of it when the program ends, however it ends.
+// go of it when the program ends, however it ends; where it is killed, when what it has started has ended
+// too.
 class FolderLock {
  public:
   // file: the lock, in the folder or beside it, in a folder that is there. work: what is being done, as in
@@ -14,12 +15,15 @@ class FolderLock {
   // process does, and when the file cannot be written.
   FolderLock(const std::filesystem::path& file, const std::filesystem::path& folder, const std::string& work);
   ~FolderLock();
+  // False where the file system knows no locks, so that nobody is kept out.
+  bool keeps_others_out() const { return keeps_others_out_; }
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;
 
  private:
   std::filesystem::path file_;
   int descriptor_ = -1;
+  bool keeps_others_out_ = true;
 };
 
 }  // namespace traceflow

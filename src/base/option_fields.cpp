@@ -141,7 +141,7 @@ std::string OptionField::full_help() const {
 }
 
 const OptionField& find_option(const std::vector<OptionField>& fields, const std::string& path,
-                               const std::string& where) {
+                               const std::string& where, std::string_view listed_by) {
   const std::string wanted = with_underscores(path);
   for (const OptionField& field : fields) {
     if (field.path == wanted) return field;
@@ -152,7 +152,7 @@ const OptionField& find_option(const std::vector<OptionField>& fields, const std
     }
   }
   const std::string nearest = nearest_path(fields, wanted);
-  throw InputError(where, path, "no option of this name", "one that `traceflow --help-options` lists",
+  throw InputError(where, path, "no option of this name", fmt::format("one that `{}` lists", listed_by),
                    nearest.empty() ? "" : "did you mean " + nearest + "?");
 }
 
@@ -166,12 +166,11 @@ void set_option_text(const OptionField& field, const std::string& text, const st
 }
 
 void set_option_assignment(const std::vector<OptionField>& fields, const std::string& assignment,
-                           const std::string& where) {
+                           const std::string& where, std::string_view listed_by) {
   const size_t equals = assignment.find('=');
-  if (equals == std::string::npos)
-    throw InputError(where, "", assignment, "an assignment such as loss.normal=0");
-  set_option_text(find_option(fields, assignment.substr(0, equals), where), assignment.substr(equals + 1),
-                  where);
+  if (equals == std::string::npos) throw InputError(where, "", assignment, "an assignment, PATH=VALUE");
+  set_option_text(find_option(fields, assignment.substr(0, equals), where, listed_by),
+                  assignment.substr(equals + 1), where);
 }
 
 std::string option_text(const OptionValue& value) {

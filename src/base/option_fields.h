@@ -44,10 +44,13 @@ struct OptionField {
 template <class Options>
 std::vector<OptionField> option_fields(Options& options, const std::string& prefix = "");
 
-// The field of this path ('-' counts as '_'), or an InputError that begins with `where` and suggests the
-// nearest path.
+// The command that lists the options of a training; what has others says which one lists those.
+constexpr std::string_view training_options_page = "traceflow --help-options";
+
+// The field of this path ('-' counts as '_'), or an InputError that begins with `where`, suggests the nearest
+// path, and names the command that lists all of them.
 const OptionField& find_option(const std::vector<OptionField>& fields, const std::string& path,
-                               const std::string& where);
+                               const std::string& where, std::string_view listed_by = training_options_page);
 
 // Writes one field, from a value or from text as the command line has it ("0.5", "true", "1,0,0", "hit").
 // Throws InputError beginning with `where` and naming the path, what was found and what the field takes.
@@ -56,7 +59,7 @@ void set_option_text(const OptionField& field, const std::string& text, const st
 
 // Writes the field that "path=value" names.
 void set_option_assignment(const std::vector<OptionField>& fields, const std::string& assignment,
-                           const std::string& where);
+                           const std::string& where, std::string_view listed_by = training_options_page);
 
 // The value as the command line has it.
 std::string option_text(const OptionValue& value);

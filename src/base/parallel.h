@@ -50,8 +50,9 @@ class ExceptionBridge {
 };
 
 #ifdef __SANITIZE_THREAD__
-// run(block) for every block. The thread sanitizer does not see how OpenMP's runtime orders its threads and
-// takes the end of every loop for a race; under it the same blocks are dealt to threads that it does see.
+// run(block) for every block, which takes memory. The thread sanitizer does not see how OpenMP's runtime
+// orders its threads and takes the end of every loop for a race; under it the same blocks are dealt to
+// threads that it does see.
 void deal_to_plain_threads(int64_t blocks, const std::function<void(int64_t)>& run);
 #endif
 
@@ -70,7 +71,11 @@ void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
     bridge.run(block, [&] { f(block * grain, std::min(n, (block + 1) * grain)); });
   };
 #ifdef __SANITIZE_THREAD__
-  detail::deal_to_plain_threads(blocks, run);
+  if (blocks > 1 && thread_count() > 1) {
+    detail::deal_to_plain_threads(blocks, run);
+  } else {
+    for (int64_t block = 0; block < blocks; ++block) run(block);
+  }
 #else
 #pragma omp parallel for schedule(dynamic, 1) num_threads(thread_count()) if (blocks > 1)
   for (int64_t block = 0; block < blocks; ++block) run(block);

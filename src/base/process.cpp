@@ -105,12 +105,13 @@ bool Process::wait() {
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-bool Process::wait(const std::atomic<bool>& stop) {
+bool Process::wait(const std::atomic<bool>& stop, const std::function<void()>& meanwhile) {
   siginfo_t info{};
-  while (!stop) {
+  for (int glances = 1; !stop; ++glances) {
     if (::waitid(P_PID, static_cast<id_t>(id_), &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid != 0)
       return wait();
     std::this_thread::sleep_for(glance);
+    if (glances % 10 == 0) meanwhile();
   }
   end();
   return false;

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,9 @@ class Process {
   // Until it has ended by itself: whether well.
   bool wait();
   // The same, unless `stop` turns true: then it and what it has started are ended, and the answer is false.
-  bool wait(const std::atomic<bool>& stop);
+  // Calls `meanwhile` some times a second.
+  bool wait(
+      const std::atomic<bool>& stop, const std::function<void()>& meanwhile = [] {});
   // Asks it and what it has started to end, and insists after two seconds.
   void end();
 

@@ -1,5 +1,7 @@
 #include "base/utf8.h"
 
+#include <fmt/format.h>
+
 #include <cstdint>
 
 namespace traceflow {
@@ -17,6 +19,18 @@ std::optional<Utf8Character> first_utf8_character(std::string_view text) {
   constexpr char32_t smallest[] = {0, 0, 0x80, 0x800, 0x10000};
   const bool is_character = code >= smallest[length] && code <= 0x10ffff && (code < 0xd800 || code > 0xdfff);
   return is_character ? std::optional(Utf8Character{code, length}) : std::nullopt;
+}
+
+std::string as_utf8(std::string_view text) {
+  std::string result;
+  while (!text.empty()) {
+    const auto character = first_utf8_character(text);
+    const size_t bytes = character ? character->bytes : 1;
+    result += character ? std::string(text.substr(0, bytes))
+                        : fmt::format("%{:02X}", static_cast<uint8_t>(text[0]));
+    text.remove_prefix(bytes);
+  }
+  return result;
 }
 
 }  // namespace traceflow

@@ -1,5 +1,8 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <unordered_map>
 
@@ -12,16 +15,19 @@
 #include "capture/formats/formats.h"
 #include "capture/image_cache.h"
 #include "capture/prior_axes.h"
-#include "capture/unregistered.h"
 #include "files/image.h"
 
 namespace traceflow {
 
 namespace {
 
-bool differs_in_proportions(const ImageSize& size, const Lens& lens) {
-  const double stretch = (size.width / lens.width) / (size.height / lens.height);
-  return std::abs(stretch - 1) > 0.02;
+bool differs_in_proportions(const Vec2<double>& size, const Lens& lens) {
+  return !same_proportions(size.x, size.y, lens.width, lens.height);
+}
+
+Vec2<double> size_of(const TreeFile& image) {
+  const ImageSize size = read_image_size(image.open());
+  return {size.width, size.height};
 }
 
 uint8_t grey_level(Background background) {
@@ -49,7 +55,6 @@ class Assembly {
 
   Capture finish() {
     make_views();
-    find_unregistered();
     set_extent();
     take_points();
     find_masks();
@@ -77,9 +82,6 @@ class Assembly {
   }
 
   void make_views() {
-    for (const auto* split : {&found_.train, &found_.test}) {
-      for (const FoundView& view : *split) last_time_ = std::max(last_time_, view.time);
-    }
     if (found_.train.empty()) {
       const auto missing = std::find_if(capture_.warnings.begin(), capture_.warnings.end(),
                                         [](const Finding& f) { return f.kind.starts_with("missing-"); });
@@ -87,14 +89,35 @@ class Assembly {
                        "an image, a camera and a time each",
                        missing == capture_.warnings.end() ? "" : "see what is missing: " + missing->text);
     }
-    if (!(last_time_ > 0)) {
-      warn("all views have time 0: the scene cannot move", "one-time",
-           found_.says_times ? Severity::problem : Severity::notice);
-      last_time_ = 1;
-    }
+    stretch_times();
     capture_.train = make_split(found_.train);
     capture_.test = make_split(found_.test);
+    warn_about_times();
     warn_about_sizes();
+  }
+
+  // From the first view at 0 to the last at 1.
+  void stretch_times() {
+    double first = found_.train.front().time, last = first;
+    for (const auto* split : {&found_.train, &found_.test}) {
+      for (const FoundView& view : *split) {
+        first = std::min(first, view.time);
+        last = std::max(last, view.time);
+      }
+    }
+    const double span = last > first ? last - first : 1;
+    for (auto* split : {&found_.train, &found_.test}) {
+      for (FoundView& view : *split) view.time = (view.time - first) / span;
+    }
+  }
+
+  void warn_about_times() {
+    const bool moves = std::any_of(capture_.train.begin(), capture_.train.end(), [&](const View& view) {
+      return view.time != capture_.train.front().time;
+    });
+    if (moves) return;
+    warn("all training views are of one time: the scene cannot move", "one-time",
+         found_.times == CaptureTimes::none ? Severity::notice : Severity::problem);
   }
 
   std::vector<View> make_split(const std::vector<FoundView>& found) {
@@ -108,7 +131,7 @@ class Assembly {
           const ImageSize size = read_image_size(found[i].image.open());
           sources[i] = source_of(found[i], size);
           views[i] = view_of(found[i], sources[i]);
-          if (differs_in_proportions(size, found[i].lens)) misfits[i] = found[i].id;
+          if (differs_in_proportions({size.width, size.height}, found[i].lens)) misfits[i] = found[i].id;
           if (size.orientation != 1) turned[i] = found[i].id;
         },
         1);
@@ -158,7 +181,20 @@ class Assembly {
     camera.centre_y = lens.centre.y / source.factor;
     camera.camera_from_world = found.camera_from_world;
     camera.position = found_.normalisation.in_scene(found.position);
-    return {found.id, static_cast<float>(found.time / last_time_), convert<float>(camera)};
+    check_position(found, camera.position);
+    return {found.id, static_cast<float>(found.time), convert<float>(camera)};
+  }
+
+  // That single precision holds it after some arithmetic.
+  static void check_position(const FoundView& found, const Vec3<double>& in_scene) {
+    constexpr double farthest = 1e15;
+    const double distance = length(in_scene);
+    // Also true for a NaN.
+    if (!(distance < farthest)) {
+      throw InputError(found.camera_name, "position",
+                       fmt::format("{:g} scene units from the scene's centre", distance),
+                       fmt::format("less than {:g}", farthest));
+    }
   }
 
   void warn_about_sizes() {
@@ -172,15 +208,6 @@ class Assembly {
                std::to_string(sizes.rbegin()->first) + "×" + std::to_string(sizes.rbegin()->second),
            "mixed-sizes", Severity::notice);
     }
-  }
-
-  void find_unregistered() {
-    std::vector<std::string> files = unregistered_images(*tree_, found_);
-    if (files.empty()) return;
-    warn(std::to_string(files.size()) + (files.size() == 1 ? " image has" : " images have") + " no camera (" +
-             ids_text(files) + ")",
-         "unregistered-image", Severity::notice)
-        .files = std::move(files);
   }
 
   void set_extent() {
@@ -281,7 +308,9 @@ class Assembly {
                     "missing-mask");
     warn_if_partial(capture_.test, ids_without(capture_.test, sources_, has), "test views have no mask",
                     "missing-mask");
-    warn_about_proportions("mask", "mask-size", [](const ViewSource& source) { return source.mask; });
+    warn_about_proportions("mask", "mask-size", [](const ViewSource& source) {
+      return source.mask ? std::optional(size_of(source.mask)) : std::nullopt;
+    });
   }
 
   void find_priors() {
@@ -296,8 +325,13 @@ class Assembly {
     const auto has = [](const ViewSource& source) { return source.has_prior(); };
     warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has),
                     "training views have no normal prior", "missing-prior");
-    warn_about_proportions("normal prior", "prior-size",
-                           [](const ViewSource& source) { return source.prior; });
+    warn_about_proportions(
+        "normal prior", "prior-size", [&](const ViewSource& source) -> std::optional<Vec2<double>> {
+          if (source.prior) return size_of(source.prior);
+          if (source.prior_slice < 0) return std::nullopt;
+          const Shape& shape = shared_.prior_array->shape();
+          return Vec2<double>(static_cast<double>(shape[2]), static_cast<double>(shape[1]));
+        });
   }
 
   // One element for each training id in the order of the capture's list, or one for each of all ids.
@@ -320,17 +354,16 @@ class Assembly {
     capture_.has_normal_priors = true;
   }
 
-  // Reads the header of every file that `file_of` names; a file that is no image ends the loading here, not
-  // in the middle of a run.
+  // size_of_its: width and height of what belongs to a view, if there is such. It reads the header of every
+  // file: one that is no image ends the loading here, not in the middle of a run.
   template <class F>
-  void warn_about_proportions(const std::string& what, const std::string& kind, F&& file_of) {
+  void warn_about_proportions(const std::string& what, const std::string& kind, F&& size_of_its) {
     std::vector<std::string> misfits;
     for (const auto* split : {&capture_.train, &capture_.test}) {
       for (const View& view : *split) {
         const ViewSource& source = sources_.at(view.id);
-        const TreeFile file = file_of(source);
-        if (file && differs_in_proportions(read_image_size(file.open()), source.lens))
-          misfits.push_back(view.id);
+        const std::optional<Vec2<double>> size = size_of_its(source);
+        if (size && differs_in_proportions(*size, source.lens)) misfits.push_back(view.id);
       }
     }
     if (!misfits.empty()) {
@@ -352,17 +385,13 @@ class Assembly {
     }
   }
 
-  // Views near time 0, when the points were there.
   void choose_axes() {
-    constexpr size_t views_to_check = 6;
     if (capture_.has_normal_priors) {
       std::vector<const View*> views;
       for (const View& view : capture_.train) {
         if (sources_.at(view.id).has_prior()) views.push_back(&view);
       }
-      std::stable_sort(views.begin(), views.end(),
-                       [](const View* a, const View* b) { return a->time < b->time; });
-      views.resize(std::min(views.size(), views_to_check));
+      views = views_for_axes(std::move(views));
       std::vector<PriorView> priors(views.size());
       parallel_for(
           "capture: prior axes", static_cast<int64_t>(views.size()),
@@ -385,7 +414,6 @@ class Assembly {
   Capture capture_;
   CaptureSource shared_;
   std::unordered_map<std::string, ViewSource> sources_;
-  double last_time_ = 0;
   uint8_t background_ = 0;
 };
 

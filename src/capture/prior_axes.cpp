@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 #include "capture/surface_points.h"
 
@@ -11,8 +12,9 @@ namespace traceflow {
 namespace {
 
 constexpr std::array named_axes = {PriorAxes::opengl, PriorAxes::opencv, PriorAxes::stable_normal};
-constexpr double clear = 0.3;    // a correlation that decides
 constexpr int64_t enough = 100;  // samples that decide
+
+bool decides(double correlation) { return std::abs(correlation) >= 0.3; }
 
 struct Sums {
   Vec3<double> product{0}, prior2{0}, truth2{0};
@@ -38,7 +40,7 @@ std::string signs_text(const Vec3<double>& correlation) {
   std::string text;
   for (int axis = 0; axis < 3; ++axis) {
     const double c = correlation[axis];
-    text += std::string(axis == 0 ? "" : " ") + "xyz"[axis] + (std::abs(c) < clear ? '?' : c > 0 ? '+' : '-');
+    text += std::string(axis == 0 ? "" : " ") + "xyz"[axis] + (!decides(c) ? '?' : c > 0 ? '+' : '-');
   }
   return text;
 }
@@ -60,13 +62,29 @@ std::string prior_axes_name(PriorAxes axes) {
   return std::string(enum_names(axes)[static_cast<size_t>(axes)]);
 }
 
-bool agrees(PriorAxes axes, const AxisEvidence& evidence) {
-  const Vec3<double> signs = prior_axis_signs(axes);
-  for (int axis = 0; axis < 3; ++axis) {
-    const double correlation = evidence.correlation[axis];
-    if (std::abs(correlation) >= clear && correlation * signs[axis] < 0) return false;
-  }
-  return true;
+std::vector<const View*> views_for_axes(std::vector<const View*> with_priors) {
+  constexpr size_t most = 6;
+  std::stable_sort(with_priors.begin(), with_priors.end(),
+                   [](const View* a, const View* b) { return a->time < b->time; });
+  with_priors.resize(std::min(with_priors.size(), most));
+  return with_priors;
+}
+
+std::vector<PriorAxes> agreeing_axes(const AxisEvidence& evidence) {
+  std::vector<PriorAxes> agreeing;
+  std::copy_if(named_axes.begin(), named_axes.end(), std::back_inserter(agreeing), [&](PriorAxes axes) {
+    const Vec3<double> signs = prior_axis_signs(axes);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (decides(evidence.correlation[axis]) && evidence.correlation[axis] * signs[axis] < 0) return false;
+    }
+    return true;
+  });
+  return agreeing;
+}
+
+bool decides_all(const AxisEvidence& evidence) {
+  const Vec3<double>& c = evidence.correlation;
+  return decides(c.x) && decides(c.y) && decides(c.z);
 }
 
 AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<PriorView>& views) {
@@ -93,15 +111,15 @@ AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<P
 
 AxisChoice choose_prior_axes(PriorAxes asked, const AxisEvidence& evidence) {
   const PriorAxes preferred = asked == PriorAxes::automatic ? PriorAxes::opengl : asked;
-  if (agrees(preferred, evidence)) return {preferred, ""};
-  const auto better = std::find_if(named_axes.begin(), named_axes.end(),
-                                   [&](PriorAxes axes) { return agrees(axes, evidence); });
+  const std::vector<PriorAxes> agreeing = agreeing_axes(evidence);
+  if (std::find(agreeing.begin(), agreeing.end(), preferred) != agreeing.end()) return {preferred, ""};
   const std::string disagrees = "normal priors: the axes " + prior_axes_name(preferred) +
                                 " disagree with the geometry, which reads " +
                                 signs_text(evidence.correlation) + " against x right, y down, z forward";
-  if (better == named_axes.end()) return {preferred, disagrees + "; no known axes fit"};
-  if (asked == PriorAxes::automatic) return {*better, disagrees + "; using " + prior_axes_name(*better)};
-  return {preferred, disagrees + "; " + prior_axes_name(*better) + " would fit"};
+  if (agreeing.empty()) return {preferred, disagrees + "; no known axes fit"};
+  const std::string better = prior_axes_name(agreeing.front());
+  if (asked == PriorAxes::automatic) return {agreeing.front(), disagrees + "; using " + better};
+  return {preferred, disagrees + "; " + better + " would fit"};
 }
 
 }  // namespace traceflow

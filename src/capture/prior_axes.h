@@ -30,8 +30,13 @@ struct AxisEvidence {
 // nearer one hides. Without points only z is known: what is seen faces the camera.
 AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<PriorView>& views);
 
-// Whether no axis that the evidence decides points the other way in these axes, of any but `automatic`.
-bool agrees(PriorAxes axes, const AxisEvidence& evidence);
+// A few of the views, those nearest to time 0, when the points were there: what the axes are measured on.
+std::vector<const View*> views_for_axes(std::vector<const View*> with_priors);
+
+// The known axes in which no axis that the evidence decides points the other way.
+std::vector<PriorAxes> agreeing_axes(const AxisEvidence& evidence);
+// Whether it decides all three.
+bool decides_all(const AxisEvidence& evidence);
 
 // The axes to use for what was asked, and a warning where the evidence speaks against them (empty: none).
 struct AxisChoice {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "base/parallel.h"
 #include "base/profile.h"
 #include "base/version.h"
+#include "cli/arguments/help_formatter.h"
 #include "cli/arguments/option_page.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/standard_streams.h"
@@ -33,7 +35,7 @@ struct GlobalArguments {
 void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
   program.set_version_flag("--version", std::string("traceflow ") + version());
   program.add_flag("--help-options", arguments.help_options,
-                   "Print every option of --set and --config, and exit");
+                   "Print every option of a training, with its value in each preset, and exit");
   program
       .add_option("--threads", arguments.threads,
                   "Threads to use; 0 for all cores. The results do not depend on it")
@@ -74,6 +76,7 @@ int finish_parse(const CLI::App& program, const CLI::ParseError& error) {
 
 int run_program(int argc, const char* const* argv) {
   CLI::App program("Reconstructs moving specular scenes from video with 2D Gaussian surfels.", "traceflow");
+  program.formatter(std::make_shared<HelpFormatter>());
   program.fallthrough();
   program.require_subcommand(0, 1);
   GlobalArguments arguments;

@@ -24,7 +24,8 @@ std::string reason() { return std::generic_category().message(errno); }
 InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
   // Without waiting for somebody to write, should it be a pipe.
   descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor_ < 0) throw InputError(path.string(), "", reason(), "a readable file");
+  if (descriptor_ < 0 && errno == ENOENT) throw InputError(path.string(), "", reason(), "a readable file");
+  if (descriptor_ < 0) throw UnreadableFile(path, reason());
   struct stat status {};
   if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
     close();
@@ -51,7 +52,7 @@ InputFile InputFile::part(int64_t offset, int64_t size, std::filesystem::path na
   require(offset >= 0 && size >= 0 && offset <= size_ && size <= size_ - offset, "a part lies in its file",
           path_.string());
   const int descriptor = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
-  if (descriptor < 0) throw InputError(name.string(), "", reason(), "a readable file");
+  if (descriptor < 0) throw UnreadableFile(name, reason());
   InputFile result(std::move(name), descriptor, size);
   result.begin_ = begin_ + offset;
   return result;
@@ -97,7 +98,7 @@ void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
     const ssize_t n = ::pread(descriptor_, bytes.data() + done, bytes.size() - done,
                               static_cast<off_t>(begin_ + offset) + static_cast<off_t>(done));
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) throw InputError(path_.string(), "read", reason(), "a readable file");
+    if (n < 0) throw UnreadableFile(path_, reason());
     if (n == 0) cut_short();
     done += static_cast<size_t>(n);
   }

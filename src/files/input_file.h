@@ -4,11 +4,21 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
+
+#include "base/error.h"
 
 namespace traceflow {
 
+// A file that is there and that the system does not let us read, so that nothing is known of what it holds.
+class UnreadableFile : public InputError {
+ public:
+  UnreadableFile(const std::filesystem::path& path, const std::string& reason)
+      : InputError(path.string(), "", reason, "a readable file") {}
+};
+
 // A file opened for reading at any place, by several threads at once. Every failure is an InputError naming
-// the file.
+// the file; those of the system, but that there is none, an UnreadableFile.
 class InputFile {
  public:
   explicit InputFile(const std::filesystem::path& path);

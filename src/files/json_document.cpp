@@ -17,26 +17,14 @@ constexpr int max_depth = 64;
 // A place that knows its name takes a hundred times the two bytes that an element of a list may have.
 constexpr size_t max_elements = 1'000'000;
 
-// Of brackets outside strings.
-bool nests_too_deep(std::string_view text) {
-  int depth = 0;
-  bool in_string = false;
-  for (size_t i = 0; i < text.size() && depth <= max_depth; ++i) {
-    const char c = text[i];
-    if (in_string && c == '\\') {
-      ++i;
-    } else if (c == '"') {
-      in_string = !in_string;
-    } else if (!in_string) {
-      depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
-    }
-  }
-  return depth > max_depth;
-}
-
 nlohmann::json parse(const std::string& name, std::string_view text) {
-  if (nests_too_deep(text)) {
+  const JsonExtent extent = json_extent(text);
+  if (extent.depth > max_depth) {
     throw InputError(name, "", fmt::format("brackets more than {} deep", max_depth), "JSON of common depth");
+  }
+  if (extent.values > max_json_values) {
+    throw InputError(name, "", fmt::format("{} values", extent.values),
+                     fmt::format("at most {}", max_json_values));
   }
   try {
     return nlohmann::json::parse(text);
@@ -48,6 +36,26 @@ nlohmann::json parse(const std::string& name, std::string_view text) {
 }
 
 }  // namespace
+
+JsonExtent json_extent(std::string_view text) {
+  JsonExtent extent{0, 1};
+  int depth = 0;
+  bool in_string = false;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string && c == '\\') {
+      ++i;
+    } else if (c == '"') {
+      in_string = !in_string;
+    } else if (!in_string) {
+      const bool opens = c == '[' || c == '{';
+      depth += opens ? 1 : c == ']' || c == '}' ? -1 : 0;
+      extent.depth = std::max(extent.depth, depth);
+      extent.values += opens || c == ',' ? 1 : 0;
+    }
+  }
+  return extent;
+}
 
 std::string read_text(const InputFile& file) {
   if (file.size() > max_bytes) {

@@ -63,8 +63,18 @@ class JsonField {
   const nlohmann::json* value_;
 };
 
+// What stands in a text of JSON, told before it is parsed.
+struct JsonExtent {
+  int depth = 0;      // of arrays and objects in one another
+  size_t values = 0;  // at most
+};
+JsonExtent json_extent(std::string_view text);
+// Parsed they take up to 160 bytes each.
+constexpr size_t max_json_values = 4'000'000;
+
 // A whole document; fields taken from it live as long as it does. Throws InputError for text that is not
-// JSON, and for arrays and objects in one another deeper than 64: what walks them does so by recursion.
+// JSON, for more than max_json_values, and for arrays and objects in one another deeper than 64: what walks
+// them does so by recursion.
 class JsonDocument : public JsonField {
  public:
   // name: of the document in errors.
@@ -77,7 +87,7 @@ class JsonDocument : public JsonField {
   std::unique_ptr<const nlohmann::json> root_;
 };
 
-// The text of a file of at most 64 MiB, which parsed takes up to 1 GiB.
+// The text of a file of at most 64 MiB.
 std::string read_text(const InputFile& file);
 std::string read_text(const std::filesystem::path& path);
 

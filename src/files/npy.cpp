@@ -146,6 +146,7 @@ ZipMember find_member(const InputFile& file, const std::string& name) {
     names += (names.empty() ? "" : ", ") + member.name;
   }
   if (!name.empty()) fail(file.path(), "", "arrays " + names, "an array named " + name);
+  if (members.empty()) fail(file.path(), "", "an archive of nothing", "one array");
   if (members.size() != 1)
     fail(file.path(), "", std::to_string(members.size()) + " arrays (" + names + ")", "one array");
   return members.front();

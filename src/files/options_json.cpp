@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "files/json_document.h"
 
 namespace traceflow {
 
@@ -11,7 +12,9 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
+// Beyond what options are: to read them in their order takes the square of their number.
 constexpr int deepest_option = 16;
+constexpr size_t most_values = 10'000;
 
 OrderedJson json_value(const OptionValue& value) {
   return std::visit([](const auto& v) { return OrderedJson(v); }, value);
@@ -62,12 +65,13 @@ void read_object(const OrderedJson& object, const std::string& prefix, const std
 }
 
 OrderedJson parse(const std::string& text, const std::string& where) {
-  const auto check = [&](int depth, OrderedJson::parse_event_t, OrderedJson&) {
-    if (depth > deepest_option) throw InputError(where, "", "JSON nested too deep", "an object of options");
-    return true;
-  };
+  const JsonExtent extent = json_extent(text);
+  if (extent.depth > deepest_option)
+    throw InputError(where, "", "JSON nested too deep", "an object of options");
+  if (extent.values > most_values)
+    throw InputError(where, "", std::to_string(extent.values) + " values", "an object of options");
   try {
-    return OrderedJson::parse(text, check);
+    return OrderedJson::parse(text);
   } catch (const OrderedJson::exception&) {
     throw InputError(where, "", "text that is not JSON", "an object of options");
   }

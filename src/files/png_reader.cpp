@@ -1,7 +1,9 @@
 #include <png.h>
 
+#include <array>
 #include <bit>
 #include <csetjmp>
+#include <cstring>
 #include <new>
 #include <span>
 #include <string>
@@ -15,6 +17,8 @@
 namespace traceflow {
 
 namespace {
+
+constexpr const char* remedy = "write or copy the file again";
 
 struct PngSource : PngExit {
   explicit PngSource(const InputFile& from) : file(from) {}
@@ -54,6 +58,7 @@ class PngReader {
   PngReader& operator=(const PngReader&) = delete;
 
   PngSize read_header() {
+    refuse_sides();
     if (!try_header()) fail();
     const PngSize size{static_cast<int>(png_get_image_width(png_, info_)),
                        static_cast<int>(png_get_image_height(png_, info_)),
@@ -78,6 +83,21 @@ class PngReader {
  private:
   static std::string size_text(const PngSize& size) {
     return std::to_string(size.width) + "×" + std::to_string(size.height);
+  }
+  // Ahead of libpng, which says neither which side it refuses nor what it is.
+  void refuse_sides() const {
+    std::array<png_byte, 24> start{};
+    if (source_.file.size() < static_cast<int64_t>(start.size())) return;
+    source_.file.read_at(0, std::as_writable_bytes(std::span(start)));
+    if (png_sig_cmp(start.data(), 0, 8) != 0 || std::memcmp(&start[12], "IHDR", 4) != 0) return;
+    refuse_side("width", png_get_uint_32(&start[16]));
+    refuse_side("height", png_get_uint_32(&start[20]));
+  }
+  void refuse_side(const char* field, png_uint_32 pixels) const {
+    if (pixels >= 1 && pixels <= max_image_side) return;
+    throw InputError(source_.file.path().string(), field, std::to_string(pixels),
+                     "1 to " + std::to_string(max_image_side) + " pixels",
+                     pixels == 0 ? remedy : "scale the image down");
   }
   bool try_header() {
     if (setjmp(png_jmpbuf(png_)) != 0) return false;
@@ -113,8 +133,7 @@ class PngReader {
   }
   [[noreturn]] void fail(const std::string& found) const {
     throw InputError(source_.file.path().string(), "", found,
-                     "a PNG image of at most 32,768 pixels a side and 2²⁸ in all",
-                     "write or copy the file again");
+                     "a PNG image of at most 32,768 pixels a side and 2²⁸ in all", remedy);
   }
 
   PngSource source_;

@@ -7,7 +7,6 @@
 #include <array>
 #include <charconv>
 #include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
@@ -16,6 +15,8 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "files/half.h"
+#include "files/input_file.h"
+#include "files/json_document.h"
 
 namespace traceflow {
 
@@ -74,33 +75,18 @@ std::string shown(const Json& value) {
   return shown(value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-std::ifstream open(const std::filesystem::path& path, uint64_t& size) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    throw InputError(path.string(), "", "no such file", "a safetensors file");
-  }
-  size = std::filesystem::file_size(path, error);
-  std::ifstream file(path, std::ios::binary);
-  if (error || !file)
-    throw InputError(path.string(), "", "a file that cannot be opened", "a safetensors file");
-  return file;
-}
-
-void read_bytes(std::ifstream& file, const std::string& origin, const std::string& field,
-                std::span<char> into) {
-  file.read(into.data(), static_cast<std::streamsize>(into.size()));
-  if (file.gcount() != static_cast<std::streamsize>(into.size())) {
-    throw InputError(origin, field, "an early end of file", std::to_string(into.size()) + " bytes");
-  }
-}
-
 // The header as JSON. A name that stands twice is refused, since readers would differ on which one counts; so
 // is nesting that no header has, since printing it would take the stack.
 Json parse_header(const std::string& text, const std::string& origin) {
+  const JsonExtent extent = json_extent(text);
+  if (extent.depth > deepest_header)
+    throw InputError(origin, "header", "JSON nested too deep", "a safetensors header");
+  if (extent.values > max_json_values) {
+    throw InputError(origin, "header", std::to_string(extent.values) + " values",
+                     "at most " + std::to_string(max_json_values));
+  }
   std::set<std::string> names;
   const auto check = [&](int depth, Json::parse_event_t event, Json& value) {
-    if (depth > deepest_header)
-      throw InputError(origin, "header", "JSON nested too deep", "a safetensors header");
     if (event == Json::parse_event_t::key && depth == 1 && !names.insert(value.get<std::string>()).second) {
       throw InputError(origin, "header", "the name " + shown(value) + " twice", "every tensor once");
     }
@@ -115,17 +101,16 @@ Json parse_header(const std::string& text, const std::string& origin) {
   }
 }
 
-Json read_header(std::ifstream& file, uint64_t file_size, const std::string& origin, uint64_t& data_start) {
+Json read_header(const InputFile& file, const std::string& origin, uint64_t& data_start) {
+  const auto file_size = static_cast<uint64_t>(file.size());
   if (file_size < length_bytes) {
     throw InputError(origin, "", std::to_string(file_size) + " bytes",
                      "a safetensors file of 8 bytes or more");
   }
-  std::array<char, length_bytes> length{};
-  read_bytes(file, origin, "header length", length);
+  std::array<std::byte, length_bytes> length{};
+  file.read_at(0, length);
   uint64_t header_bytes = 0;
-  for (size_t i = 0; i < length_bytes; ++i) {
-    header_bytes |= static_cast<uint64_t>(static_cast<unsigned char>(length[i])) << (8 * i);
-  }
+  for (size_t i = 0; i < length_bytes; ++i) header_bytes |= std::to_integer<uint64_t>(length[i]) << (8 * i);
   const uint64_t limit = std::min(max_header_bytes, file_size - length_bytes);
   if (header_bytes > limit) {
     throw InputError(origin, "header length", std::to_string(header_bytes),
@@ -133,7 +118,7 @@ Json read_header(std::ifstream& file, uint64_t file_size, const std::string& ori
                      "the file is cut short or is not a safetensors file");
   }
   std::string text(header_bytes, '\0');
-  read_bytes(file, origin, "header", text);
+  file.read_at(length_bytes, std::as_writable_bytes(std::span(text)));
   data_start = length_bytes + header_bytes;
   return parse_header(text, origin);
 }
@@ -260,7 +245,8 @@ class Checksums {
   Checksums(std::map<std::string, std::string>& metadata, std::string origin) : origin_(std::move(origin)) {
     const auto found = metadata.find(checksums_key);
     if (found == metadata.end()) return;
-    Json json = Json::parse(found->second, nullptr, false);
+    const bool fits = json_extent(found->second).values <= max_json_values;
+    Json json = fits ? Json::parse(found->second, nullptr, false) : Json();
     metadata.erase(found);
     if (!json.is_object() || !json.contains("metadata") || !json.contains("tensors") ||
         !json["tensors"].is_object()) {
@@ -323,31 +309,30 @@ std::vector<std::byte> bytes_of(const Tensor<T>& tensor) {
 Safetensors Safetensors::read(const std::filesystem::path& path) {
   Safetensors result;
   result.origin_ = path.string();
-  uint64_t file_size = 0;
+  const InputFile file(path);
   uint64_t data_start = 0;
-  std::ifstream file = open(path, file_size);
-  const Json header = read_header(file, file_size, result.origin_, data_start);
+  const Json header = read_header(file, result.origin_, data_start);
+  const uint64_t data_bytes = static_cast<uint64_t>(file.size()) - data_start;
 
   std::vector<Described> tensors;
   for (const auto& [name, entry] : header.items()) {
     if (name == metadata_key) {
       result.metadata = parse_metadata(entry, result.origin_);
     } else {
-      tensors.push_back(parse_entry(name, entry, result.origin_, file_size - data_start));
+      tensors.push_back(parse_entry(name, entry, result.origin_, data_bytes));
     }
   }
   std::sort(tensors.begin(), tensors.end(), [](const Described& a, const Described& b) {
     return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
   });
-  check_tiling(tensors, result.origin_, file_size - data_start);
+  check_tiling(tensors, result.origin_, data_bytes);
   const Checksums checksums(result.metadata, result.origin_);
   result.has_checksums_ = checksums.exist();
   if (checksums.exist()) checksums.check_names(tensors);
 
   for (const Described& t : tensors) {
     std::vector<std::byte> bytes(t.end - t.begin);
-    read_bytes(file, result.origin_, "tensor " + shown(t.name),
-               {reinterpret_cast<char*>(bytes.data()), bytes.size()});
+    file.read_at(static_cast<int64_t>(data_start + t.begin), bytes);
     if (checksums.exist()) checksums.check(t, bytes);
     std::string type(t.type.name);
     if (type == "F16" || type == "BF16") {

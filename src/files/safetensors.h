@@ -17,8 +17,9 @@ namespace traceflow {
 // metadata, in one more metadata entry that other readers pass over.
 class Safetensors {
  public:
-  // Throws InputError for a file that is not one, whose header points outside it, or of which a section does
-  // not agree with its checksum: then the error names the tensor, or "metadata".
+  // Throws InputError for a file that is missing or is not one, whose header points outside it, or of which a
+  // section does not agree with its checksum: then the error names the tensor, or "metadata". UnreadableFile
+  // (files/input_file.h) where the system refuses.
   static Safetensors read(const std::filesystem::path& path);
 
   // Takes a copy of the tensor, wherever it is.

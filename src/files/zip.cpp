@@ -86,7 +86,8 @@ Directory find_directory(const InputFile& file) {
     if (end64.u32(0) != end64_signature) fail(file, "a broken zip64 record");
     return {end64.u64(48), end64.u64(40)};
   }
-  fail(file, "no zip directory");
+  const bool begins_as_one = bytes.size() >= 4 && Bytes(file, 0, 4).u32(0) == local_signature;
+  fail(file, begins_as_one ? "a zip archive whose end is missing" : "a file that is no zip archive");
 }
 
 // Sizes of 4 GiB and more stand in an extra field, in a fixed order, only those that did not fit.

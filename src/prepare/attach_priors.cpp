@@ -7,6 +7,8 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "base/folder_lock.h"
+#include "base/work.h"
 #include "capture/decode.h"
 #include "capture/image_cache.h"
 #include "files/json_document.h"
@@ -51,15 +53,23 @@ class Staging {
   Staging& operator=(const Staging&) = delete;
 
   fs::path operator/(const fs::path& name) const { return folder_ / name; }
-  // Puts the folder made here in the place of what the capture has.
-  void move_in(const Kind& kind) const {
+  // Puts the folders made here in the place of what the capture has: all, or none.
+  void move_in() const {
+    std::vector<const Kind*> moved;
     try {
-      for (const char* name : kind.replaced) {
-        if (fs::exists(capture_ / name)) fs::rename(capture_ / name, old(name));
+      for (const Kind& kind : kinds) {
+        if (!fs::exists(folder_ / kind.folder)) continue;
+        moved.push_back(&kind);
+        for (const char* name : kind.replaced) {
+          if (fs::exists(capture_ / name)) fs::rename(capture_ / name, old(name));
+        }
+        fs::rename(folder_ / kind.folder, capture_ / kind.folder);
       }
-      fs::rename(folder_ / kind.folder, capture_ / kind.folder);
     } catch (const fs::filesystem_error&) {
-      put_back(kind);
+      for (const Kind* kind : moved) {
+        if (!fs::exists(folder_ / kind->folder)) fs::rename(capture_ / kind->folder, folder_ / kind->folder);
+        put_back(*kind);
+      }
       throw;
     }
   }
@@ -116,17 +126,13 @@ void for_each_view(const std::map<std::string, int64_t>& matched, Source&& take,
        [&](int64_t place, auto&& value) { f(by_index.at(indices[static_cast<size_t>(place)]), value); });
 }
 
-// What the axes are measured on: the training views nearest to time 0, when the points were there.
 AxisEvidence measure(const Capture& capture, const NormalSource& source,
                      const std::map<std::string, int64_t>& matched, const Staging& staging) {
-  constexpr size_t views_to_check = 6;
   std::vector<const View*> views;
   for (const View& view : capture.train) {
     if (matched.contains(view.id)) views.push_back(&view);
   }
-  std::stable_sort(views.begin(), views.end(),
-                   [](const View* a, const View* b) { return a->time < b->time; });
-  views.resize(std::min(views.size(), views_to_check));
+  views = views_for_axes(std::move(views));
   std::map<std::string, int64_t> some;
   for (const View* view : views) some.emplace(view->id, matched.at(view->id));
   fs::create_directories(staging / "probe");
@@ -170,16 +176,20 @@ void attach_normals(const Capture& capture, const AttachOptions& options, const 
 void attach_masks(const Capture& capture, const AttachOptions& options, const Staging& staging,
                   const Say& say, const std::atomic<bool>& stop) {
   const PictureSource source(options.masks, 0, staging / "ffmpeg.log", stop);
-  const std::vector<std::string> names = source.names();
-  auto count = static_cast<int64_t>(names.size());
-  if (!source.is_folder()) source.take_all(true, [&](int64_t, Tensor<uint8_t>&&) { ++count; });
-  const auto matched = match_views(options.masks, names, count, ids_of(capture.train), all_ids(capture));
+  const auto matched =
+      match_views(options.masks, source.names(), source.count(), ids_of(capture.train), all_ids(capture));
+  std::map<std::string, Camera<float>> cameras;
+  for (const auto* split : {&capture.train, &capture.test}) {
+    for (const View& view : *split) cameras.emplace(view.id, view.camera);
+  }
   fs::create_directories(staging / "mask/1x");
   double covered = 0;
   for_each_view(
       matched, [&](const auto& indices, const auto& f) { source.take_some(true, indices, f); },
       [&](const std::string& id, const Tensor<uint8_t>& picture) {
         const Tensor<uint8_t> mask = as_mask(picture);
+        const Camera<float>& camera = cameras.at(id);
+        require_proportions(options.masks, mask, id, camera.width, camera.height);
         covered += share_of(mask) / static_cast<double>(matched.size());
         write_mask(staging / "mask/1x" / (id + ".png.png"), mask);
       });
@@ -233,12 +243,12 @@ FoundAxes find_axes(PriorAxes asked, const AxisEvidence& evidence, const std::st
     return {prior_axis_signs(asked), measured + ": " + prior_axes_name(asked) +
                                          (choice.warning.empty() ? "" : "; warning: " + choice.warning)};
   }
-  for (const PriorAxes axes : {PriorAxes::opengl, PriorAxes::opencv, PriorAxes::stable_normal}) {
-    if (agrees(axes, evidence)) return {prior_axis_signs(axes), measured + ": " + prior_axes_name(axes)};
-  }
-  constexpr double clear = 0.3;
-  if (std::min({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) < clear) {
-    throw InputError(origin, "axes", measured, "axes of a known kind", "say which they are with --axes");
+  const std::vector<PriorAxes> agreeing = agreeing_axes(evidence);
+  if (agreeing.size() == 1)
+    return {prior_axis_signs(agreeing.front()), measured + ": " + prior_axes_name(agreeing.front())};
+  if (!agreeing.empty() || !decides_all(evidence)) {
+    throw InputError(origin, "axes", measured, "what tells one kind of axes from the others",
+                     "say which they are with --axes");
   }
   return {sign(c), measured + ": no known axes, taken as measured"};
 }
@@ -250,14 +260,14 @@ void attach_priors(const fs::path& capture, const AttachOptions& options, const 
     throw InputError(capture.string(), "dataset.json", "no such file", "a folder in the layout of NeRF-DS",
                      "see docs/captures.md");
   }
+  const FolderLock lock(capture / ".attach-priors.lock", capture, "attaching priors");
   if (!options.normals.empty()) refuse_to_replace(capture, normals_kind, options);
   if (!options.masks.empty()) refuse_to_replace(capture, masks_kind, options);
   const Capture loaded = load_capture(capture, {});
   const Staging staging(capture);
   if (!options.normals.empty()) attach_normals(loaded, options, staging, say, stop);
   if (!options.masks.empty()) attach_masks(loaded, options, staging, say, stop);
-  if (!options.normals.empty()) staging.move_in(normals_kind);
-  if (!options.masks.empty()) staging.move_in(masks_kind);
+  staging.move_in();
 }
 
 }  // namespace traceflow::prepare

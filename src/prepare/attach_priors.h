@@ -32,7 +32,8 @@ struct AttachOptions {
 
 // Puts normals and masks of other programs into a capture in the layout of NeRF-DS: normal/1x/ID.png with 16
 // bits and the axes that are the default there (x right, y up, z to the viewer), mask/1x/ID.png.png. `say`
-// gets a line for everything found. Throws InputError, with the capture as it was, and Stopped.
+// gets a line for everything found. Throws InputError, with the capture as it was, also where another process
+// is at it; and Stopped.
 void attach_priors(const std::filesystem::path& capture, const AttachOptions& options,
                    const std::function<void(const std::string& line)>& say, const std::atomic<bool>& stop);
 
@@ -43,8 +44,8 @@ std::map<std::string, int64_t> match_views(const std::string& origin, const std:
                                            const std::vector<std::string>& all_ids);
 
 // The signs of the axes of normals against the camera's (x right, y down, z forward), and in words how they
-// were found. automatic: those of the known axes that the evidence agrees with, else the evidence's own;
-// InputError where it does not speak clearly.
+// were found. automatic: the one of the known axes that the evidence agrees with, else the evidence's own;
+// InputError where several agree, or it does not decide.
 struct FoundAxes {
   Vec3<double> signs{1};
   std::string text;

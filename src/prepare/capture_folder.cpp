@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <map>
 #include <set>
@@ -87,17 +88,19 @@ Tensor<float> straight(const PosedFrame& posed, const Tensor<uint8_t>& picture) 
 }
 
 void write_pictures(const std::vector<PosedFrame>& posed, const fs::path& pictures, const fs::path& folder,
-                    const std::atomic<bool>& stop) {
+                    const Work& work) {
+  const auto count = static_cast<int64_t>(posed.size());
+  std::atomic<int64_t> done = 0;
   parallel_for(
-      "prepare: pictures", static_cast<int64_t>(posed.size()),
+      "prepare: pictures", count,
       [&](int64_t i) {
-        if (stop) return;
+        work.check();
         const PosedFrame& p = posed[static_cast<size_t>(i)];
         const std::string name = p.frame->id + ".png";
         write_halved(straight(p, read_png(pictures / name)), folder / "rgb", name);
+        work.tell(++done, count);
       },
       1);
-  if (stop) throw Stopped{};
 }
 
 void write_given_masks(const std::vector<PosedFrame>& posed, const fs::path& masks, const fs::path& folder) {
@@ -127,7 +130,7 @@ std::optional<TwoView> lines_between(const PosedFrame& a, const PosedFrame& b, d
 }
 
 void write_estimated_masks(const std::vector<PosedFrame>& posed, double typical_depth, const fs::path& folder,
-                           const std::atomic<bool>& stop) {
+                           const Work& work) {
   for (const int camera : {0, 1}) {
     std::vector<const PosedFrame*> mine;
     std::vector<fs::path> files;
@@ -141,27 +144,25 @@ void write_estimated_masks(const std::vector<PosedFrame>& posed, double typical_
         [&](int64_t i, int64_t j) {
           return lines_between(*mine[static_cast<size_t>(i)], *mine[static_cast<size_t>(j)], typical_depth);
         },
-        stop,
+        work,
         [&](int64_t i, const Tensor<uint8_t>& mask) {
           write_mask(folder / "mask/1x" / (mine[static_cast<size_t>(i)]->frame->id + ".png.png"), mask);
         });
   }
 }
 
-double typical_depth(const std::vector<Vec3<double>>& points, const std::vector<PosedFrame>& posed) {
+double typical_depth(const std::vector<Vec3<double>>& points, const std::vector<Camera<double>>& cameras) {
   std::vector<double> depths;
-  for (const PosedFrame& p : posed) {
-    for (const Vec3<double>& point : points) {
-      const double z = p.camera.point_in_camera(point).z;
-      if (z > 0) depths.push_back(z);
-    }
-  }
+  for_each_sampled_pair(points, cameras, [&](const Vec3<double>& point, const Camera<double>& camera) {
+    const double z = camera.point_in_camera(point).z;
+    if (z > 0) depths.push_back(z);
+  });
   return depths.empty() ? 1 : median(std::move(depths));
 }
 
 // Milliseconds; of pictures without times, their places.
 int64_t time_of(const Frame& frame) {
-  return std::llround(frame.source.empty() ? 1000 * frame.time : frame.time);
+  return std::llround(frame.is_of_film() ? 1000 * frame.time : frame.time);
 }
 
 std::vector<NerfiesView> views_of(const PrepareOptions& options, const std::vector<PosedFrame>& posed) {
@@ -196,7 +197,7 @@ std::vector<Vec3<double>> good_points(const ColmapModel& model) {
 }
 
 std::string write_capture(const PrepareOptions& options, const CaptureParts& parts, const fs::path& folder,
-                          const std::atomic<bool>& stop) {
+                          const Work& work) {
   const std::vector<PosedFrame> posed = posed_frames(parts);
   const std::vector<NerfiesView> views = views_of(options, posed);
   const auto tests =
@@ -211,20 +212,20 @@ std::string write_capture(const PrepareOptions& options, const CaptureParts& par
   }
   fs::remove_all(folder);
   for (const char* name : {"camera", "rgb/1x", "rgb/2x", "rgb/4x"}) fs::create_directories(folder / name);
-  write_pictures(posed, parts.pictures, folder, stop);
+  write_pictures(posed, parts.pictures, folder, work);
   const std::vector<Vec3<double>> points = good_points(parts.model);
+  std::vector<Camera<double>> cameras;
+  cameras.reserve(posed.size());
+  for (const PosedFrame& p : posed) cameras.push_back(p.camera);
   if (wants_masks(options)) {
     fs::create_directories(folder / "mask/1x");
     if (options.masks == "estimate") {
-      write_estimated_masks(posed, typical_depth(points, posed), folder, stop);
+      write_estimated_masks(posed, typical_depth(points, cameras), folder, work);
     } else {
       write_given_masks(posed, parts.masks, folder);
     }
   }
   write_points(folder / "points.npy", points);
-  std::vector<Camera<double>> cameras;
-  cameras.reserve(posed.size());
-  for (const PosedFrame& p : posed) cameras.push_back(p.camera);
   const SceneBounds bounds = scene_bounds(points, cameras);
   write_nerfies_layout(folder, views, {bounds.normalisation, bounds.near_plane, bounds.far_plane});
   const double zoom = posed.front().zoom;
@@ -236,12 +237,15 @@ std::string write_capture(const PrepareOptions& options, const CaptureParts& par
 }
 
 void check_place(const fs::path& capture) {
-  if (!fs::exists(capture) || (fs::is_directory(capture) && fs::is_empty(capture))) return;
+  if (!fs::exists(capture)) return;
   const auto refuse = [&](const std::string& found) {
     throw InputError(capture.string(), "output folder", found, "a new folder, or a capture that prepare made",
                      "choose another folder, or move what is there away");
   };
   if (!fs::is_directory(capture)) refuse("a file");
+  // It would be another folder afterwards, and this one gone.
+  if (fs::equivalent(capture, fs::current_path())) refuse("the folder that you are in");
+  if (fs::is_empty(capture)) return;
   if (!fs::exists(capture / marker)) refuse("other files in it");
   const std::set<std::string> own(own_names.begin(), own_names.end());
   for (const auto& entry : fs::directory_iterator(capture)) {

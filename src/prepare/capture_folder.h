@@ -1,9 +1,9 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <string>
 
+#include "base/work.h"
 #include "capture/formats/colmap_model.h"
 #include "prepare/frames.h"
 
@@ -21,7 +21,7 @@ struct CaptureParts {
 // again, by the cameras' own epipolar lines. What was written, in words. Throws InputError where train or
 // test were empty, and Stopped.
 std::string write_capture(const PrepareOptions& options, const CaptureParts& parts,
-                          const std::filesystem::path& folder, const std::atomic<bool>& stop);
+                          const std::filesystem::path& folder, const Work& work);
 
 // The points that several pictures agree on: the error is below 2 pixels, and three pictures see them.
 std::vector<Vec3<double>> good_points(const ColmapModel& model);

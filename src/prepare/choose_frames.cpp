@@ -61,6 +61,20 @@ std::vector<int64_t> nearest_frames(const std::vector<Candidate>& candidates,
     const bool found = best != candidates.end() && std::abs(best->time - time) <= tolerance;
     nearest.push_back(found ? best - candidates.begin() : -1);
   }
+  const auto distance = [&](size_t i) {
+    return std::abs(candidates[static_cast<size_t>(nearest[i])].time - times[i]);
+  };
+  size_t last = 0;  // the last one so far that keeps its candidate
+  for (size_t i = 1; i < times.size(); ++i) {
+    if (nearest[i] < 0) continue;
+    const bool shared = nearest[last] == nearest[i];
+    if (shared && distance(i) >= distance(last)) {
+      nearest[i] = -1;
+      continue;
+    }
+    if (shared) nearest[last] = -1;
+    last = i;
+  }
   return nearest;
 }
 

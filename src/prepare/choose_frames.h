@@ -11,6 +11,7 @@ namespace traceflow::prepare {
 struct Candidate {
   double time = 0;  // seconds, or its place in the folder
   double sharpness = 0;
+  int64_t index = 0;  // its place in the film or folder
 };
 
 // Cuts the time from --start to --end into --frames equal intervals, or into those of --rate, and takes the
@@ -18,8 +19,8 @@ struct Candidate {
 // --frames. Candidates come in the order of time. Intervals without a candidate give none.
 std::vector<int64_t> choose_frames(const std::vector<Candidate>& candidates, const PrepareOptions& options);
 
-// For each time the candidate that is nearest to it, or -1 where none is within `tolerance`. Both come in the
-// order of time.
+// For each time the candidate that is nearest to it, or -1 where none is within `tolerance`, or where the
+// candidate is nearer to another of the times. Both come in the order of time.
 std::vector<int64_t> nearest_frames(const std::vector<Candidate>& candidates,
                                     const std::vector<double>& times, double tolerance);
 

@@ -4,9 +4,11 @@
 
 #include <charconv>
 #include <fstream>
+#include <optional>
 
 #include "base/error.h"
 #include "base/process.h"
+#include "base/work.h"
 #include "prepare/netpbm.h"
 #include "prepare/programs.h"
 
@@ -25,22 +27,37 @@ std::string filters(const Film& film) {
   return chain + "showinfo=checksum=0";
 }
 
-// Of the pictures that showinfo has told of.
+// The whole number after `key` in the line, which may have spaces before it.
+std::optional<int64_t> number_after(const std::string& line, const std::string& key) {
+  const size_t at = line.find(key);
+  if (at == std::string::npos) return std::nullopt;
+  const size_t begin = line.find_first_not_of(' ', at + key.size());
+  int64_t number = 0;
+  if (begin == std::string::npos ||
+      std::from_chars(line.data() + begin, line.data() + line.size(), number).ec != std::errc())
+    return std::nullopt;
+  return number;
+}
+
+// Seconds of the pictures that showinfo has told of, until one has no time. They are counted in the film's
+// own unit of time: showinfo's seconds have six digits, too few late in a long film.
 std::vector<double> read_times(const std::filesystem::path& log) {
-  const std::string key = " pts_time:";
+  const std::string unit_key = " config in time_base: ";
   std::vector<double> times;
+  double unit = 0;
   std::ifstream file(log);
   for (std::string line; std::getline(file, line);) {
-    const size_t at = line.find(key);
-    if (at == std::string::npos || line.find("showinfo") == std::string::npos) continue;
-    const size_t begin = line.find_first_not_of(' ', at + key.size());
-    double time = 0;
-    if (begin == std::string::npos ||
-        std::from_chars(line.data() + begin, line.data() + line.size(), time).ec != std::errc()) {
-      throw InputError(log.string(), "pts_time", line.substr(at, 40), "a time stamp for every picture",
-                       "write the film anew with ffmpeg");
+    if (line.find("showinfo") == std::string::npos) continue;
+    if (const auto numerator = number_after(line, unit_key)) {
+      const auto denominator = number_after(line.substr(line.find(unit_key)), "/");
+      unit = denominator && *denominator > 0
+                 ? static_cast<double>(*numerator) / static_cast<double>(*denominator)
+                 : 0;
+    } else if (line.find(" pts:") != std::string::npos) {
+      const auto stamp = number_after(line, " pts:");
+      if (!stamp || !(unit > 0)) break;
+      times.push_back(static_cast<double>(*stamp) * unit);
     }
-    times.push_back(time);
   }
   return times;
 }
@@ -90,7 +107,7 @@ std::vector<double> decode_film(const Film& film, const std::filesystem::path& l
   if (stop) throw Stopped{};
   if (!ended_well || count == 0) {
     throw InputError(film.path.string(), "", "what ffmpeg cannot read: " + last_line(log),
-                     "a film or picture", "see " + log.string());
+                     "a film or picture");
   }
   std::vector<double> times = read_times(log);
   if (times.size() < static_cast<size_t>(count)) {

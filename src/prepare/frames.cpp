@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "base/robust.h"
 #include "capture/sharpness.h"
 #include "files/json_document.h"
 #include "files/png.h"
@@ -20,40 +22,48 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 // Times and sharpness of all.
-std::vector<Candidate> look_at(const PictureSource& source) {
+std::vector<Candidate> look_at(const PictureSource& source, const Work& work) {
+  const auto all = static_cast<int64_t>(source.names().size());
   std::vector<Candidate> found;
   const std::vector<double> times = source.take_all(true, [&](int64_t, Tensor<uint8_t>&& picture) {
-    found.push_back({0, sharpness(picture)});
+    found.push_back({0, sharpness(picture), static_cast<int64_t>(found.size())});
+    work.tell(static_cast<int64_t>(found.size()), all);
   });
   for (size_t i = 0; i < found.size(); ++i) found[i].time = times[i];
   return found;
 }
 
-void check_enough(const fs::path& input, size_t found) {
-  if (found >= static_cast<size_t>(fewest_frames)) return;
-  throw InputError(input.string(), "pictures", std::to_string(found),
-                   fmt::format("at least {} between --start and --end", fewest_frames));
+void check_count(const fs::path& input, size_t found) {
+  const auto count = static_cast<int64_t>(found);
+  if (count >= fewest_frames && count <= most_frames) return;
+  throw InputError(input.string(), "pictures", std::to_string(count),
+                   fmt::format("{} to {} between --start and --end", fewest_frames, most_frames),
+                   count > most_frames ? "use --frames, or a smaller --rate" : "");
 }
 
 // Every n-th of the first camera's times, and what the second camera saw then.
 void add_test_camera(const PrepareOptions& options, std::vector<Candidate> second, double first_time,
                      Frames& frames) {
-  std::vector<double> times;
-  double gap = 0;
+  std::vector<double> times, gaps;
   for (size_t i = 0; i < frames.frames.size(); ++i) {
-    if (i > 0) gap = std::max(gap, frames.frames[i].time - frames.frames[i - 1].time);
+    if (i > 0) gaps.push_back(frames.frames[i].time - frames.frames[i - 1].time);
     if (static_cast<int>(i) % options.test_every == options.test_every / 2)
-      times.push_back(frames.frames[i].time + first_time);
+      times.push_back(frames.frames[i].time);
   }
-  for (Candidate& c : second) c.time += options.test_offset;
-  const std::vector<int64_t> nearest = nearest_frames(second, times, gap / 2);
+  if (times.empty()) {
+    throw InputError(
+        "option", "test_every", std::to_string(options.test_every),
+        fmt::format("at most {} for {} pictures", 2 * frames.frames.size() - 1, frames.frames.size()));
+  }
+  for (Candidate& c : second) c.time += options.test_offset - first_time;
+  std::erase_if(second, [](const Candidate& c) { return c.time < 0; });
+  const std::vector<int64_t> nearest = nearest_frames(second, times, median(std::move(gaps)) / 2);
   for (size_t i = 0; i < times.size(); ++i) {
     if (nearest[i] < 0) continue;
     const Candidate& c = second[static_cast<size_t>(nearest[i])];
     const size_t beside =
         i * static_cast<size_t>(options.test_every) + static_cast<size_t>(options.test_every / 2);
-    frames.frames.push_back({fmt::format("{:06}_right", beside), 1, "", nearest[i],
-                             std::max(0.0, c.time - first_time), c.sharpness});
+    frames.frames.push_back({fmt::format("{:06}_right", beside), 1, "", c.index, c.time, c.sharpness});
   }
   if (frames.frames.back().camera == 0) {
     throw InputError(options.test_video, "time stamps", "none at the first film's times",
@@ -62,7 +72,8 @@ void add_test_camera(const PrepareOptions& options, std::vector<Candidate> secon
   }
 }
 
-void write_pictures(const PictureSource& source, int camera, const fs::path& folder, Frames& frames) {
+void write_pictures(const PictureSource& source, int camera, const fs::path& folder, const Work& work,
+                    Frames& frames) {
   std::vector<Frame*> mine;
   std::vector<int64_t> indices;
   for (Frame& frame : frames.frames) {
@@ -82,25 +93,32 @@ void write_pictures(const PictureSource& source, int camera, const fs::path& fol
                        "pictures of one camera, none of them turned");
     }
     write_png(folder / (frame.id + ".png"), picture);
+    work.tell(place + 1, static_cast<int64_t>(indices.size()));
   });
 }
 
 }  // namespace
 
 Frames take_frames(const fs::path& input, const PrepareOptions& options, const fs::path& folder,
-                   const fs::path& log, const std::atomic<bool>& stop) {
-  const PictureSource first(input, options.size, log, stop);
+                   const fs::path& log, const Work& work) {
+  const PictureSource first(input, options.size, log, work.stop());
   if (first.is_folder() && (options.rate > 0 || !options.test_video.empty())) {
     throw InputError(input.string(), "", "pictures without times", "a film for --rate and --test-video",
                      "use --frames");
   }
-  const std::vector<Candidate> candidates = look_at(first);
+  std::optional<PictureSource> second;
+  if (!options.test_video.empty()) {
+    second.emplace(options.test_video, options.size, log, work.stop());
+    if (second->is_folder())
+      throw InputError(options.test_video, "", "pictures without times", "a film for --test-video");
+  }
+  const std::vector<Candidate> candidates = look_at(first, work);
   const std::vector<int64_t> chosen = choose_frames(candidates, options);
-  check_enough(input, chosen.size());
+  check_count(input, chosen.size());
   Frames frames;
   frames.source_frames.push_back(static_cast<int64_t>(candidates.size()));
   const double first_time = candidates[static_cast<size_t>(chosen.front())].time;
-  const char* side = options.test_video.empty() ? "" : "_left";
+  const char* side = second ? "_left" : "";
   for (const int64_t i : chosen) {
     const Candidate& c = candidates[static_cast<size_t>(i)];
     frames.frames.push_back(
@@ -108,14 +126,13 @@ Frames take_frames(const fs::path& input, const PrepareOptions& options, const f
   }
   fs::remove_all(folder);
   fs::create_directories(folder);
-  if (!options.test_video.empty()) {
-    const PictureSource second(options.test_video, options.size, log, stop);
-    const std::vector<Candidate> others = look_at(second);
+  if (second) {
+    std::vector<Candidate> others = look_at(*second, work);
     frames.source_frames.push_back(static_cast<int64_t>(others.size()));
-    add_test_camera(options, others, first_time, frames);
-    write_pictures(second, 1, folder, frames);
+    add_test_camera(options, std::move(others), first_time, frames);
+    write_pictures(*second, 1, folder, work, frames);
   }
-  write_pictures(first, 0, folder, frames);
+  write_pictures(first, 0, folder, work, frames);
   return frames;
 }
 

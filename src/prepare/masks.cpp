@@ -7,6 +7,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "capture/lens/lens.h"
 #include "capture/lens/resample.h"
 #include "capture/sharpness.h"
 #include "files/png.h"
@@ -39,15 +40,12 @@ Scaled small_grey(const fs::path& path) {
 }
 
 // f(frame, mask) for every frame that --masks has a mask of.
-void take_supplied(const PrepareOptions& options, const Frames& frames, const fs::path& log,
-                   const std::atomic<bool>& stop,
+void take_supplied(const PrepareOptions& options, const Frames& frames, const fs::path& log, const Work& work,
                    const std::function<void(const Frame& frame, const Tensor<uint8_t>& mask)>& f) {
-  const PictureSource source(options.masks, 0, log, stop);
-  const std::vector<std::string> names = source.names();
-  auto count = static_cast<int64_t>(names.size());
-  if (!source.is_folder()) source.take_all(true, [&](int64_t, Tensor<uint8_t>&&) { ++count; });
+  const PictureSource source(options.masks, 0, log, work.stop());
+  const std::vector<std::optional<int64_t>> matched =
+      match_masks(options.masks, source.names(), source.count(), frames);
   std::map<int64_t, const Frame*> wanted;
-  const std::vector<std::optional<int64_t>> matched = match_masks(options.masks, names, count, frames);
   for (size_t i = 0; i < matched.size(); ++i) {
     if (matched[i]) wanted[*matched[i]] = &frames.frames[i];
   }
@@ -56,7 +54,33 @@ void take_supplied(const PrepareOptions& options, const Frames& frames, const fs
   for (const auto& [index, frame] : wanted) indices.push_back(index);
   source.take_some(true, indices, [&](int64_t place, Tensor<uint8_t>&& picture) {
     f(*wanted.at(indices[static_cast<size_t>(place)]), as_mask(picture));
+    work.tell(place + 1, static_cast<int64_t>(indices.size()));
   });
+}
+
+using Matched = std::vector<std::optional<int64_t>>;
+
+// place(frame) of each frame, if all of the first camera have one.
+template <class Place>
+std::optional<Matched> all_matched(const Frames& frames, Place&& place) {
+  Matched matched;
+  for (const Frame& frame : frames.frames) {
+    matched.push_back(place(frame));
+    if (frame.camera == 0 && !matched.back()) return std::nullopt;
+  }
+  return matched;
+}
+
+void require_one_each(const std::string& origin, const Matched& matched, const Frames& frames) {
+  std::map<int64_t, const Frame*> owners;
+  for (size_t i = 0; i < matched.size(); ++i) {
+    if (!matched[i]) continue;
+    const auto [owner, is_first] = owners.emplace(*matched[i], &frames.frames[i]);
+    if (is_first) continue;
+    throw InputError(
+        origin, "masks", fmt::format("one for both {} and {}", owner->second->id, frames.frames[i].id),
+        "one for each frame", "name the pictures and their masks differently before their endings");
+  }
 }
 
 }  // namespace
@@ -68,39 +92,40 @@ std::vector<std::optional<int64_t>> match_masks(const std::string& origin,
                                                 const Frames& frames) {
   std::map<std::string, int64_t> by_name;
   for (size_t i = 0; i < names.size(); ++i) by_name.emplace(stem_of(names[i]), static_cast<int64_t>(i));
-  std::vector<std::optional<int64_t>> matched(frames.frames.size());
-  int64_t named = 0, first_camera = 0;
-  for (size_t i = 0; i < matched.size(); ++i) {
-    const Frame& frame = frames.frames[i];
-    first_camera += frame.camera == 0 ? 1 : 0;
-    for (const std::string& name : {frame.id, stem_of(frame.source)}) {
-      const auto found = by_name.find(name);
-      if (name.empty() || found == by_name.end()) continue;
-      matched[i] = found->second;
-      ++named;
-      break;
-    }
+  const auto named = [&](const std::string& name) -> std::optional<int64_t> {
+    const auto found = by_name.find(name);
+    return found == by_name.end() ? std::nullopt : std::optional(found->second);
+  };
+  const auto first_camera = std::count_if(frames.frames.begin(), frames.frames.end(),
+                                          [](const Frame& frame) { return frame.camera == 0; });
+  const int64_t of_film = frames.source_frames.front();
+  int64_t order = 0;
+  std::optional<Matched> matched =
+      all_matched(frames, [&](const Frame& frame) { return named(stem_of(frame.source)); });
+  if (!matched && count == of_film) {
+    matched = all_matched(frames, [&](const Frame& frame) {
+      return frame.camera == 0 ? std::optional(frame.index) : std::nullopt;
+    });
   }
-  if (named >= first_camera) return matched;
-  const bool of_frames = count == first_camera, of_film = count == frames.source_frames.front();
-  if (!of_frames && !of_film) {
-    throw InputError(origin, "masks", fmt::format("{}, of which {} have a frame's name", count, named),
+  if (!matched) matched = all_matched(frames, [&](const Frame& frame) { return named(frame.id); });
+  if (!matched && count == first_camera) {
+    matched = all_matched(frames, [&](const Frame& frame) {
+      return frame.camera == 0 ? std::optional(order++) : std::nullopt;
+    });
+  }
+  if (!matched) {
+    throw InputError(origin, "masks", fmt::format("{}, not all of them with a frame's name", count),
                      fmt::format("one for each of {} frames, or of the {} pictures they were taken from",
-                                 first_camera, frames.source_frames.front()),
+                                 first_camera, of_film),
                      "see the frames' names with --until frames");
   }
-  int64_t place = 0;
-  for (size_t i = 0; i < matched.size(); ++i) {
-    matched[i].reset();
-    if (frames.frames[i].camera != 0) continue;
-    matched[i] = of_frames ? place++ : frames.frames[i].index;
-  }
-  return matched;
+  require_one_each(origin, *matched, frames);
+  return *matched;
 }
 
 void estimate_masks(const std::vector<fs::path>& pictures,
                     const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& lines,
-                    const std::atomic<bool>& stop,
+                    const Work& work,
                     const std::function<void(int64_t i, const Tensor<uint8_t>& mask)>& take) {
   if (pictures.empty()) return;
   const double factor = small_grey(pictures.front()).factor;
@@ -112,8 +137,7 @@ void estimate_masks(const std::vector<fs::path>& pictures,
         if (!known) return std::nullopt;
         return in_larger_pixels(*known, factor);
       },
-      stop);
-  if (stop) throw Stopped{};
+      work);
   for (size_t i = 0; i < masks.size(); ++i) {
     const PngSize size = read_png_size(pictures[i]);
     take(static_cast<int64_t>(i), resized_mask(masks[i], size.height, size.width));
@@ -121,19 +145,21 @@ void estimate_masks(const std::vector<fs::path>& pictures,
 }
 
 std::string make_masks(const PrepareOptions& options, const Frames& frames, const fs::path& pictures,
-                       const fs::path& masks, const fs::path& log, const std::atomic<bool>& stop) {
+                       const fs::path& masks, const fs::path& log, const Work& work) {
   fs::remove_all(masks);
   if (!wants_masks(options)) return "none";
   fs::create_directories(masks);
   double covered = 0;
   int64_t count = 0;
   const auto keep = [&](const Frame& frame, const Tensor<uint8_t>& mask) {
+    require_proportions(options.masks, mask, frame.id, static_cast<double>(frame.width),
+                        static_cast<double>(frame.height));
     write_mask(masks / (frame.id + ".png"), resized_mask(mask, frame.height, frame.width));
     covered += share_of(mask);
     ++count;
   };
   if (options.masks != "estimate") {
-    take_supplied(options, frames, log, stop, keep);
+    take_supplied(options, frames, log, work, keep);
     require_white(options.masks, covered);
   } else {
     for (const int camera : {0, 1}) {
@@ -145,11 +171,13 @@ std::string make_masks(const PrepareOptions& options, const Frames& frames, cons
         files.push_back(pictures / (frame.id + ".png"));
       }
       estimate_masks(
-          files, [](int64_t, int64_t) { return std::nullopt; }, stop,
+          files, [](int64_t, int64_t) { return std::nullopt; }, work,
           [&](int64_t i, const Tensor<uint8_t>& mask) { keep(*mine[static_cast<size_t>(i)], mask); });
     }
   }
-  return fmt::format("{} {}, covering {:.1f}% of the pixels", count,
+  return fmt::format("{} {}, covering {:.1f}% of the pixels",
+                     options.masks == "estimate" ? fmt::format("{}", count)
+                                                 : fmt::format("{} of {}", count, frames.frames.size()),
                      options.masks == "estimate" ? "estimated" : "supplied",
                      100 * covered / static_cast<double>(std::max<int64_t>(1, count)));
 }
@@ -175,6 +203,15 @@ Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_
       result(y, x) = mask((2 * y + 1) * mask.dim(0) / (2 * height), (2 * x + 1) * mask.dim(1) / (2 * width));
   }
   return result;
+}
+
+void require_proportions(const std::string& origin, const Tensor<uint8_t>& mask, const std::string& picture,
+                         double width, double height) {
+  const auto mask_width = static_cast<double>(mask.dim(1)), mask_height = static_cast<double>(mask.dim(0));
+  if (same_proportions(mask_width, mask_height, width, height)) return;
+  throw InputError(origin, "masks", fmt::format("{}×{} for {}", mask_width, mask_height, picture),
+                   fmt::format("the proportions of {}×{}", width, height),
+                   "turn or cut them as the pictures are");
 }
 
 void require_white(const std::string& origin, double covered) {

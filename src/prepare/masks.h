@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "base/tensor.h"
+#include "base/work.h"
 #include "prepare/frames.h"
 #include "prepare/motion/two_view.h"
 
@@ -21,12 +21,14 @@ bool wants_masks(const PrepareOptions& options);
 // ones. What was found, in words. Throws InputError, and Stopped.
 std::string make_masks(const PrepareOptions& options, const Frames& frames,
                        const std::filesystem::path& pictures, const std::filesystem::path& masks,
-                       const std::filesystem::path& log, const std::atomic<bool>& stop);
+                       const std::filesystem::path& log, const Work& work);
 
-// Supplied masks by the frames that they belong to: of a folder by name (that of the frame, or of the picture
-// that it was taken from), else by order: one for each frame of the first camera, or one for each picture of
-// its film. Which picture of the folder or film is the mask of frame i; frames of the second camera have one
-// only by name. Throws InputError where names are missing and the count fits neither.
+// Supplied masks by the frames that they belong to, in one way for all. Of a folder by name: all frames of
+// the first camera by the pictures that they were taken from, or all by their own names, unless there is one
+// mask for each picture of the film, whose names would count those. Else by order: one for each picture of
+// the first camera's film, or one for each of its frames. Which picture of the folder or film is the mask of
+// frame i; frames of the second camera have one only by name. Throws InputError where no way fits, and where
+// two frames would have the same.
 std::vector<std::optional<int64_t>> match_masks(const std::string& origin,
                                                 const std::vector<std::string>& names, int64_t count,
                                                 const Frames& frames);
@@ -36,7 +38,7 @@ std::vector<std::optional<int64_t>> match_masks(const std::string& origin,
 // picture's own size, where it is known. Throws Stopped.
 void estimate_masks(const std::vector<std::filesystem::path>& pictures,
                     const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& lines,
-                    const std::atomic<bool>& stop,
+                    const Work& work,
                     const std::function<void(int64_t i, const Tensor<uint8_t>& mask)>& take);
 
 // 0 and 1 as black and white.
@@ -45,6 +47,10 @@ void write_mask(const std::filesystem::path& path, const Tensor<uint8_t>& mask);
 Tensor<uint8_t> as_mask(const Tensor<uint8_t>& picture);
 // The mask at another size, by nearest pixel.
 Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_t width);
+// Throws InputError for what has other proportions than the picture of this name and size: it was turned, or
+// cut.
+void require_proportions(const std::string& origin, const Tensor<uint8_t>& mask, const std::string& picture,
+                         double width, double height);
 // Throws InputError for masks that cover nothing, whose white is perhaps another grey.
 void require_white(const std::string& origin, double covered);
 // The share of ones.

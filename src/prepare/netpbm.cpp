@@ -8,6 +8,7 @@
 #include <cerrno>
 
 #include "base/error.h"
+#include "base/work.h"
 #include "prepare/programs.h"
 
 namespace traceflow::prepare {

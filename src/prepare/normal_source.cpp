@@ -35,12 +35,8 @@ NormalSource::NormalSource(const fs::path& path, const fs::path& log, const std:
     return;
   }
   pictures_.emplace(path, 0, log, stop);
-  if (pictures_->is_folder()) {
-    folder_ = path;
-    count_ = static_cast<int64_t>(pictures_->names().size());
-  } else {
-    pictures_->take_all(true, [&](int64_t, Tensor<uint8_t>&&) { ++count_; });
-  }
+  if (pictures_->is_folder()) folder_ = path;
+  count_ = pictures_->count();
 }
 
 std::vector<std::string> NormalSource::names() const {

@@ -5,6 +5,7 @@
 #include <cctype>
 
 #include "base/error.h"
+#include "base/utf8.h"
 #include "capture/formats/image_names.h"
 #include "prepare/film.h"
 #include "prepare/programs.h"
@@ -58,8 +59,14 @@ PictureSource::PictureSource(const fs::path& path, int longest_side, fs::path lo
 std::vector<std::string> PictureSource::names() const {
   std::vector<std::string> names;
   names.reserve(files_.size());
-  for (const fs::path& file : files_) names.push_back(file.filename().string());
+  for (const fs::path& file : files_) names.push_back(as_utf8(file.filename().string()));
   return names;
+}
+
+int64_t PictureSource::count() const {
+  auto count = static_cast<int64_t>(files_.size());
+  if (!is_folder()) take_all(true, [&](int64_t, Tensor<uint8_t>&&) { ++count; });
+  return count;
 }
 
 std::vector<double> PictureSource::decode(bool grey, int64_t end,

@@ -25,8 +25,10 @@ class PictureSource {
                 const std::atomic<bool>& stop);
 
   bool is_folder() const { return !files_.empty(); }
-  // Of a folder's pictures; of a film, none.
+  // Of a folder's pictures, in UTF-8 (base/utf8.h); of a film, none.
   std::vector<std::string> names() const;
+  // How many pictures there are; a film is decoded for it.
+  int64_t count() const;
 
   using Take = std::function<void(int64_t index, Tensor<uint8_t>&& picture)>;
   // All, in order; their times in seconds, or their places in the folder. These throw InputError and Stopped.

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
+#include <sstream>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
@@ -67,6 +70,12 @@ void remove_database(const fs::path& database) {
   for (const char* ending : {"", "-shm", "-wal", "-journal"}) fs::remove(database.string() + ending);
 }
 
+ReadShare share_of_all(const Frames& frames) {
+  return [count = static_cast<int64_t>(frames.frames.size())](const std::string& said) {
+    return share_said(said, count);
+  };
+}
+
 // What may help, of what has not been tried.
 std::string advice(const PrepareOptions& options, const Frames& frames) {
   std::string text = "try more frames (--frames, --rate)";
@@ -76,6 +85,15 @@ std::string advice(const PrepareOptions& options, const Frames& frames) {
   text += options.camera_model == CameraModel::opencv ? ", --camera-model simple-radial"
                                                       : ", --camera-model opencv";
   return text + ", or film again with a camera that moves sideways around the scene";
+}
+
+[[noreturn]] void refuse_poses(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder,
+                               int64_t registered) {
+  throw InputError(folder.models().string(), "poses",
+                   fmt::format("{} of {} frames registered", registered, frames.frames.size()),
+                   fmt::format("at least {} and {:g}% (--least-registered)", fewest_frames,
+                               100 * options.least_registered),
+                   advice(options, frames));
 }
 
 struct Registered {
@@ -107,10 +125,11 @@ Registered largest_model(const fs::path& models) {
 }  // namespace
 
 std::string extract_features(const PrepareOptions& options, const Frames& frames, const fs::path& pictures,
-                             const fs::path& masks, const PoseFolder& folder, const std::atomic<bool>& stop) {
+                             const fs::path& masks, const PoseFolder& folder, const Work& work) {
   fs::create_directories(folder.top);
   remove_database(folder.features());
   const bool masked = wants_masks(options);
+  const ReadShare share = share_of_all(frames);
   if (masked) write_feature_masks(frames, masks, folder.masks());
   for (size_t camera = 0; camera < frames.source_frames.size(); ++camera) {
     const fs::path list = folder.top / fmt::format("camera_{}.txt", camera);
@@ -135,14 +154,14 @@ std::string extract_features(const PrepareOptions& options, const Frames& frames
                 "--SiftExtraction.num_threads",
                 std::to_string(thread_count())};
     if (masked) words.insert(words.end(), {"--ImageReader.mask_path", folder.masks().string()});
-    run_program(words, folder.top / fmt::format("features_{}.log", camera), stop);
+    run_program(words, folder.top / fmt::format("features_{}.log", camera), work, share);
   }
   return fmt::format("up to {} of each of {} frames{}", options.features, frames.frames.size(),
                      masked ? ", none where something moves" : "");
 }
 
 std::string match_features(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder,
-                           const std::atomic<bool>& stop) {
+                           const Work& work) {
   remove_database(folder.matches());
   fs::copy_file(folder.features(), folder.matches());
   const bool all = compares_all(options, frames);
@@ -155,45 +174,65 @@ std::string match_features(const PrepareOptions& options, const Frames& frames, 
               "--SiftMatching.num_threads",
               std::to_string(thread_count())};
   if (!all) words.insert(words.end(), {"--SequentialMatching.overlap", std::to_string(options.overlap)});
-  run_program(words, folder.top / "matches.log", stop);
+  run_program(words, folder.top / "matches.log", work, share_of_all(frames));
   return all ? "every frame with every other"
              : fmt::format("every frame with the next {} and some farther ones", options.overlap);
 }
 
 std::string find_poses(const PrepareOptions& options, const Frames& frames, const fs::path& pictures,
-                       const PoseFolder& folder, const std::atomic<bool>& stop) {
+                       const PoseFolder& folder, const Work& work) {
   fs::remove_all(folder.models());
   fs::create_directories(folder.models());
   try {
     run_program({"colmap", "mapper", "--database_path", folder.matches().string(), "--image_path",
                  pictures.string(), "--output_path", folder.models().string(), "--Mapper.num_threads",
                  std::to_string(thread_count()), "--Mapper.min_model_size", "3"},
-                folder.top / "mapper.log", stop);
+                folder.top / "mapper.log", work, share_of_all(frames));
   } catch (const InputError&) {
     if (!found_nothing(folder)) throw;
   }
   const Registered best = largest_model(folder.models());
-  const auto all = static_cast<int64_t>(frames.frames.size());
-  if (best.frames < fewest_frames ||
-      static_cast<double>(best.frames) < options.least_registered * static_cast<double>(all)) {
-    throw InputError(folder.models().string(), "poses",
-                     fmt::format("{} of {} frames registered", best.frames, all),
-                     fmt::format("at least {} and {:g}% (--least-registered)", fewest_frames,
-                                 100 * options.least_registered),
-                     advice(options, frames));
-  }
+  if (best.frames == 0) refuse_poses(options, frames, folder, 0);
   write_atomically(folder.chosen(), best.model.filename().string());
   const ColmapModel model = read_chosen_model(folder);
   const Lens& lens = model.cameras.front().lens;
   return fmt::format(
       "{} of {} frames registered, {} points, reprojection error {:.2f} px, lens {} with a focal length of "
       "{:.0f} px for {:.0f}×{:.0f}",
-      best.frames, all, model.points.size(), mean_error(model), model.cameras.front().model, lens.focal.x,
-      lens.width, lens.height);
+      best.frames, frames.frames.size(), model.points.size(), mean_error(model), model.cameras.front().model,
+      lens.focal.x, lens.width, lens.height);
 }
 
 ColmapModel read_chosen_model(const PoseFolder& folder) {
   return read_colmap_model(*FileTree::open(folder.models() / read_text(folder.chosen())), "");
+}
+
+void require_registered(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder) {
+  const auto registered = static_cast<int64_t>(read_chosen_model(folder).images.size());
+  const double asked = options.least_registered * static_cast<double>(frames.frames.size());
+  if (registered < fewest_frames || static_cast<double>(registered) < asked)
+    refuse_poses(options, frames, folder, registered);
+}
+
+std::optional<Share> share_said(const std::string& said, int64_t frames) {
+  std::optional<Share> share;
+  std::istringstream lines(said);
+  for (std::string line; std::getline(lines, line);) {
+    std::array<long long, 4> n{};
+    const auto numbers = [&](const char* key, const char* format) {
+      const size_t at = line.find(key);
+      // NOLINTNEXTLINE(cert-err34-c): numbers that are too large for COLMAP are no matter here
+      return at == std::string::npos ? 0 : std::sscanf(line.c_str() + at, format, &n[0], &n[1], &n[2], &n[3]);
+    };
+    if (numbers("Processed file [", "Processed file [%lld/%lld") == 2 ||
+        numbers("Matching image [", "Matching image [%lld/%lld") == 2)
+      share = {n[0], n[1]};
+    else if (numbers("Matching block [", "Matching block [%lld/%lld, %lld/%lld") == 4)
+      share = {(n[0] - 1) * n[3] + n[2], n[1] * n[3]};
+    else if (numbers("Registering image #", "Registering image #%lld (%lld)") == 2)
+      share = {n[1], frames};
+  }
+  return share;
 }
 
 double mean_error(const ColmapModel& model) {

@@ -2,18 +2,21 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/folder_lock.h"
+#include "base/utf8.h"
 #include "files/options_json.h"
 #include "prepare/capture_folder.h"
 #include "prepare/frames.h"
 #include "prepare/masks.h"
 #include "prepare/poses.h"
 #include "prepare/programs.h"
+#include "prepare/steps.h"
 
 namespace traceflow::prepare {
 
@@ -22,40 +25,64 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+// Beside a link's target, not the link, what is made can be moved into place.
+fs::path without_links(const fs::path& path) {
+  const fs::path whole = fs::weakly_canonical(fs::absolute(path));
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
 // The steps of one capture, in order. Each tells Steps what its results depend on beyond the steps before.
 class Preparation {
  public:
-  Preparation(fs::path input, fs::path capture, const PrepareOptions& options, const Steps::Say& say,
+  Preparation(fs::path input, fs::path capture, const PrepareOptions& options, const Audience& audience,
               const std::atomic<bool>& stop)
       : input_(std::move(input)),
-        capture_(std::move(capture)),
-        work_(work_folder(capture_)),
+        capture_(without_links(capture)),
+        folder_(work_folder(capture_)),
         options_(options),
-        stop_(&stop),
-        steps_(work_, say, [this] { before_work(); }) {}
+        work_(stop, [this](int64_t done, int64_t all) { audience_.at_work(step_, done, all); }),
+        audience_(audience),
+        steps_(folder_, audience.found, [this] { before_work(); }) {}
 
   void run() {
+    for (const fs::path& given : {input_, fs::path(options_.masks), fs::path(options_.test_video)})
+      refuse_own_folders(given);
     for (const Step step :
          {Step::frames, Step::masks, Step::features, Step::matches, Step::poses, Step::capture}) {
       if (step > options_.until) return;
-      if (*stop_) throw Stopped{};
+      work_.check();
+      step_ = step;
       run_step(step);
       if (step == Step::frames) frames_ = read_frames(frame_list());
     }
   }
 
  private:
-  fs::path pictures() const { return work_ / "frames"; }
-  fs::path masks() const { return work_ / "masks"; }
-  fs::path frame_list() const { return work_ / "frames.list.json"; }
-  PoseFolder poses() const { return {work_ / "colmap"}; }
+  fs::path pictures() const { return folder_ / "frames"; }
+  fs::path masks() const { return folder_ / "masks"; }
+  fs::path made() const { return folder_ / "capture"; }
+  fs::path frame_list() const { return folder_ / "frames.list.json"; }
+  PoseFolder poses() const { return {folder_ / "colmap"}; }
+
+  // A step empties its folder before it fills it.
+  void refuse_own_folders(const fs::path& given) const {
+    if (given.empty() || !fs::exists(given)) return;
+    const fs::path place = fs::weakly_canonical(given);
+    for (const fs::path& own : {pictures(), masks(), poses().top, made()}) {
+      const auto [parted, rest] = std::mismatch(own.begin(), own.end(), place.begin(), place.end());
+      if (parted != own.end()) continue;
+      throw InputError(given.string(), "", "a folder that this preparation writes itself", "another place",
+                       "copy it out of " + folder_.string());
+    }
+  }
 
   // Before hours go into steps whose capture would find its place taken, or into ones that another process
   // does as well.
   void before_work() {
     if (options_.until == Step::capture) check_place(capture_);
-    fs::create_directories(work_);
-    if (!lock_) lock_.emplace(work_ / "lock", work_, "preparing");
+    fs::create_directories(folder_);
+    if (!lock_) lock_.emplace(folder_ / "lock", folder_, "preparing");
+    work_.tell(0, 0);
   }
 
   void run_step(Step step) {
@@ -65,23 +92,24 @@ class Preparation {
       case Step::masks:
         return steps_.run(
             step, mask_inputs(), [&] { return !wants_masks(options_) || fs::is_directory(masks()); },
-            [&] { return make_masks(options_, frames_, pictures(), masks(), work_ / "masks.log", *stop_); });
+            [&] { return make_masks(options_, frames_, pictures(), masks(), folder_ / "masks.log", work_); });
       case Step::features:
         return steps_.run(
             step,
             {{"features", options_.features}, {"camera_model", static_cast<int>(options_.camera_model)}},
             [&] { return fs::exists(poses().features()); },
-            [&] { return extract_features(options_, frames_, pictures(), masks(), poses(), *stop_); });
+            [&] { return extract_features(options_, frames_, pictures(), masks(), poses(), work_); });
       case Step::matches:
         return steps_.run(
             step, {{"matcher", static_cast<int>(options_.matcher)}, {"overlap", options_.overlap}},
             [&] { return fs::exists(poses().matches()); },
-            [&] { return match_features(options_, frames_, poses(), *stop_); });
+            [&] { return match_features(options_, frames_, poses(), work_); });
       case Step::poses:
-        return steps_.run(
-            step, {{"least_registered", options_.least_registered}},
-            [&] { return fs::exists(poses().chosen()); },
-            [&] { return find_poses(options_, frames_, pictures(), poses(), *stop_); });
+        steps_.run(
+            step, json::object(), [&] { return fs::exists(poses().chosen()); },
+            [&] { return find_poses(options_, frames_, pictures(), poses(), work_); });
+        // What was found stands, so that another --least-registered does not find it again.
+        return require_registered(options_, frames_, poses());
       case Step::capture:
         return steps_.run(
             step, {{"test_every", options_.test_every}},
@@ -101,7 +129,7 @@ class Preparation {
         Step::frames, inputs, [&] { return fs::exists(frame_list()) && fs::is_directory(pictures()); },
         [&] {
           const Frames frames =
-              prepare::take_frames(input_, options_, pictures(), work_ / "ffmpeg.log", *stop_);
+              prepare::take_frames(input_, options_, pictures(), folder_ / "ffmpeg.log", work_);
           write_frames(frame_list(), frames);
           return told_of(frames);
         });
@@ -117,7 +145,7 @@ class Preparation {
     const auto taken = static_cast<int64_t>(frames.frames.size()) - second_camera;
     std::string text = fmt::format("{} of {} pictures, the sharpest of each interval, {}×{}", taken,
                                    frames.source_frames.front(), first.width, first.height);
-    if (first.source.empty()) text += fmt::format(", over {:.2f} s", last->time);
+    if (first.is_of_film()) text += fmt::format(", over {:.2f} s", last->time);
     if (second_camera > 0)
       text += fmt::format("; {} of the test camera's {}", second_camera, frames.source_frames.back());
     return text;
@@ -133,22 +161,24 @@ class Preparation {
   }
 
   std::string finish() {
-    const fs::path made = work_ / "capture";
     std::string found =
-        write_capture(options_, {frames_, pictures(), masks(), read_chosen_model(poses())}, made, *stop_);
-    json told{{"input", fs::absolute(input_).string()}, {"options", json::parse(options_to_json(options_))}};
+        write_capture(options_, {frames_, pictures(), masks(), read_chosen_model(poses())}, made(), work_);
+    json told{{"input", as_utf8(fs::absolute(input_).string())},
+              {"options", json::parse(options_to_json(options_))}};
     for (const Step step : {Step::frames, Step::masks, Step::features, Step::matches, Step::poses}) {
       const json stamp = steps_.stamp(step);
       told["steps"][step_name(step)] = {{"found", stamp.at("found")}, {"seconds", stamp.at("seconds")}};
     }
-    write_atomically(made / "prepare.json", told.dump(1) + "\n");
-    move_into_place(made, capture_, work_ / "replaced");
+    write_atomically(made() / "prepare.json", told.dump(1) + "\n");
+    move_into_place(made(), capture_, folder_ / "replaced");
     return found;
   }
 
-  fs::path input_, capture_, work_;
+  fs::path input_, capture_, folder_;
   const PrepareOptions& options_;
-  const std::atomic<bool>* stop_;
+  const Work work_;
+  const Audience& audience_;
+  Step step_ = Step::frames;
   std::optional<FolderLock> lock_;
   Steps steps_;
   Frames frames_;
@@ -156,20 +186,16 @@ class Preparation {
 
 }  // namespace
 
-fs::path work_folder(const fs::path& capture) {
-  fs::path whole = fs::absolute(capture).lexically_normal();
-  if (!whole.has_filename()) whole = whole.parent_path();
-  return whole.string() + ".prepare";
-}
+fs::path work_folder(const fs::path& capture) { return without_links(capture).string() + ".prepare"; }
 
 bool prepare_capture(const fs::path& input, const fs::path& capture, const PrepareOptions& options,
-                     const Steps::Say& say, const std::atomic<bool>& stop) {
+                     const Audience& audience, const std::atomic<bool>& stop) {
   options.validate();
   if (!fs::exists(input)) throw InputError(input.string(), "", "nothing", "a film or a folder of pictures");
   need_program("ffmpeg");
   if (options.until > Step::masks) need_program("colmap");
   try {
-    Preparation(input, capture, options, say, stop).run();
+    Preparation(input, capture, options, audience, stop).run();
   } catch (const Stopped&) {
     return false;
   }

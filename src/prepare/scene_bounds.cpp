@@ -7,8 +7,8 @@ namespace traceflow::prepare {
 
 namespace {
 
-// The value below which this share of the values lies.
-double quantile(std::vector<double> values, double share) {
+// The value below which this share of the values lies, which are put into another order.
+double quantile(std::vector<double>& values, double share) {
   const auto place = static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
   std::nth_element(values.begin(), values.begin() + place, values.end());
   return values[static_cast<size_t>(place)];
@@ -17,14 +17,12 @@ double quantile(std::vector<double> values, double share) {
 std::vector<double> depths_seen(const std::vector<Vec3<double>>& points,
                                 const std::vector<Camera<double>>& cameras) {
   std::vector<double> depths;
-  for (const Camera<double>& camera : cameras) {
-    for (const Vec3<double>& point : points) {
-      const Vec3<double> x = camera.point_in_camera(point);
-      if (!(x.z > 0)) continue;
-      const Vec2<double> at = camera.project(x);
-      if (at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height) depths.push_back(x.z);
-    }
-  }
+  for_each_sampled_pair(points, cameras, [&](const Vec3<double>& point, const Camera<double>& camera) {
+    const Vec3<double> x = camera.point_in_camera(point);
+    if (!(x.z > 0)) return;
+    const Vec2<double> at = camera.project(x);
+    if (at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height) depths.push_back(x.z);
+  });
   return depths;
 }
 
@@ -43,13 +41,13 @@ SceneBounds scene_bounds(const std::vector<Vec3<double>>& points,
     values.reserve(points.size());
     for (const Vec3<double>& point : points) values.push_back(point[axis]);
     low[axis] = std::min(low[axis], quantile(values, outer));
-    high[axis] = std::max(high[axis], quantile(std::move(values), 1 - outer));
+    high[axis] = std::max(high[axis], quantile(values, 1 - outer));
   }
   SceneBounds bounds;
   bounds.normalisation.centre = 0.5 * (low + high);
   const double diagonal = length(high - low);
   bounds.normalisation.scale = diagonal > 0 ? 1 / diagonal : 1;
-  const std::vector<double> depths = depths_seen(points, cameras);
+  std::vector<double> depths = depths_seen(points, cameras);
   if (!depths.empty()) {
     bounds.near_plane = quantile(depths, rare) / more * bounds.normalisation.scale;
     bounds.far_plane = quantile(depths, 1 - rare) * more * bounds.normalisation.scale;

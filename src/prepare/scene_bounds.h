@@ -1,11 +1,24 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "math/camera.h"
 #include "scene/normalisation.h"
 
 namespace traceflow::prepare {
+
+// f(point, camera) for each point and camera; where these are more than some millions, for an even share of
+// the points of each camera.
+template <class F>
+void for_each_sampled_pair(const std::vector<Vec3<double>>& points,
+                           const std::vector<Camera<double>>& cameras, F&& f) {
+  constexpr size_t most = size_t{1} << 22;
+  const size_t step = std::max<size_t>(1, points.size() * cameras.size() / most);
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    for (size_t k = i % step; k < points.size(); k += step) f(points[k], cameras[i]);
+  }
+}
 
 // What scene.json says.
 struct SceneBounds {

@@ -10,6 +10,7 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "base/utf8.h"
 #include "files/json_document.h"
 
 namespace traceflow::prepare {
@@ -64,7 +65,7 @@ void Steps::run(Step step, const json& inputs, const std::function<bool()>& stan
 
 json identity_of(const fs::path& path) {
   const auto one = [](const fs::path& file) {
-    return json{{"path", fs::absolute(file).string()},
+    return json{{"path", as_utf8(fs::absolute(file).lexically_normal().string())},
                 {"bytes", fs::file_size(file)},
                 {"changed", fs::last_write_time(file).time_since_epoch().count()}};
   };

@@ -14,13 +14,12 @@ namespace traceflow::prepare {
 // STEP.json, its stamp, in the work folder; a step whose stamp tells the same again is skipped.
 class Steps {
  public:
-  using Say = std::function<void(const std::string& line)>;
-
-  // say: gets one line per step. before: called when a step's work is about to begin; what it throws leaves
-  // all stamps.
+  // found: gets one line per step.
+  // before: called when a step's work is about to begin; what it throws leaves all stamps.
   Steps(
-      std::filesystem::path folder, Say say, std::function<void()> before = [] {})
-      : folder_(std::move(folder)), say_(std::move(say)), before_(std::move(before)) {}
+      std::filesystem::path folder, std::function<void(const std::string& line)> found,
+      std::function<void()> before = [] {})
+      : folder_(std::move(folder)), say_(std::move(found)), before_(std::move(before)) {}
 
   // Does `work`, which tells what it found, unless this step and all before it stand and `stands` finds the
   // results in their place. inputs: what the results depend on, beyond the steps before. From the moment when
@@ -35,7 +34,7 @@ class Steps {
   std::filesystem::path path_of(Step step) const;
 
   std::filesystem::path folder_;
-  Say say_;
+  std::function<void(const std::string& line)> say_;
   std::function<void()> before_;
 };
 

@@ -26,6 +26,26 @@ Level level_of(Instructions instructions) {
   }
 }
 
+struct IsaName {
+  dnnl::cpu_isa isa;
+  const char* name;
+};
+// Each has what stands below it.
+constexpr IsaName isa_names[] = {{dnnl::cpu_isa::avx512_core_amx, "amx"},
+                                 {dnnl::cpu_isa::avx512_core_bf16, "avx512 with bf16"},
+                                 {dnnl::cpu_isa::avx512_core, "avx512"},
+                                 {dnnl::cpu_isa::avx2, "avx2"},
+                                 {dnnl::cpu_isa::sse41, "sse4"}};
+
+const char* isa_in_use() {
+  const auto isa = static_cast<unsigned>(dnnl::get_effective_cpu_isa());
+  for (const IsaName& known : isa_names) {
+    const auto needed = static_cast<unsigned>(known.isa);
+    if ((isa & needed) == needed) return known.name;
+  }
+  return "none";
+}
+
 }  // namespace
 
 void limit_instructions(Instructions most) {
@@ -38,6 +58,11 @@ void limit_instructions(Instructions most) {
   hwy::DisableTargets(level.target - 1);
   require(dnnl::set_max_cpu_isa(level.isa) == dnnl::status::success,
           "instructions are limited before oneDNN is used", name);
+}
+
+std::string instructions_in_use() {
+  const int64_t targets = hwy::SupportedTargets() & HWY_TARGETS;
+  return std::string(hwy::TargetName(targets & -targets)) + " (oneDNN: " + isa_in_use() + ")";
 }
 
 }  // namespace traceflow

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <string>
 #include <string_view>
 
 // Which of the processor's vector instructions the CPU's steps use.
@@ -17,5 +18,8 @@ constexpr std::array<std::string_view, 4> enum_names(Instructions) {
 // computes, its own choice of instructions decides.) avx512 is its common part, without bf16. Call it before
 // any step has run. Throws InputError where the processor lacks `most`, InternalError where it is too late.
 void limit_instructions(Instructions most);
+
+// Which of them are used, in words: processors, or limits, of which the same is said give the same bytes.
+std::string instructions_in_use();
 
 }  // namespace traceflow

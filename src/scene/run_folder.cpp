@@ -4,12 +4,20 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "files/input_file.h"
 
 namespace traceflow {
 
 namespace {
 
 namespace fs = std::filesystem;
+
+bool stands(const fs::path& path) {
+  std::error_code error;
+  const bool found = fs::exists(path, error);
+  if (error) throw UnreadableFile(path, error.message());
+  return found;
+}
 
 // One whose every section is as it was written.
 Safetensors read_sound(const fs::path& path) {
@@ -33,15 +41,18 @@ std::string iteration_of(const Safetensors& file) {
   return found == file.metadata.end() ? "" : ", of iteration " + found->second;
 }
 
-// The current checkpoint, or the one before it and why.
+// The current checkpoint, or the one before it and why. One that may be sound and cannot be read now is no
+// reason to go back.
 Safetensors newest_sound(const RunFolder& run, std::string& note) {
   std::string trouble;
   try {
     return read_sound(run.checkpoint());
+  } catch (const UnreadableFile&) {
+    throw;
   } catch (const InputError& error) {
     trouble = error.what();
   }
-  if (!fs::exists(run.previous_checkpoint())) {
+  if (!stands(run.previous_checkpoint())) {
     throw InputError(trouble, "", "", "", "there is no checkpoint before it to go back to");
   }
   try {
@@ -53,9 +64,21 @@ Safetensors newest_sound(const RunFolder& run, std::string& note) {
   }
 }
 
+// Gives the current checkpoint the name of the one before it beside its own, which it keeps until the new one
+// takes it. Where the file system has no second names, it loses its own.
+void name_previous(const RunFolder& run, std::error_code& error) {
+  const fs::path second = run.folder / "checkpoint.previous.safetensors.link";
+  std::error_code refused;
+  fs::remove(second, refused);
+  fs::create_hard_link(run.checkpoint(), second, refused);
+  fs::rename(refused ? run.checkpoint() : second, run.previous_checkpoint(), error);
+  // It stays where the one before was this file already: then renaming does nothing.
+  fs::remove(second, refused);
+}
+
 }  // namespace
 
-bool RunFolder::holds_a_run() const { return fs::exists(checkpoint()) || fs::exists(previous_checkpoint()); }
+bool RunFolder::holds_a_run() const { return stands(checkpoint()) || stands(previous_checkpoint()); }
 
 Safetensors read_checkpoint(const RunFolder& run, std::string& note) {
   if (!run.holds_a_run()) {
@@ -67,15 +90,15 @@ Safetensors read_checkpoint(const RunFolder& run, std::string& note) {
   return file;
 }
 
-void write_checkpoint(const RunFolder& run, Safetensors file) {
+void write_checkpoint(const RunFolder& run, Safetensors file, Current current) {
   file.metadata["version"] = std::to_string(checkpoint_version);
   std::error_code error;
-  fs::create_directories(run.folder, error);
+  make_folder(run.folder);
   // Write the new one beside the old before either changes its name, so that at every moment a whole one
   // stands.
   const fs::path fresh = run.folder / "checkpoint.new.safetensors";
   file.write(fresh);
-  if (fs::exists(run.checkpoint())) fs::rename(run.checkpoint(), run.previous_checkpoint(), error);
+  if (current == Current::becomes_previous && stands(run.checkpoint())) name_previous(run, error);
   if (!error) fs::rename(fresh, run.checkpoint(), error);
   if (error) throw InputError(run.checkpoint().string(), "rename", error.message(), "a writable folder");
   sync_folder(run.folder);
@@ -83,7 +106,7 @@ void write_checkpoint(const RunFolder& run, Safetensors file) {
 
 void set_damaged_aside(const RunFolder& run) {
   std::error_code error;
-  if (fs::exists(run.checkpoint())) fs::rename(run.checkpoint(), run.damaged_checkpoint(), error);
+  if (stands(run.checkpoint())) fs::rename(run.checkpoint(), run.damaged_checkpoint(), error);
   if (error) throw InputError(run.checkpoint().string(), "rename", error.message(), "a writable folder");
 }
 

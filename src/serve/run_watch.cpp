@@ -19,7 +19,7 @@ RunWatch::RunWatch(RunFolder run) : run_(std::move(run)) {
 RunWatch::Change RunWatch::look() {
   const Version checkpoint = version_of(run_.checkpoint());
   if (checkpoint.size < 0) {
-    // While a checkpoint is renamed to the one before, only that one is there.
+    // Where no file has two names, a checkpoint is renamed to the one before: only that one is there then.
     return {version_of(run_.previous_checkpoint()).size < 0, false};
   }
   seen_ = checkpoint;

@@ -103,10 +103,16 @@ Tensor<uint8_t> Painter::paint_difference(const Tensor<float>& values) const {
   return mapped(values, {0, 0.25F / std::exp2(options_.exposure)}, false);
 }
 
-Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width) {
+Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width, int64_t height) {
   const int64_t h = image.dim(0), w = image.dim(1);
-  if (w <= width) return image;
-  const int64_t height = std::max<int64_t>(1, h * width / w);
+  if (w <= width && h <= height) return image;
+  width = std::min(width, w);
+  const int64_t in_proportion = std::max<int64_t>(1, h * width / w);
+  if (in_proportion <= height) {
+    height = in_proportion;
+  } else {
+    width = std::max<int64_t>(1, w * height / h);
+  }
   Tensor<uint8_t> small;
   small.resize({height, width, 3});
   for (int64_t i = 0; i < height; ++i) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 
 #include "show/colour_map.h"
@@ -45,8 +46,9 @@ class Painter {
   std::optional<Range> inverse_depth_, distortion_;
 };
 
-// Averages to fit `width` columns; an image that is narrower stays as it is. H×W×3.
-Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width);
+// Averages to fit `width` columns and `height` rows; an image that fits stays as it is. H×W×3.
+Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width,
+                       int64_t height = std::numeric_limits<int64_t>::max());
 
 // Grey (H×W) to three channels; three stay.
 Tensor<uint8_t> in_colour(const Tensor<uint8_t>& image);

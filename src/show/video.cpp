@@ -16,13 +16,15 @@ void Video::prepare(const std::filesystem::path& path) {
     throw InputError("option", "video", "no ffmpeg on this machine", "ffmpeg in PATH",
                      "install it with `apt install ffmpeg`, or leave --video out");
   }
-  if (path.has_parent_path()) std::filesystem::create_directories(path.parent_path());
+  make_folder(path.parent_path());
 }
 
 void Video::start() {
+  // The last ending tells ffmpeg the format.
+  partial_.emplace(path_, PartialFile::OtherWriter::refused, ".partial" + path_.extension().string());
   Pipe pipe = make_pipe();
   // A relative name could begin with a dash.
-  const std::string output = std::filesystem::absolute(path_).string();
+  const std::string output = std::filesystem::absolute(partial_->name()).string();
   process_.emplace(
       std::vector<std::string>{
           "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
@@ -64,11 +66,8 @@ void Video::finish() {
   const bool good = process_->wait();
   process_.reset();
   if (!good) fail();
-}
-
-Video::~Video() {
-  pipe_.close();
-  if (process_) process_->wait();
+  partial_->put_in_place();
+  partial_.reset();
 }
 
 }  // namespace traceflow::show

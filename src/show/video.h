@@ -3,12 +3,15 @@
 #include <filesystem>
 #include <optional>
 
+#include "base/atomic_file.h"
+#include "base/descriptor.h"
 #include "base/process.h"
 #include "base/tensor.h"
 
 namespace traceflow::show {
 
-// A film written by ffmpeg, which is fed frames through a pipe.
+// A film written by ffmpeg, which is fed frames through a pipe. It takes its name when it is whole: until
+// then, and where it is never finished, what bore the name before stays.
 class Video {
  public:
   // Throws InputError when there is no ffmpeg, and makes the film's folder: to be called before any work
@@ -17,11 +20,11 @@ class Video {
 
   Video(std::filesystem::path path, double frames_per_second)
       : path_(std::move(path)), frames_per_second_(frames_per_second) {}
-  ~Video();
   Video(const Video&) = delete;
   Video& operator=(const Video&) = delete;
 
-  // H×W×3; every frame has the first one's size, or InputError.
+  // H×W×3. Throws InputError for a frame of another size than the first one's, and where another program is
+  // writing this film.
   void add(const Tensor<uint8_t>& frame);
   // Ends the film. Throws InputError when ffmpeg could not write it.
   void finish();
@@ -33,7 +36,8 @@ class Video {
   std::filesystem::path path_;
   double frames_per_second_;
   Shape size_;
-  std::optional<Process> process_;
+  std::optional<PartialFile> partial_;
+  std::optional<Process> process_;  // ended before the file goes that it writes
   Descriptor pipe_;
 };
 

@@ -25,16 +25,9 @@ Tensor<float> drawn_normal(int64_t count, Random& random) {
 
 void DensityControl::accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched) {
   require(signal.size() == sum_.size() && touched.size() == sum_.size(), "density statistics cover the set",
-          std::to_string(signal.size()) + " for " + std::to_string(sum_.size()));
-  move_statistics(signal.device());
+          std::to_string(signal.size()));
   parallel_for(signal.device(), "density: accumulate", sum_.size(),
                AccumulateSignal{signal.data(), touched.data(), sum_.data(), seen_.data()});
-}
-
-void DensityControl::move_statistics(Device device) {
-  if (sum_.device() == device) return;
-  sum_ = sum_.on(device);
-  seen_ = seen_.on(device);
 }
 
 std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, const SceneSize& size,
@@ -149,13 +142,13 @@ void DensityControl::put(Safetensors& file) const {
 
 void DensityControl::get(const Safetensors& file) {
   if (sum_.empty()) return;
-  Tensor<float> sum = file.tensor<float>("density/" + set_ + "/sum");
-  Tensor<float> seen = file.tensor<float>("density/" + set_ + "/seen");
+  const Tensor<float> sum = file.tensor<float>("density/" + set_ + "/sum");
+  const Tensor<float> seen = file.tensor<float>("density/" + set_ + "/seen");
   if (sum.shape() != sum_.shape() || seen.shape() != seen_.shape()) {
     throw InputError("checkpoint", "density/" + set_, sum.shape().to_string(), sum_.shape().to_string());
   }
-  sum_ = std::move(sum);
-  seen_ = std::move(seen);
+  sum_ = sum.on(sum_.device());
+  seen_ = seen.on(seen_.device());
 }
 
 }  // namespace traceflow

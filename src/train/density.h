@@ -21,11 +21,11 @@ struct SceneSize {
 // faint and the oversized go, and the count never passes the cap.
 class DensityControl {
  public:
-  // set: "main" or "environment", for events and checkpoints.
-  DensityControl(std::string set, const DensityOptions& options, int64_t count)
-      : set_(std::move(set)), options_(options), sum_({count}), seen_({count}) {}
+  // set: "main" or "environment", for events and checkpoints. device: where the surfels are.
+  DensityControl(std::string set, const DensityOptions& options, int64_t count, Device device = Device::cpu)
+      : set_(std::move(set)), options_(options), sum_({count}, device), seen_({count}, device) {}
 
-  // Adds an iteration's signal (N) of the surfels that it touched (N flags), where the signal is.
+  // Adds an iteration's signal (N) of the surfels that it touched (N flags). Asks for no memory.
   void accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched);
 
   // Clones, splits and prunes; forgets the statistics. `cap`: the most surfels there may be. What becomes of
@@ -42,7 +42,6 @@ class DensityControl {
  private:
   enum class Fate : uint8_t { keep, clone, split, prune_transparent, prune_large };
   std::vector<Fate> fates(const Surfels& surfels, const SceneSize& size, int64_t cap, bool& at_cap) const;
-  void move_statistics(Device device);
 
   std::string set_;
   DensityOptions options_;

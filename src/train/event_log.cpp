@@ -188,7 +188,8 @@ void EventLog::operator()(const events::Event& event) {
   const auto* step = std::get_if<events::Step>(&event);
   if (step != nullptr && step->iteration % step_interval_ != 0 && step->iteration != step->iterations) return;
   if (missing_ > 0) {
-    const events::Warning gap{0, std::to_string(missing_) + " lines of the log could not be written here"};
+    const events::Warning gap{0, std::to_string(missing_) + (missing_ == 1 ? " line" : " lines") +
+                                     " of the log could not be written here"};
     if (write(to_json_line(gap) + '\n')) missing_ = 0;
   }
   if (!write(to_json_line(event) + '\n')) ++missing_;

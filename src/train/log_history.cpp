@@ -1,10 +1,14 @@
 #include "train/log_history.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <system_error>
+
+#include "files/json_document.h"
 
 namespace traceflow {
 
@@ -12,14 +16,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Longer or deeper than any event is: not ours.
+// Longer, deeper or fuller than any event is: not ours.
 constexpr size_t line_cap = size_t{1} << 20;
 constexpr int depth_cap = 8;
+constexpr size_t value_cap = 4000;
 
 // An object, or null.
 Json parsed(const std::string& line) {
   const auto shallow = [](int depth, Json::parse_event_t, Json&) { return depth <= depth_cap; };
-  Json json = line.size() > line_cap ? Json() : Json::parse(line, shallow, false);
+  const bool is_ours = line.size() <= line_cap && json_extent(line).values <= value_cap;
+  Json json = is_ours ? Json::parse(line, shallow, false) : Json();
   return json.is_object() ? std::move(json) : Json();
 }
 
@@ -103,16 +109,44 @@ std::vector<LoggedEvent> that_count(std::vector<LoggedEvent> logged) {
   return history.take();
 }
 
+LogLine next_line(std::istream& log) {
+  LogLine line;
+  std::array<char, 4096> piece{};
+  do {
+    log.clear();  // a piece that is full is called a failure
+    log.getline(piece.data(), piece.size());
+    line.ended = log.good();
+    line.bytes += log.gcount();
+    if (line.text.size() <= line_cap)
+      line.text.append(piece.data(), static_cast<size_t>(log.gcount() - (line.ended ? 1 : 0)));
+  } while (!line.ended && !log.eof() && !log.bad() && !LogExtent{line.bytes}.is_all());
+  if (line.text.size() > line_cap) line.text.clear();
+  return line;
+}
+
+std::ifstream open_events(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return {};
+  return std::ifstream(path, std::ios::binary);
+}
+
 std::vector<LoggedEvent> read_log(std::istream& log) {
   std::vector<LoggedEvent> logged;
-  for (std::string line; std::getline(log, line);) {
-    if (auto event = read_event(line)) logged.push_back(std::move(*event));
+  LogExtent read;
+  while (!read.is_all()) {
+    const LogLine line = next_line(log);
+    if (line.bytes == 0) break;
+    read.bytes += line.bytes;
+    auto event = read_event(line.text);
+    if (!event) continue;
+    ++read.events;
+    logged.push_back(std::move(*event));
   }
   return that_count(std::move(logged));
 }
 
 std::vector<LoggedEvent> read_log(const std::filesystem::path& path) {
-  std::ifstream file(path);
+  std::ifstream file = open_events(path);
   return read_log(file);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
@@ -22,12 +23,31 @@ struct LoggedEvent {
 // Nothing for a line that cannot be read.
 std::optional<LoggedEvent> read_event(const std::string& line);
 
+// A line of a log as it stands there.
+struct LogLine {
+  std::string text;    // without its end; empty where it is longer than an event may be
+  int64_t bytes = 0;   // 0: there is none left
+  bool ended = false;  // else it is the last one, perhaps half written
+};
+LogLine next_line(std::istream& log);
+
+// How far a log has been read. Training writes a small part of what is read at most; a folder from elsewhere
+// may hold any file in the log's place.
+struct LogExtent {
+  int64_t bytes = 0, events = 0;
+  bool is_all() const { return bytes >= int64_t{256} << 20 || events >= 200'000; }
+};
+
+// A log to read; closed where there is none, or something that is no file.
+std::ifstream open_events(const std::filesystem::path& path);
+
 // Of all events that were logged, those that count, in order: see read_log.
 std::vector<LoggedEvent> that_count(std::vector<LoggedEvent> logged);
 
 // The events that count, in order. A log may hold several sessions: a resumed one goes back to its
 // checkpoint, and what came after that is dropped, as are the endings of sessions that were continued and
-// warnings said before. Lines that cannot be read, such as one that is half written, are left out.
+// warnings said before. Lines that cannot be read, such as one that is half written, are left out, as is what
+// comes after the LogExtent that is all.
 std::vector<LoggedEvent> read_log(std::istream& log);
 // Of a file; nothing where there is none.
 std::vector<LoggedEvent> read_log(const std::filesystem::path& path);

@@ -12,36 +12,40 @@ constexpr size_t remembered = 512;
 
 }  // namespace
 
-bool LogTail::goes_on(std::istream& file) const {
-  std::string there(last_read_.size(), '\0');
-  file.seekg(read_ - static_cast<int64_t>(there.size()));
-  file.read(there.data(), static_cast<std::streamsize>(there.size()));
-  return file && there == last_read_;
+std::string LogTail::end_of_read(std::istream& file) const {
+  std::string end(std::min(static_cast<size_t>(read_.bytes), remembered), '\0');
+  file.clear();
+  file.seekg(read_.bytes - static_cast<int64_t>(end.size()));
+  file.read(end.data(), static_cast<std::streamsize>(end.size()));
+  end.resize(static_cast<size_t>(file.gcount()));
+  return end;
 }
 
 LogTail::News LogTail::next() {
-  std::ifstream file(path_, std::ios::binary);
-  if (!file) return {};
+  std::ifstream file = open_events(path_);
+  if (!file.is_open()) return {};
   News news;
-  news.anew = !begun_ || !goes_on(file);
+  news.anew = !begun_ || end_of_read(file) != last_read_;
   if (news.anew) {
     *this = LogTail(path_);
     begun_ = true;
-    file.clear();
-    file.seekg(0);
   }
+  file.clear();
+  file.seekg(read_.bytes);
   bool taken_back = false;
-  for (std::string line; std::getline(file, line) && !file.eof();) {
-    read_ += static_cast<int64_t>(line.size()) + 1;
-    last_read_ = (last_read_ + line + '\n');
-    last_read_.erase(0, last_read_.size() - std::min(last_read_.size(), remembered));
-    std::optional<LoggedEvent> event = read_event(line);
+  while (!read_.is_all()) {
+    const LogLine line = next_line(file);
+    if (!line.ended) break;
+    read_.bytes += line.bytes;
+    std::optional<LoggedEvent> event = read_event(line.text);
     if (!event) continue;
+    ++read_.events;
     const bool start = event->kind == "started", step = event->kind == "step";
     taken_back = taken_back || start || (step && event->iteration <= iteration_);
     if (start || step) iteration_ = event->iteration;
     news.events.push_back(std::move(*event));
   }
+  last_read_ = end_of_read(file);
   if (news.anew) {
     news.events = that_count(std::move(news.events));
   } else if (taken_back) {

@@ -19,17 +19,17 @@ class LogTail {
   };
   // What has been written since the last time, in whole lines: a line without its end is left for later.
   // Anew the first time, when the file has become shorter or is another one, and when a resumed session takes
-  // back what was told. Nothing while there is no file.
+  // back what was told. Nothing while there is no file, and beyond the LogExtent that is all.
   News next();
 
  private:
-  // Whether what was read last still stands where it stood.
-  bool goes_on(std::istream& file) const;
+  // The end of what was read, as it stands there now.
+  std::string end_of_read(std::istream& file) const;
 
   std::filesystem::path path_;
   bool begun_ = false;
-  int64_t read_ = 0;       // bytes
-  std::string last_read_;  // the end of them
+  LogExtent read_;
+  std::string last_read_;  // the end of it
   int64_t iteration_ = 0;  // of the last step or start
 };
 

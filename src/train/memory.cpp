@@ -1,9 +1,8 @@
 #include "train/memory.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 
+#include "base/machine.h"
 #include "math/spherical_harmonics.h"
 #include "ops/lpips/lpips.h"
 
@@ -57,6 +56,12 @@ KeptMemory kept_memory(Device device, int64_t budget) {
           .hit_bytes = std::min(budget / 6, 4096 * mebibyte)};
 }
 
+// What the options ask for.
+SurfelCaps caps_of(const TrainOptions& options) {
+  const bool traced = options.specular == Specular::environment_gaussians;
+  return {options.density.max_surfels, traced ? options.environment_density.max_surfels : 0, false};
+}
+
 }  // namespace
 
 int64_t largest_view(const Capture& capture) {
@@ -85,36 +90,34 @@ int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t
   return bytes;
 }
 
+int64_t available_bytes(Device device) {
+  return device == Device::cuda ? static_cast<int64_t>(cuda::facts().free_bytes) : memory_available();
+}
+
 int64_t memory_budget_bytes(const TrainOptions& options, Device device) {
-  if (options.memory_budget > 0) return options.memory_budget * mebibyte;
-  const int64_t available = device == Device::cuda
-                                ? static_cast<int64_t>(cuda::facts().free_bytes)
-                                : static_cast<int64_t>(sysconf(_SC_AVPHYS_PAGES)) * sysconf(_SC_PAGESIZE);
-  return available / 4 * 3;
+  return options.memory_budget > 0 ? options.memory_budget * mebibyte : available_bytes(device) / 4 * 3;
 }
 
 MemoryPlan plan_memory(const MemorySetting& run) {
   const TrainOptions& o = run.options;
-  const bool traced = o.specular == Specular::environment_gaussians;
   MemoryPlan plan;
   plan.budget_bytes = memory_budget_bytes(o, run.device);
   plan.kept = kept_memory(run.device, plan.budget_bytes);
   plan.image_bytes = o.capture.cache_mebibytes * mebibyte;
-  const int64_t main = o.density.max_surfels;
-  const int64_t environment = traced ? o.environment_density.max_surfels : 0;
+  const SurfelCaps asked = caps_of(o);
   if (const int64_t fixed = forecast_bytes(run, plan.kept, 0, 0); fixed >= plan.budget_bytes) {
     throw InputError("option", "memory_budget", number_text(plan.budget_bytes / mebibyte) + " MiB",
                      "more than " + number_text(fixed / mebibyte) + " MiB for images of this size",
                      "raise it, use --downscale, or lower capture.cache_mebibytes");
   }
   const auto caps = [&](double share) {
-    return SurfelCaps{static_cast<int64_t>(share * static_cast<double>(main)),
-                      static_cast<int64_t>(share * static_cast<double>(environment)), share < 1};
+    return SurfelCaps{static_cast<int64_t>(share * static_cast<double>(asked.main)),
+                      static_cast<int64_t>(share * static_cast<double>(asked.environment)), share < 1};
   };
   const auto fits = [&](const SurfelCaps& sizes) {
     return forecast_bytes(run, plan.kept, sizes.main, sizes.environment) <= plan.budget_bytes;
   };
-  plan.caps = caps(1);
+  plan.caps = asked;
   if (!fits(plan.caps)) {
     // What is kept only up to a limit makes the forecast bend, so that the share is searched for.
     double low = 0, high = 1;
@@ -123,6 +126,13 @@ MemoryPlan plan_memory(const MemorySetting& run) {
     plan.caps = caps(low);
   }
   plan.forecast_bytes = forecast_bytes(run, plan.kept, plan.caps.main, plan.caps.environment);
+  return plan;
+}
+
+MemoryPlan with_caps(MemoryPlan plan, const MemorySetting& run, const SurfelCaps& caps) {
+  const SurfelCaps asked = caps_of(run.options);
+  plan.caps = {caps.main, caps.environment, caps.main < asked.main || caps.environment < asked.environment};
+  plan.forecast_bytes = forecast_bytes(run, plan.kept, caps.main, caps.environment);
   return plan;
 }
 

@@ -16,8 +16,10 @@ struct MemorySetting {
 // Pixels of the largest view of both splits: a run renders them all.
 int64_t largest_view(const Capture& capture);
 
-// Bytes that a run may take: options.memory_budget, or three quarters of what the device (for the CPU: the
-// machine) has free.
+// Bytes that the device, for the CPU the machine, can give.
+int64_t available_bytes(Device device);
+
+// Bytes that a run may take: options.memory_budget, or three quarters of what can be given.
 int64_t memory_budget_bytes(const TrainOptions& options, Device device);
 
 // What a run with sets of these sizes takes at most, in bytes on its device: parameters, gradients, moments,
@@ -42,6 +44,8 @@ struct MemoryPlan {
   int64_t image_bytes = 0;  // photographs kept on the device
 };
 MemoryPlan plan_memory(const MemorySetting& run);
+// The same with given caps, within the budget or not.
+MemoryPlan with_caps(MemoryPlan plan, const MemorySetting& run, const SurfelCaps& caps);
 
 // What a run takes at most, in bytes, where no budget limits it: both sets at the options' caps, all kept
 // that is worth keeping.

@@ -69,7 +69,8 @@ void step_field(Stepper& step, const std::string& name, Field& field, const Fiel
 
 NonFiniteGradients StepNotes::report() const {
   NonFiniteGradients report;
-  const Tensor<optimize::LeftAlone> notes = left_alone.on(Device::cpu);
+  Tensor<optimize::LeftAlone> fetched;
+  const Tensor<optimize::LeftAlone>& notes = on_host(left_alone, fetched);
   for (size_t k = 0; k < tensors.size(); ++k) {
     const optimize::LeftAlone& note = notes[static_cast<int64_t>(k)];
     if (note.count > 0 && report.count == 0) {

@@ -54,7 +54,8 @@ class Optimiser {
   // Zero moments in the shapes of the scene.
   explicit Optimiser(const Scene& scene);
 
-  // One step on whatever is trainable. Entries that are not finite are left alone.
+  // One step on whatever is trainable. Entries that are not finite are left alone. Where memory runs out,
+  // nothing has changed.
   void step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable, const Schedule& schedule,
             const RateOptions& rates, int iteration);
   // What the last step left alone. Waits for the device.

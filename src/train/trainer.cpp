@@ -3,6 +3,7 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <system_error>
 
 #include "base/parallel.h"
 #include "base/version.h"
@@ -10,6 +11,7 @@
 #include "ops/loss/rigidity.h"
 #include "render/frame_kernels.h"
 #include "scene/scene_file.h"
+#include "train/continuation.h"
 #include "train/initialise.h"
 
 namespace traceflow {
@@ -60,6 +62,20 @@ class NotSaved : public InputError {
   explicit NotSaved(const std::string& why) : InputError(why, "", "", "") {}
 };
 
+// As it was given where there is no working directory any more.
+std::filesystem::path whole_path(const std::filesystem::path& given) {
+  std::error_code error;
+  std::filesystem::path whole = std::filesystem::absolute(given, error);
+  return error ? given : whole;
+}
+
+// The weights are found again wherever the run is resumed.
+TrainOptions with_whole_paths(TrainOptions options) {
+  std::string& weights = options.loss.lpips_weights;
+  if (!weights.empty()) weights = whole_path(weights).string();
+  return options;
+}
+
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
 
 std::optional<lpips::Network> network_on(Device device, std::optional<lpips::Network> network) {
@@ -92,11 +108,13 @@ void ViewOrder::set_state(Tensor<int32_t> order, int64_t next) {
   next_ = next;
 }
 
-Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run, Device device)
-    : options_(options),
+Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesystem::path& run,
+                 Device device)
+    : options_(with_whole_paths(options)),
       device_(device),
       capture_(std::move(capture)),
-      run_{std::move(run)},
+      capture_folder_(whole_path(capture_.folder).lexically_normal().string()),
+      run_{whole_path(run)},
       schedule_(options),
       perceptual_(network_on(device, perceptual_network(options.loss, capture_))),
       random_(seeded(options.seed)),
@@ -104,14 +122,15 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, std::filesystem::
       targets_(device, memory_.image_bytes),
       scene_(scene_on(device, initial_scene(capture_, options, random_))),
       optimiser_(scene_),
-      main_density_("main", options.density, scene_.main.count()),
-      environment_density_("environment", options.environment_density, scene_.environment.count()),
+      main_density_("main", options.density, scene_.main.count(), device),
+      environment_density_("environment", options.environment_density, scene_.environment.count(), device),
       cloud_radius_(cloud_radius(capture_.points)),
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
       before_step_{random_, views_, -1} {
+  density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
 
@@ -158,9 +177,10 @@ LossTerms Trainer::step() {
                      grad_frame_, means_, schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
-  non_finite_ = {};
-  if (std::isfinite(terms.total)) learn(frame, request, trainable);
+  const bool learns = std::isfinite(terms.total);
+  if (learns) learn(frame, request, trainable);
   ++iteration_;
+  non_finite_ = learns ? optimiser_.left_alone() : NonFiniteGradients{};
   control_density(iteration_);
   return terms;
 }
@@ -170,12 +190,13 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
+  // Nothing has changed up to here, and nothing behind this asks for memory: an iteration that finds none
+  // before its end is as if it had not begun.
+  optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
   if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
   if (trainable.environment && scene_.environment.count() > 0) {
     environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
   }
-  optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
-  non_finite_ = optimiser_.left_alone();
   parallel_for(device_, "train: follow the reach", 1,
                FollowReach{frame.reach.data(), scene_.main_reach.data()});
 }
@@ -193,6 +214,7 @@ void Trainer::add_rigidity(const Frame& frame) {
 }
 
 void Trainer::control_density(int done) {
+  // Where memory runs out in an update, that set is as it was; what follows an update asks for none.
   const auto tell = [&](events::DensityChanged change, bool reset) {
     change.iteration = done;
     change.opacity_reset = reset;
@@ -259,11 +281,10 @@ void Trainer::tell_start() {
                                std::string(name_of(device_)), thread_count(),
                                static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes,
                                version(), this_machine(device_)});
-  for (const Finding& found : capture_.warnings) stream_.emit(events::Warning{iteration_, found.text});
+  for (const Finding& found : capture_.warnings) warn(found.text);
   if (memory_.caps.lowered) {
-    stream_.emit(events::Warning{iteration_, "the memory budget holds " + std::to_string(memory_.caps.main) +
-                                                 " main and " + std::to_string(memory_.caps.environment) +
-                                                 " environment surfels at most"});
+    warn("the memory budget holds " + std::to_string(memory_.caps.main) + " main and " +
+         std::to_string(memory_.caps.environment) + " environment surfels at most");
   }
 }
 
@@ -320,7 +341,8 @@ events::Finished Trainer::run(const std::atomic<bool>& stop) {
   if (end.ending == events::Ending::out_of_memory || end.ending == events::Ending::no_input) step_back();
   // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
   // still good.
-  if (end.ending != events::Ending::diverged || health_.sound() || !run_.holds_a_run()) save_or_say_why_not();
+  if (end.ending != events::Ending::diverged || health_.sound() || standing_ == Standing::none)
+    save_or_say_why_not();
   return finish(end.ending, end.reason);
 }
 
@@ -344,7 +366,10 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["views_next"] = std::to_string(views_.next());
   file.metadata["options"] = options_to_json(options_);
   file.metadata["capture"] = capture_.name;
-  file.metadata["capture_folder"] = std::filesystem::absolute(capture_.folder).lexically_normal().string();
+  file.metadata["capture_folder"] = capture_folder_;
+  put_views(capture_, file);
+  put_caps(memory_.caps, file);
+  put_arithmetic(device_, file);
   return file;
 }
 
@@ -353,17 +378,24 @@ void Trainer::save() {
   const Clock::time_point start = Clock::now();
   Safetensors file = checkpoint();
   file.metadata["train_seconds"] = std::to_string(seconds_);
-  write_checkpoint(run_, std::move(file));
+  write_checkpoint(run_, std::move(file),
+                   standing_ == Standing::unsound ? Current::is_dropped : Current::becomes_previous);
+  standing_ = health_.sound() ? Standing::sound : Standing::unsound;
   const double took = seconds_since(start);
   seconds_ += took;
   stream_.emit(events::Saved{iteration_, run_.checkpoint(), took});
 }
 
 void Trainer::save_or_say_why_not() {
+  const auto refused = [this](const std::exception& error) {
+    return NotSaved("iteration " + std::to_string(iteration_) + " is not saved: " + error.what());
+  };
   try {
     save();
   } catch (const InputError& error) {
-    throw NotSaved("iteration " + std::to_string(iteration_) + " is not saved: " + error.what());
+    throw refused(error);
+  } catch (const std::system_error& error) {
+    throw refused(error);
   }
 }
 
@@ -373,9 +405,8 @@ void Trainer::save_on_the_way() {
   try {
     save_or_say_why_not();
   } catch (const NotSaved& error) {
-    if (!run_.holds_a_run()) throw;
-    stream_.emit(events::Warning{
-        iteration_, std::string(error.what()) + "; training goes on and tries again at the next checkpoint"});
+    if (standing_ == Standing::none) throw;
+    warn(std::string(error.what()) + "; training goes on and tries again at the next checkpoint");
   }
 }
 
@@ -394,17 +425,15 @@ void Trainer::step_back() {
 void Trainer::resume() {
   std::string note;
   const Safetensors file = read_checkpoint(run_, note);
-  if (!note.empty()) {
-    stream_.emit(events::Warning{0, note});
-    set_damaged_aside(run_);
-  }
-  scene_ = scene_on(device_, get_scene(file));
+  Scene scene = get_scene(file);
+  check_views(file, scene.normalisation, capture_);
+  scene_ = scene_on(device_, std::move(scene));
   optimiser_ = Optimiser(scene_);
   optimiser_.get(file);
-  main_density_ = DensityControl("main", options_.density, scene_.main.count());
+  main_density_ = DensityControl("main", options_.density, scene_.main.count(), device_);
   main_density_.get(file);
   environment_density_ =
-      DensityControl("environment", options_.environment_density, scene_.environment.count());
+      DensityControl("environment", options_.environment_density, scene_.environment.count(), device_);
   environment_density_.get(file);
   bonds_ = {};
   if (file.has("bonds/index")) {
@@ -424,6 +453,25 @@ void Trainer::resume() {
   health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
   iteration_ = static_cast<int>(count_in(file, "iteration"));
   seconds_ = file.number("train_seconds");
+  standing_ = health_.sound() ? Standing::sound : Standing::unsound;
+  keep_caps(file);
+  if (const std::string other = other_arithmetic(file, device_); !other.empty()) warn(other);
+  if (note.empty()) return;
+  // Last: a run that is not resumed keeps its files as they are.
+  warn(note);
+  set_damaged_aside(run_);
+}
+
+// What is free now is no measure for a run that began with more, or it would end in other bytes.
+void Trainer::keep_caps(const Safetensors& file) {
+  const std::optional<SurfelCaps> caps = caps_to_keep(file, options_);
+  if (!caps) return;
+  memory_ = with_caps(memory_, {options_, device_, largest_view(capture_)}, *caps);
+  const int64_t available = available_bytes(device_);
+  if (memory_.forecast_bytes <= available) return;
+  const auto mebibytes = [](int64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; };
+  warn("the run may take " + mebibytes(memory_.forecast_bytes) + ", as when it began, and " +
+       mebibytes(available) + " are free now; --memory-budget makes it smaller, and its end another");
 }
 
 }  // namespace traceflow

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "base/random.h"
 #include "capture/capture.h"
@@ -44,7 +45,7 @@ class Trainer {
  public:
   // Starts a scene from the capture and takes it to the device. The run's folder is made when the first
   // checkpoint is saved.
-  Trainer(const TrainOptions& options, Capture capture, std::filesystem::path run,
+  Trainer(const TrainOptions& options, Capture capture, const std::filesystem::path& run,
           Device device = Device::cpu);
 
   // Continues from the run's checkpoint; call before run(). Throws InputError when it does not fit.
@@ -61,7 +62,8 @@ class Trainer {
 
   // Ends run() after the iteration that goes on. On any thread.
   void stop_soon() { stop_soon_ = true; }
-  // Saves what stands. May be called between two iterations, so by a listener.
+  // Saves what stands. May be called between two iterations, so by a listener. The checkpoint before the
+  // current one is always sound: a run that collapses drops its own.
   void save();
 
   events::Stream& stream() { return stream_; }
@@ -81,6 +83,8 @@ class Trainer {
   void control_density(int done);
   SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
   void tell_start();
+  void warn(const std::string& text) { stream_.emit(events::Warning{iteration_, text}); }
+  void keep_caps(const Safetensors& file);
   // Tells what was measured up to here, in the phase of the last iteration.
   void tell_measured();
   void tell_density();
@@ -92,7 +96,7 @@ class Trainer {
   End iterate(const std::atomic<bool>& stop);
   // One of them, with what is told of it; what is wrong with its numbers, or nothing.
   std::string tell_iteration();
-  // Throw InputError where save() does, the second only where no checkpoint stands.
+  // Throw NotSaved where save() fails, the second only where no checkpoint stands.
   void save_or_say_why_not();
   void save_on_the_way();
   // What a step draws from.
@@ -112,7 +116,10 @@ class Trainer {
   TrainOptions options_;
   Device device_;
   Capture capture_;
+  std::string capture_folder_;  // whole paths both, so that neither needs the working directory again
   RunFolder run_;
+  // Of the current checkpoint.
+  enum class Standing { none, sound, unsound } standing_ = Standing::none;
   Schedule schedule_;
   std::optional<lpips::Network> perceptual_;
   Random random_;

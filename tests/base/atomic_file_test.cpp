@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <iterator>
+#include <thread>
 
 #include "support/file_bytes.h"
 #include "support/refusal.h"
@@ -74,6 +76,61 @@ TEST(AtomicFile, ARefusalKeepsTheOldFile) {
   fs::create_directory(folder / "file.partial");  // stands where the temporary file would
   EXPECT_NE(refusal(folder / "file"), "accepted");
   EXPECT_EQ(bytes_of(folder / "file"), "old");
+}
+
+// Whoever was killed may have left more than is written now.
+TEST(AtomicFile, WhatWasLeftHalfWrittenIsWrittenOver) {
+  const TempFolder folder;
+  write_bytes(folder / "file.partial", std::string(100'000, 'x'));
+  write_atomically(folder / "file", "new");
+  EXPECT_EQ(bytes_of(folder / "file"), "new");
+  EXPECT_EQ(entries(folder.path()), 1);
+}
+
+TEST(AtomicFile, ALinkThatStandsInTheWayIsNotFollowed) {
+  const TempFolder folder;
+  write_bytes(folder / "elsewhere", "mine");
+  fs::create_symlink("elsewhere", folder / "file.partial");
+  EXPECT_NE(refusal(folder / "file"), "accepted");
+  EXPECT_EQ(bytes_of(folder / "elsewhere"), "mine");
+}
+
+TEST(AtomicFile, ANameMayBeAsLongAsTheSystemTakes) {
+  const TempFolder folder;
+  const std::string first = std::string(254, 'n') + "1", second = std::string(254, 'n') + "2";
+  write_atomically(folder / first, "one");
+  write_atomically(folder / second, "two");
+  EXPECT_EQ(bytes_of(folder / first), "one");
+  EXPECT_EQ(bytes_of(folder / second), "two");
+  EXPECT_EQ(entries(folder.path()), 2);
+}
+
+// Whoever reads meanwhile finds one writer's text, whole.
+TEST(AtomicFile, SeveralMayWriteOneFileAtOnce) {
+  const TempFolder folder;
+  const fs::path path = folder / "file";
+  write_atomically(path, "a");
+  std::atomic<int> at_work{4};
+  std::vector<std::string> troubles(4);
+  std::vector<std::thread> writers;
+  for (size_t i = 0; i < 4; ++i) {
+    writers.emplace_back([&, i] {
+      const std::string text(1 + 30'000 * i, static_cast<char>('a' + i));
+      for (int round = 0; round < 100 && (troubles[i].empty() || troubles[i] == "accepted"); ++round)
+        troubles[i] = refusal_of([&] { write_atomically(path, text); });
+      --at_work;
+    });
+  }
+  while (at_work > 0) {
+    const std::string text = bytes_of(path);
+    if (text.empty() || text != std::string(1 + 30'000 * static_cast<size_t>(text[0] - 'a'), text[0])) {
+      ADD_FAILURE() << text.size() << " bytes";
+      break;
+    }
+  }
+  for (std::thread& writer : writers) writer.join();
+  EXPECT_THAT(troubles, testing::Each("accepted"));
+  EXPECT_EQ(entries(folder.path()), 1);
 }
 
 }  // namespace

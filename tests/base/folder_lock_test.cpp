@@ -2,12 +2,18 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <fstream>
 #include <string>
+#include <thread>
 
 #include "base/error.h"
+#include "base/process.h"
+#include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -37,6 +43,34 @@ TEST(FolderLock, KeepsOthersOutUntilItGoes) {
   std::ofstream(file) << "process 1 on elsewhere";
   EXPECT_NO_THROW(lock());
   EXPECT_THROW(FolderLock(folder / "nowhere" / "lock", folder / "nowhere", "training"), InputError);
+}
+
+// As `prepare` killed while COLMAP works: what COLMAP writes must not meet what a second `prepare` does.
+TEST(FolderLock, OutlivesAKilledHolderForAsLongAsWhatItStartedGoesOn) {
+  const TempFolder folder;
+  const auto lock = [&] { return FolderLock(folder / "lock", folder / "work", "preparing"); };
+  const pid_t holder = ::fork();
+  ASSERT_GE(holder, 0);
+  if (holder == 0) {
+    const FolderLock held = lock();
+    // A script that starts the program which does the work.
+    const Descriptor out = open_log(folder / "out");
+    Process({"sh", "-c", "sleep 1000 & echo $!; wait"}, {.output = out.number()}).wait();
+    ::_exit(1);
+  }
+  while (bytes_of(folder / "out").find('\n') == std::string::npos) std::this_thread::yield();
+  const pid_t worker = std::stoi(bytes_of(folder / "out"));
+  const pid_t script = ::getpgid(worker);  // which leads a group of its own
+  EXPECT_THAT(refusal_of(lock), HasSubstr("found process " + std::to_string(holder) + " on "));
+
+  ::kill(holder, SIGKILL);
+  ::waitpid(holder, nullptr, 0);
+  const auto refused = HasSubstr("found a program that outlived process " + std::to_string(holder) + " on ");
+  EXPECT_THAT(refusal_of(lock), refused);
+  ::kill(script, SIGKILL);
+  EXPECT_THAT(refusal_of(lock), refused);
+  ::kill(worker, SIGKILL);
+  while (refusal_of(lock) != "accepted") std::this_thread::yield();
 }
 
 }  // namespace

@@ -43,5 +43,11 @@ TEST_F(Utf8, RefusesWhatIsNoCharacter) {
     EXPECT_FALSE(first_utf8_character(text)) << text;
 }
 
+TEST_F(Utf8, OtherBytesAreWrittenAsNumbers) {
+  EXPECT_EQ(as_utf8("caf\xe9 \xff.mp4"), "caf%E9 %FF.mp4");
+  EXPECT_EQ(as_utf8("caf\xc3\xa9"), "caf\xc3\xa9");
+  EXPECT_EQ(as_utf8(""), "");
+}
+
 }  // namespace
 }  // namespace traceflow

@@ -128,7 +128,8 @@ TEST(ColmapCapture, two_cameras_side_by_side_share_their_times) {
   options.times = CaptureTimes::none;
   const Capture still = load_capture(fake.path(), options);
   EXPECT_EQ(still.train[4].time, 0);
-  EXPECT_THAT(still.warnings, Contains(tells("one-time", Severity::notice, "all views have time 0")));
+  EXPECT_THAT(still.warnings,
+              Contains(tells("one-time", Severity::notice, "all training views are of one time")));
 }
 
 TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
@@ -154,6 +155,60 @@ TEST(ColmapCapture, what_is_missing_or_left_over_is_said) {
                                     [](const Finding& f) { return f.kind == "missing-image"; });
   EXPECT_THAT(missing->views, ElementsAre("frame_3"));
   EXPECT_THAT(missing->files, ElementsAre("images/frame_3.png"));
+}
+
+// A rig's cameras have their own folders, with the same names in them.
+struct RigCapture : ColmapCapture {
+  RigCapture() : ColmapCapture(0) {}
+  void add(const std::string& name) {
+    const auto i = static_cast<uint32_t>(model.images.size());
+    model.images.push_back({i + 1, {1, 0, 0, 0}, {0.1 * i, 0, 0}, 1, name, {}});
+    write_photograph("images/" + name, static_cast<int>(i));
+  }
+};
+
+TEST(ColmapCapture, photographs_of_a_rig_without_camera_are_named_by_their_folders) {
+  RigCapture fake;
+  for (const char* name : {"left/1.png", "left/2.png", "right/1.png"}) fake.add(name);
+  fake.write_photograph("images/right/2.png", 7);
+  fake.write_photograph("images/back/1.png", 8);
+  fake.write_photograph("masks/left/1.png", 9);
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  ASSERT_THAT(capture.warnings, Contains(says("2 images have no camera")));
+  const auto left_over = std::find_if(capture.warnings.begin(), capture.warnings.end(),
+                                      [](const Finding& f) { return f.kind == "unregistered-image"; });
+  EXPECT_THAT(left_over->files, ElementsAre("images/back/1.png", "images/right/2.png"));
+}
+
+// COLMAP drops pictures; they were taken all the same.
+TEST(ColmapCapture, photographs_without_camera_keep_their_places_in_time) {
+  RigCapture fake;
+  for (const char* name : {"90.png", "91.png", "93.png", "100.png"}) fake.add(name);
+  for (const int n : {92, 94, 95, 96, 97, 98, 99})
+    fake.write_photograph("images/" + std::to_string(n) + ".png", n);
+  fake.write_photograph("images/91_depth.png", 1);
+  fake.save();
+  CaptureOptions options;
+  options.test_every = 0;
+  const Capture capture = load_capture(fake.path(), options);
+  ASSERT_THAT(ids(capture.train), ElementsAre("90", "91", "93", "100"));
+  EXPECT_FLOAT_EQ(capture.train[1].time, 0.1F);
+  EXPECT_FLOAT_EQ(capture.train[2].time, 0.3F);
+  EXPECT_FLOAT_EQ(capture.train[3].time, 1);
+}
+
+TEST(ColmapCapture, smaller_images_are_enough) {
+  ColmapCapture fake(4);
+  fake.save();
+  std::filesystem::rename(fake.path() / "images", fake.path() / "images_4");
+  EXPECT_THAT(refusal(fake.path()), HasSubstr("images: found images_4, expected images at full size"));
+  CaptureOptions options;
+  options.downscale = 4;
+  const Capture capture = load_capture(fake.path(), options);
+  EXPECT_EQ(capture.train.size(), 3U);
+  EXPECT_EQ(capture.images->source("frame_1").image.path, "images_4/frame_1.png");
+  EXPECT_EQ(capture.images->source("frame_1").factor, 1);
 }
 
 TEST(ColmapCapture, no_photographs_at_all_is_refused) {
@@ -224,6 +279,63 @@ TEST(SyntheticCapture, times_make_it_a_moving_one) {
   EXPECT_EQ(shifted.train[0].time, 0);
 }
 
+TEST(SyntheticCapture, times_in_any_unit_run_from_0_to_1) {
+  for (const double first : {100.0, 3000.0, 1.69e9, -5.0}) {
+    SyntheticCapture fake;
+    Json &train = fake.files["transforms_train.json"]["frames"],
+         &test = fake.files["transforms_test.json"]["frames"];
+    for (size_t i = 0; i < train.size(); ++i) train[i]["time"] = first + 20.0 * static_cast<double>(i);
+    for (Json& frame : test) frame["time"] = first + 60;
+    test[1].erase("time");
+    fake.save();
+    const Capture capture = load_capture(fake.path(), {});
+    EXPECT_FLOAT_EQ(capture.train[0].time, 0);
+    EXPECT_FLOAT_EQ(capture.train[1].time, 0.2F);
+    EXPECT_FLOAT_EQ(capture.train[5].time, 1);
+    EXPECT_FLOAT_EQ(capture.test[0].time, 0.6F);
+    EXPECT_FLOAT_EQ(capture.test[1].time, 0) << "taken for the first";
+    EXPECT_THAT(capture.warnings, Contains(tells("missing-time", Severity::problem, "(test/r_1)")));
+  }
+}
+
+TEST(SyntheticCapture, training_views_of_one_time_are_told) {
+  SyntheticCapture fake(true);
+  for (Json& frame : fake.files["transforms_train.json"]["frames"]) frame["time"] = 5;
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(tells("one-time", Severity::problem, "all training views are of one time")));
+}
+
+// Three files over one folder of images, of which two are used.
+TEST(SyntheticCapture, images_of_files_that_are_not_used_are_not_left_over) {
+  SyntheticCapture fake;
+  const std::string splits[] = {"train", "test", "val"};
+  for (const std::string& split : splits) {
+    for (Json& frame : fake.files["transforms_" + split + ".json"]["frames"]) {
+      std::string path = frame["file_path"];
+      const std::string name = path.substr(path.rfind('/') + 1), moved = "all/" + split + name;
+      std::filesystem::create_directories(fake.path() / "all");
+      std::filesystem::rename(fake.path() / split / (name + ".png"), fake.path() / (moved + ".png"));
+      frame["file_path"] = "./" + moved;
+    }
+  }
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Not(Contains(says("no camera"))));
+  fake.write_text("transforms_val.json", "not used");
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(says("3 images have no camera")));
+}
+
+TEST(SyntheticCapture, what_is_wrong_in_the_test_file_is_told_of_it) {
+  SyntheticCapture fake;
+  fake.files["transforms_test.json"]["k1"] = -60;
+  fake.save();
+  EXPECT_THAT(refusal(fake.path()), HasSubstr("transforms_test.json: test/r_"));
+  fake.files["transforms_test.json"].erase("k1");
+  fake.files["transforms_test.json"]["frames"][1]["file_path"] = "test/a\u001b[2J";
+  fake.save();
+  EXPECT_THAT(refusal(fake.path()), HasSubstr("transforms_test.json: image names"));
+}
+
 TEST(NgpCapture, natural_order_split_and_intrinsics) {
   NgpCapture fake(12);
   fake.json()["k1"] = 0.01;
@@ -268,6 +380,7 @@ TEST(NgpCapture, nerfstudio_splits_points_and_frames_with_their_own_lens) {
   EXPECT_FLOAT_EQ(capture.train[1].camera.focal_x, 20);
   EXPECT_THAT(capture.warnings, Contains(tells("in-no-split", Severity::problem,
                                                "2 frames are in neither train_filenames nor")));
+  EXPECT_THAT(capture.warnings, Not(Contains(says("no camera")))) << "what is left out has one";
   EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "mask_path: not used")));
   EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "depth images: not used")));
   fake.write_text("sparse_pc.ply", "broken");
@@ -286,10 +399,60 @@ TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
   fake.save();
   const Capture capture = load_capture(fake.path(), {});
   EXPECT_EQ(capture.train.size(), 5U);
-  EXPECT_THAT(capture.warnings, Contains(tells("path-outside", Severity::notice, "lead out of the capture")));
+  EXPECT_THAT(capture.warnings,
+              Contains(tells("path-outside", Severity::notice, "not in the capture as written")));
   for (Json& frame : fake.json()["frames"]) frame["file_path"] = "../../etc/passwd";
   fake.save();
   EXPECT_THAT(refusal(fake.path()), HasSubstr("none of 1 images"));
+}
+
+TEST(NgpCapture, paths_of_windows_and_from_another_folder_are_found_by_their_ends) {
+  for (const char* before : {"C:\\data\\x\\", "data/fox/", "./a/b/c/d/"}) {
+    NgpCapture fake(6);
+    for (Json& frame : fake.json()["frames"])
+      frame["file_path"] = before + frame["file_path"].get<std::string>();
+    fake.json()["train_filenames"] = Json::array();
+    for (int i = 0; i < 4; ++i)
+      fake.json()["train_filenames"].push_back(before + ("images/" + std::to_string(i) + ".jpg"));
+    fake.save();
+    const Capture capture = load_capture(fake.path(), {});
+    EXPECT_EQ(capture.train.size(), 4U) << before;
+    EXPECT_THAT(capture.warnings,
+                Contains(tells("path-outside", Severity::notice, "are not in the capture as written")));
+    EXPECT_THAT(capture.warnings, Contains(says("2 frames are in neither")));
+    EXPECT_THAT(capture.warnings, Not(Contains(says("no camera"))));
+  }
+  // Where some are as written, the others are missing, not elsewhere.
+  NgpCapture fake(3);
+  fake.json()["frames"][0]["file_path"] = "lost/images/1.jpg";
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(tells("missing-image", Severity::problem, "1 of 3 listed views")));
+}
+
+TEST(NgpCapture, smaller_images_are_enough) {
+  NgpCapture fake(3);
+  fake.save();
+  std::filesystem::rename(fake.path() / "images", fake.path() / "images_4");
+  EXPECT_THAT(refusal(fake.path()), HasSubstr("images: found images_4, expected images at full size"));
+  CaptureOptions options;
+  options.downscale = 4;
+  EXPECT_EQ(load_capture(fake.path(), options).train.size(), 2U);
+}
+
+TEST(NgpCapture, names_with_dots_are_whole_names) {
+  NgpCapture fake(0);
+  for (const double angle : {0.0, 1.0, 2.0})
+    fake.json()["frames"].push_back(
+        NgpCapture::frame("images/1616." + std::to_string(int(angle) + 1), angle));
+  for (int i = 0; i < 3; ++i)
+    fake.write_image("images/1616." + std::to_string(i + 1) + ".png", fake.image(i));
+  fake.write_image("images/1616.png", fake.image(9));
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_THAT(ids(capture.train), ElementsAre("1616.2", "1616.3"));
+  expect_pixels(capture, capture.train[0], fake.image(1), 0.01);
+  EXPECT_THAT(capture.warnings, Contains(says("1 image has no camera (images/1616.png)")));
 }
 
 TEST(NgpCapture, smaller_images_are_taken_where_they_are) {
@@ -395,7 +558,7 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
   for (auto& [name, split] : splits) split["time_ids"] = Json(4, 0);
   save();
   EXPECT_THAT(load_capture(fake.path(), {}).warnings,
-              Contains(tells("one-time", Severity::problem, "all views have time 0")));
+              Contains(tells("one-time", Severity::problem, "all training views are of one time")));
 }
 
 TEST(Formats, are_chosen_by_looking_or_by_name) {
@@ -423,6 +586,34 @@ TEST(Formats, are_chosen_by_looking_or_by_name) {
     EXPECT_THAT(refusal(empty.path()), HasSubstr(looked_for));
   options.test_every = 1;
   EXPECT_THAT(refusal(transforms.path(), options), HasSubstr("test_every"));
+}
+
+// COLMAP and other programs' metadata.json lie side by side.
+TEST(Formats, a_stray_metadata_file_makes_no_capture_of_nerfies) {
+  ColmapCapture fake(4);
+  fake.save();
+  fake.write_text("metadata.json", "{}");
+  EXPECT_EQ(load_capture(fake.path(), {}).format, "colmap");
+  const TempFolder alone;
+  std::ofstream(alone / "metadata.json") << "{}";
+  EXPECT_THAT(refusal(alone.path()), HasSubstr("dataset.json: found no such file"));
+}
+
+TEST(Formats, times_can_be_those_of_the_names_in_all) {
+  NerfDsCapture fake(3);
+  for (auto& [id, entry] : fake.metadata.items()) entry["time_id"] = 2 - entry["time_id"].get<int>();
+  fake.save();
+  EXPECT_EQ(load_capture(fake.path(), {}).train[0].time, 1);
+  CaptureOptions options;
+  options.times = CaptureTimes::names;
+  const Capture named = load_capture(fake.path(), options);
+  EXPECT_FLOAT_EQ(named.train[0].time, 0);
+  EXPECT_FLOAT_EQ(named.train[1].time, 0.4F);
+  EXPECT_FLOAT_EQ(named.test[2].time, 1);
+  options.times = CaptureTimes::none;
+  const Capture still = load_capture(fake.path(), options);
+  for (const View& view : still.train) EXPECT_EQ(view.time, 0);
+  EXPECT_THAT(still.warnings, Contains(tells("one-time", Severity::notice, "one time")));
 }
 
 // A photograph that a viewer would turn: told, and taken as it is stored.

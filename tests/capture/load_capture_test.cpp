@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +8,7 @@
 #include "capture/image_cache.h"
 #include "fake_capture.h"
 #include "files/npy.h"
+#include "support/refusal.h"
 
 namespace traceflow {
 namespace {
@@ -98,6 +100,28 @@ TEST(Layouts, ids_may_be_numbers) {
   fake.dataset = {{"ids", {0, 1, 2, 3, 4}}};
   fake.save();
   EXPECT_EQ(ids_of(load_capture(fake.path(), {}).train), (Ids{"0", "4"}));
+}
+
+TEST(Times, begin_with_the_first_view_wherever_the_film_was_cut) {
+  NerfDsCapture fake;
+  for (auto& [id, entry] : fake.metadata.items()) entry["time_id"] = 3000 + 10 * entry["time_id"].get<int>();
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  for (size_t i = 0; i < 4; ++i) EXPECT_FLOAT_EQ(capture.train[i].time, static_cast<float>(i) / 3);
+  for (auto& [id, entry] : fake.metadata.items()) entry["time_id"] = 5;
+  fake.save();
+  const Capture still = load_capture(fake.path(), {});
+  EXPECT_EQ(still.train[2].time, 0);
+  EXPECT_TRUE(has_warning(still, "all training views are of one time"));
+}
+
+TEST(Cameras, that_single_precision_does_not_hold_are_refused) {
+  NerfDsCapture fake;
+  fake.cameras["000001_left"]["position"] = {1e12, 0.0, 0.0};
+  fake.scene["scale"] = 1e9;
+  fake.save();
+  EXPECT_THAT(refusal_of([&] { load_capture(fake.path(), {}); }),
+              testing::HasSubstr("camera/000001_left.json: position: found 1e+21 scene units"));
 }
 
 TEST(Cameras, are_normalised_and_keep_their_pixels) {

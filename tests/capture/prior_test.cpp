@@ -114,6 +114,16 @@ TEST(Priors, arrays_of_other_shapes_are_refused) {
   }
 }
 
+TEST(Priors, arrays_of_other_proportions_are_told_of) {
+  NerfDsCapture fake;
+  fake.save();
+  for (const int64_t width : {24, 16}) {
+    write_npy(fake.path() / "normal.npy", Tensor<float>({4, 16, width, 3}));
+    EXPECT_EQ(has_warning(load_capture(fake.path(), {}), "the normal prior of 000000_left, 000001_left"),
+              width == 16);
+  }
+}
+
 TEST(Priors, averages_are_unit_again_and_sizes_may_differ) {
   NerfDsCapture fake;
   Tensor<float> array({4, 4, 6, 3});

@@ -75,6 +75,18 @@ TEST_F(InspectVerb, says_them_for_programs) {
   EXPECT_GT(paper["memory"]["training_cuda_bytes"], report["memory"]["training_cuda_bytes"]);
 }
 
+// Names of folders and files may hold what would clear the terminal, or write elsewhere on it.
+TEST_F(InspectVerb, shows_names_without_what_commands_the_terminal) {
+  const std::filesystem::path moved = folder_ / "cap\x1b[2Jture";
+  std::filesystem::rename(capture(), moved);
+  std::filesystem::copy(moved / "rgb/1x/000000_left.png", moved / "rgb/1x/holi\x1b]0;day\x07.png");
+  const Outcome told = run_with({"inspect", "-d", moved.string(), "--quick"});
+  EXPECT_EQ(told.code, exit_done) << told.err;
+  EXPECT_EQ((told.out + told.err).find_first_of("\x1b\x07"), std::string::npos);
+  EXPECT_THAT(told.out, HasSubstr("capture         cap?[2Jture (nerf-ds)\n"));
+  EXPECT_THAT(told.out, HasSubstr("\n                rgb/1x/holi?]0;day?.png\n"));
+}
+
 TEST_F(InspectVerb, draws_a_picture) {
   const std::string picture = (folder_ / "picture.png").string();
   ASSERT_EQ(run_with({"inspect", "-d", capture(), "--picture", picture}).code, exit_done);

@@ -120,7 +120,8 @@ MalformedKind malformed_folders() {
        {"a file that is no archive",
         {"inspect", "-d", "cameras.json"},
         nothing,
-        "cameras.json: found no zip directory, expected a whole zip archive, stored or deflated; pack or "
+        "cameras.json: found a file that is no zip archive, expected a whole zip archive, stored or "
+        "deflated; pack or "
         "save it again"},
        {"a link out of the capture", inspect_capture, remove("capture/points.npy"),
         "capture/points.npy: found a link out of the folder, to rays.npy, expected files inside it; copy the "

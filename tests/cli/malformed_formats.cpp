@@ -43,6 +43,10 @@ MalformedKind malformed_colmap() {
         "colmap/sparse/0/images.txt: line 1, images[0].tvec: found the end of the line, expected a number"},
        {"words for a number", inspect_colmap, put(images + ".txt", "1 1 0 0 none 0 0 1 1 a.png\n"),
         "colmap/sparse/0/images.txt: line 1, images[0].qvec: found \"none\", expected a number"},
+       {"no lines of points between the images", inspect_colmap,
+        put(images + ".txt", "1 1 0 0 0 0 0 1 1 a.png\n2 1 0 0 0 0 0 1 1 b.png\n"),
+        "colmap/sparse/0/images.txt: line 2, images[0].points2D: found 10 words, expected x, y and a point's "
+        "id of each, in a line that may be empty"},
        {"a quaternion of no length", inspect_colmap, put(images + ".txt", "1 0 0 0 0 0 0 1 1 a.png\n"),
         "colmap/sparse/0/images.txt: images[0].qvec: found 0.000000 0.000000 0.000000 0.000000, expected a "
         "rotation's quaternion"},

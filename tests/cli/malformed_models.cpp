@@ -3,6 +3,7 @@
 #include "files/safetensors.h"
 #include "support/file_bytes.h"
 #include "support/temp_folder.h"
+#include "support/zip_writer.h"
 
 namespace traceflow::cli {
 
@@ -17,6 +18,16 @@ std::string npy(const std::string& type, const std::string& shape, size_t bytes)
   const std::string head = "{'descr': " + type + ", 'fortran_order': False, 'shape': " + shape + ", }\n";
   return "\x93NUMPY" + std::string{'\1', '\0', static_cast<char>(head.size()), '\0'} + head +
          std::string(bytes, '\0');
+}
+
+// Normal priors in an archive, with what follows changed in it.
+std::function<void(Files&)> put_normals(const std::vector<std::pair<std::string, std::string>>& members,
+                                        const std::function<void(std::string&)>& change = nullptr) {
+  return [=](Files& files) {
+    files.erase("capture/normal/1x/a.png");
+    std::string& bytes = files["capture/normal.npz"] = zip_archive(members, true);
+    if (change) change(bytes);
+  };
 }
 
 // A checkpoint read, changed, and written again.
@@ -35,7 +46,7 @@ std::function<void(Files&)> edit(const std::function<void(Safetensors&)>& change
 }  // namespace
 
 MalformedKind malformed_arrays() {
-  const std::string points = "capture/points.npy", normals = "capture/normal.npz";
+  const std::string points = "capture/points.npy", pictures = npy("'<f4'", "(2, 1, 1, 3)", 24);
   return {
       "Arrays: .npy and .npz",
       {{"objects of Python", trace, put(rays, npy("'|O'", "(1, 6)", 24)),
@@ -80,6 +91,38 @@ MalformedKind malformed_arrays() {
           files["capture/normal.npy"] = npy("'<f4'", "(7, 1, 1, 3)", 84);
         },
         "capture/normal.npy: shape: found 7x1x1x3, expected T×H×W×3 with T the training views (1) or all "
+        "(2); make the priors again or take the file away"},
+       {"an archive of no arrays", inspect_capture, put_normals({}),
+        "capture/normal.npz: found an archive of nothing, expected one array; save the array again"},
+       {"an archive of two arrays", inspect_capture,
+        put_normals({{"normal.npy", pictures}, {"depth.npy", pictures}}),
+        "capture/normal.npz: found 2 arrays (normal.npy, depth.npy), expected one array; save the array "
+        "again"},
+       {"objects of Python in an archive", inspect_capture,
+        put_normals({{"normal.npy", npy("'|O'", "(2, 1, 1, 3)", 24)}}),
+        "capture/normal.npz: descr: found an array of Python objects, expected numbers of one type; save the "
+        "array again"},
+       {"text in an archive", inspect_capture, put_normals({{"normal.npy", "normals of all views"}}),
+        "capture/normal.npz: found a file that does not start as one, expected a .npy array; save the array "
+        "again"},
+       {"more numbers than an archive's array has", inspect_capture,
+        put_normals({{"normal.npy", npy("'<f4'", "(2, 100, 100, 3)", 24)}}),
+        "capture/normal.npz: shape: found 2x100x100x3, expected an array that the file holds; the file is "
+        "cut short or broken"},
+       {"an archive cut short", inspect_capture,
+        put_normals({{"normal.npy", pictures}}, [](std::string& zip) { zip.resize(zip.size() / 2); }),
+        "capture/normal.npz: found a zip archive whose end is missing, expected a whole zip archive, stored "
+        "or deflated; pack or save it again"},
+       {"an array in the place of its archive", inspect_capture,
+        [=](Files& files) {
+          put_normals({})(files);
+          files["capture/normal.npz"] = pictures;
+        },
+        "capture/normal.npz: found a file that is no zip archive, expected a whole zip archive, stored or "
+        "deflated; pack or save it again"},
+       {"priors in an archive for another number of views", inspect_capture,
+        put_normals({{"normal.npy", npy("'<f4'", "(7, 1, 1, 3)", 84)}}),
+        "capture/normal.npz: shape: found 7x1x1x3, expected T×H×W×3 with T the training views (1) or all "
         "(2); make the priors again or take the file away"}}};
 }
 

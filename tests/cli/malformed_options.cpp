@@ -54,7 +54,7 @@ MalformedKind malformed_options() {
        in_flags("no such file of settings", {"--config", "nowhere.toml"},
                 "nowhere.toml: found No such file or directory, expected a readable file"),
        in_flags("an assignment without a value", {"--set", "loss.normal"},
-                "--set: found loss.normal, expected an assignment such as loss.normal=0"),
+                "--set: found loss.normal, expected an assignment, PATH=VALUE"),
        in_flags("an assignment to a name that there is not", {"--set", "los.normal=1"},
                 "--set: los.normal: found no option of this name, expected one that `traceflow "
                 "--help-options` lists; did you mean loss.normal?"),

@@ -10,8 +10,8 @@
 
 #include "capture/synth/synth.h"
 #include "cli/program_call.h"
+#include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
-#include "cli/terminal/frame_progress.h"
 #include "files/png.h"
 #include "support/file_bytes.h"
 
@@ -234,6 +234,7 @@ TEST_F(See, FlagsThatContradictEachOtherAreRefusedInWords) {
 }
 
 TEST_F(See, CtrlCEndsTheWorkAndSaysWhatThereIs) {
+  std::signal(SIGINT, SIG_DFL);  // a shell that runs tests behind it has it ignored
   std::thread other([] {
     while (!fs::exists(folder() / "stopped/rgb/00001.png")) std::this_thread::yield();
     std::raise(SIGINT);
@@ -257,17 +258,20 @@ TEST_F(See, AFilmIsMadeWhereFfmpegIs) {
   EXPECT_THAT(bytes_of(folder() / "films/a.mp4").substr(0, 12), HasSubstr("ftyp"));
 }
 
-TEST(FrameProgress, TellsRateAndWhatIsLeft) {
-  EXPECT_EQ(frame_line(0, 10, 0), "0/10 frames");
-  EXPECT_EQ(frame_line(5, 125, 2), "5/125 frames  2.5 a second  48 s left");
+TEST(CountProgress, TellsRateAndWhatIsLeft) {
+  EXPECT_EQ(count_line({"", "frames", 0, 10}, 0), "0/10 frames");
+  EXPECT_EQ(count_line({"", "frames", 5, 125}, 2), "5/125 frames  2.5 a second  48 s left");
+  EXPECT_EQ(count_line({"features", "", 5, 125}, 2), "features  5/125  2.5 a second  48 s left");
+  EXPECT_EQ(count_line({"frames", "", 30, 0}, 2), "frames    30  15 a second");
+  EXPECT_EQ(count_line({"poses", "", 0, 0}, 2), "poses     …");
 }
 
-TEST(FrameProgress, RedrawsOneLineOnATerminalAndWritesFewElsewhere) {
+TEST(CountProgress, RedrawsOneLineOnATerminalAndWritesFewElsewhere) {
   std::ostringstream terminal, file;
-  FrameProgress on_terminal(terminal, 20, 1000), elsewhere(file, 0, 1000);
+  CountProgress on_terminal(terminal, 20), elsewhere(file, 0);
   for (int i = 1; i <= 1000; ++i) {
-    on_terminal.show(i, 0.05 * i);
-    elsewhere.show(i, 0.05 * i);
+    on_terminal.show({"", "frames", i, 1000}, 0.05 * i);
+    elsewhere.show({"", "frames", i, 1000}, 0.05 * i);
   }
   on_terminal.finish();
   elsewhere.finish();

@@ -101,6 +101,26 @@ TEST(JsonDocument, HoldsListsToALimit) {
             "file: found 1000001 elements, expected 1000000 at most");
 }
 
+TEST(JsonDocument, HoldsValuesToALimit) {
+  const auto list = [](size_t count) {
+    std::string text = "[{}";
+    for (size_t i = 1; i < count; ++i) text += ",{}";
+    return text + "]";
+  };
+  EXPECT_EQ(json_extent(list(1'999'999)).values, max_json_values - 1);
+  EXPECT_EQ(refusal(list(2'000'000), [](auto&) {}), "file: found 4000001 values, expected at most 4000000");
+  EXPECT_EQ(refusal("\"" + std::string(5'000'000, ',') + "\"", [](auto&) {}), "accepted");
+}
+
+TEST(JsonDocument, TheCamerasOfALongFilmAreFarFromTheLimit) {
+  const std::string frame =
+      R"({"file_path": "images/000001.png", "time": 0.5, "fl_x": 1, "fl_y": 1, "cx": 1, "cy": 1, "w": 1, "h": 1,)"
+      R"( "k1": 0, "k2": 0, "k3": 0, "p1": 0, "p2": 0, "colmap_im_id": 1, "transform_matrix":)"
+      R"( [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]})";
+  constexpr size_t frames = 10'000;
+  EXPECT_LT(frames * json_extent(frame).values, max_json_values / 5);
+}
+
 TEST(JsonDocument, QuotesOnlyTheBeginningOfWhatItFound) {
   const std::string message =
       refusal("[\"" + std::string(1000, 'x') + "\"]", [](const JsonField& f) { (void)f.number(); });

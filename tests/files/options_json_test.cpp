@@ -81,6 +81,7 @@ TEST(OptionsJson, RefusalsNameFilePathAndValue) {
   EXPECT_THAT(options_refusal("[1]"), HasSubstr("no object"));
   EXPECT_THAT(options_refusal("{"), HasSubstr("not JSON"));
   EXPECT_THAT(options_refusal(std::string(1'000'000, '[')), HasSubstr("nested too deep"));
+  EXPECT_THAT(options_refusal("[" + std::string(10'000, ',')), HasSubstr("found 10002 values"));
 }
 
 RC_GTEST_PROP(OptionsJsonProperty, EveryValueSurvives,

@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/random.h"
 #include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -228,10 +229,22 @@ TEST(PngHostile, huge_headers_are_refused_before_memory_is_taken) {
   EXPECT_THROW(read_png(folder / "huge.png"), InputError);
   write_bytes(folder / "more.png", header_only(32768, 8193));
   EXPECT_THROW(read_png_size(folder / "more.png"), InputError);
-  write_bytes(folder / "wide.png", header_only(32769, 1));
-  EXPECT_THROW(read_png_size(folder / "wide.png"), InputError);
-  write_bytes(folder / "none.png", header_only(0, 1));
-  EXPECT_THROW(read_png_size(folder / "none.png"), InputError);
+}
+
+TEST(PngHostile, a_side_out_of_range_is_refused_by_name) {
+  const TempFolder folder;
+  const auto path = folder / "image.png";
+  const auto refusal = [&](uint32_t width, uint32_t height) {
+    write_bytes(path, header_only(width, height));
+    return refusal_of([&] { read_png_size(path); });
+  };
+  const std::string expected = ", expected 1 to 32768 pixels; ", again = "write or copy the file again",
+                    smaller = "scale the image down";
+  EXPECT_EQ(refusal(32768, 1), "accepted");
+  EXPECT_EQ(refusal(32769, 1), path.string() + ": width: found 32769" + expected + smaller);
+  EXPECT_EQ(refusal(0, 1), path.string() + ": width: found 0" + expected + again);
+  EXPECT_EQ(refusal(1, 0), path.string() + ": height: found 0" + expected + again);
+  EXPECT_EQ(refusal(1, 0xffffffff), path.string() + ": height: found 4294967295" + expected + smaller);
 }
 
 TEST(PngHostile, what_is_not_a_png_names_the_file) {

@@ -1,12 +1,16 @@
 #include "files/safetensors.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <limits>
+#include <thread>
 
 #include "files/half.h"
 #include "support/file_bytes.h"
@@ -141,6 +145,18 @@ TEST(Safetensors, RefusesWhatIsNotAFile) {
   EXPECT_THROW(Safetensors::read(testing::TempDir()), InputError);
 }
 
+// A value of two bytes takes many times as many when it is parsed.
+TEST(Safetensors, RefusesMoreValuesThanAHeaderHas) {
+  std::string list = "[0";
+  for (int i = 0; i < 4'000'000; ++i) list += ",0";
+  list += "]";
+  EXPECT_THAT(refusal(file_bytes(R"({"a":)" + list + "}", "")),
+              HasSubstr("header: found 4000003 values, expected at most 4000000"));
+  const std::string checksums = R"({\"metadata\":\"\",\"tensors\":{},\"a\":)" + list + "}";
+  EXPECT_THAT(refusal(file_bytes(R"({"__metadata__":{"traceflow.crc32":")" + checksums + R"("}})", "")),
+              HasSubstr("metadata: found checksums that cannot be read"));
+}
+
 struct Hostile {
   const char* what;
   std::string header;
@@ -272,6 +288,24 @@ TEST(Safetensors, FilesWithoutChecksumsAreRead) {
   const Safetensors file = Safetensors::read(path);
   EXPECT_FALSE(file.has_checksums());
   EXPECT_EQ(file.text("k"), "v");
+}
+
+// As a checkpoint is replaced while somebody looks at a training.
+TEST(Safetensors, AFileThatIsReplacedMeanwhileIsReadWhole) {
+  const auto path = scratch("replaced"), other = scratch("other");
+  Safetensors small, large;
+  small.add("a", tensor_of<float>({1}, {1}));
+  large.add("a", Tensor<float>(Shape{5000}));
+  small.write(path);
+  large.write(other);
+  std::atomic<bool> over{false};
+  std::thread writer([&] {
+    while (!over) ::renameat2(AT_FDCWD, path.c_str(), AT_FDCWD, other.c_str(), RENAME_EXCHANGE);
+  });
+  for (int i = 0; i < 3000 && !HasFailure(); ++i)
+    EXPECT_EQ(refusal_of([&] { Safetensors::read(path); }), "accepted");
+  over = true;
+  writer.join();
 }
 
 // A folder's name need not be UTF-8; what is written of it must still agree with its checksum.

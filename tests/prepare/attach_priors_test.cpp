@@ -8,14 +8,20 @@
 #include <numeric>
 
 #include "base/error.h"
+#include "base/folder_lock.h"
+#include "base/process.h"
 #include "capture/image_cache.h"
 #include "capture/synth/synth.h"
+#include "files/jpeg.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "prepare/capture_folder.h"
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
+#include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
+#include "support/zip_writer.h"
 
 namespace traceflow::prepare {
 namespace {
@@ -65,6 +71,20 @@ class AttachPriors : public testing::Test {
       }
     }
     return array;
+  }
+
+  // "0.png" … of 8 bits, colours meaning 2v − 1.
+  static void write_normal_pictures(const Tensor<float>& normals, const fs::path& folder,
+                                    const std::string& ending) {
+    fs::create_directory(folder);
+    for (int64_t i = 0; i < normals.dim(0); ++i) {
+      Tensor<uint8_t> picture({normals.dim(1), normals.dim(2), 3});
+      for (int64_t k = 0; k < picture.size(); ++k)
+        picture[k] = static_cast<uint8_t>(std::lround(127.5F * (normals.row(i)[k] + 1)));
+      const fs::path file = folder / (std::to_string(i) + ending);
+      write_png(file, picture);
+      if (ending == ".jpg") write_bytes(file, jpeg_bytes(picture, 95));
+    }
   }
 
   std::string attach(const AttachOptions& options) {
@@ -151,6 +171,82 @@ TEST_F(AttachPriors, PicturesOfAFolderGoByName) {
   expect_normals_of_the_truth(0.012);
 }
 
+// As NormalCrafter leaves them.
+TEST_F(AttachPriors, AnArrayInAnArchiveIsAsGood) {
+  write_npy(folder_ / "normals.npy", normals_in({1, -1, -1}));
+  write_bytes(folder_ / "film.npz",
+              zip_archive({{"normals.npy", bytes_of(folder_ / "normals.npy")}}, true, true));
+  AttachOptions options;
+  options.normals = folder_ / "film.npz";
+  EXPECT_THAT(attach(options), HasSubstr(": opengl"));
+  expect_normals_of_the_truth(0.012);
+}
+
+TEST_F(AttachPriors, PicturesOfEightBitsAndJpegsAreTakenByOrder) {
+  for (const char* ending : {".png", ".jpg"}) {
+    const fs::path given = folder_ / (ending + 1);
+    write_normal_pictures(normals_in({1, 1, 1}), given, ending);
+    AttachOptions options;
+    options.normals = given;
+    options.force = true;
+    EXPECT_THAT(attach(options), HasSubstr(": opencv"));
+    expect_normals_of_the_truth(std::string(ending) == ".jpg" ? 0.35 : 0.02);
+  }
+}
+
+TEST_F(AttachPriors, AFilmOfPicturesIsTakenByOrder) {
+  if (!is_in_path("ffmpeg")) GTEST_SKIP() << "films need ffmpeg";
+  write_normal_pictures(normals_in({-1, -1, -1}), folder_ / "pictures", ".png");
+  const Descriptor log = open_log(folder_ / "make.log");
+  ASSERT_TRUE(Process({"ffmpeg", "-nostdin", "-i", folder_ / "pictures/%d.png", "-c:v", "ffv1", "-pix_fmt",
+                       "bgr0", folder_ / "x_vis.mkv"},
+                      {.error = log.number()})
+                  .wait());
+  AttachOptions options;
+  options.normals = folder_ / "x_vis.mkv";
+  EXPECT_THAT(attach(options), HasSubstr(": stable-normal"));
+  expect_normals_of_the_truth(0.02);
+}
+
+TEST_F(AttachPriors, MasksThatWereTurnedAreRefused) {
+  const fs::path given = folder_ / "given";
+  fs::create_directory(given);
+  for (const View& view : truth_.train) write_mask(given / (view.id + ".png"), Tensor<uint8_t>({80, 48}));
+  AttachOptions options;
+  options.masks = given;
+  options.force = true;
+  EXPECT_THAT(refusal(options),
+              HasSubstr("masks: found 48×80 for 000000_left, expected the proportions of 80×48"));
+  EXPECT_TRUE(load_capture(capture(), {}).has_masks);
+}
+
+TEST_F(AttachPriors, ASecondOneIsRefusedWhileTheFirstWorks) {
+  AttachOptions options;
+  options.masks = *made / "capture/mask/1x";
+  options.force = true;
+  const FolderLock first(capture() / ".attach-priors.lock", capture(), "attaching priors");
+  EXPECT_THAT(refusal(options), HasSubstr("attaching priors in it"));
+}
+
+TEST_F(AttachPriors, NormalsGoOutAgainWhereTheMasksCannotComeIn) {
+  write_npy(folder_ / "normals.npy", normals_in({1, 1, 1}));
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  attach(options);
+  const std::string before = bytes_of(capture() / "normal/1x" / (truth_.train.front().id + ".png"));
+  write_npy(folder_ / "normals.npy", normals_in({1, -1, -1}));
+  options.masks = *made / "capture/mask/1x";
+  options.force = true;
+  options.axes = PriorAxes::opencv;  // which gives other pictures
+  // Where the old masks would go there is something already.
+  const auto block = [&](const std::string& line) {
+    if (line.starts_with("masks")) fs::create_directories(capture() / ".attach-priors/old mask/in the way");
+  };
+  EXPECT_THROW(attach_priors(capture(), options, block, never_), fs::filesystem_error);
+  EXPECT_EQ(bytes_of(capture() / "normal/1x" / (truth_.train.front().id + ".png")), before);
+  EXPECT_TRUE(load_capture(capture(), {}).has_masks);
+}
+
 TEST_F(AttachPriors, NothingIsReplacedUnasked) {
   write_npy(folder_ / "normals.npy", normals_in({1, 1, 1}));
   AttachOptions options;
@@ -232,7 +328,15 @@ TEST(FindAxes, AMixtureThatIsNotClearIsRefused) {
   const AxisEvidence mirrored{{0.9, 0.8, -0.7}, 1000}, unclear{{0.1, 0.8, -0.7}, 1000};
   EXPECT_EQ(find_axes(PriorAxes::automatic, mirrored, "n").signs, Vec3<double>(1, 1, -1));
   EXPECT_THROW(find_axes(PriorAxes::automatic, unclear, "n"), InputError);
-  EXPECT_EQ(find_axes(PriorAxes::automatic, {{0.1, 0.05, -0.9}, 1000}, "n").signs, Vec3<double>(1, -1, -1));
+  EXPECT_EQ(find_axes(PriorAxes::automatic, {{0.9, 0.05, -0.9}, 1000}, "n").signs, Vec3<double>(1, -1, -1));
+}
+
+// As where a capture has no points: z alone is known, and opengl and stable-normal differ in x.
+TEST(FindAxes, EvidenceThatFitsTwoKindsAsksWhichItIs) {
+  const AxisEvidence only_z{{0.1, 0.05, -0.9}, 1000};
+  EXPECT_THAT(refusal_of([&] { find_axes(PriorAxes::automatic, only_z, "n"); }), HasSubstr("--axes"));
+  EXPECT_THROW(find_axes(PriorAxes::automatic, {}, "n"), InputError);
+  EXPECT_EQ(find_axes(PriorAxes::stable_normal, only_z, "n").signs, Vec3<double>(-1, -1, -1));
 }
 
 TEST(MatchViews, ByNameElseByOrder) {

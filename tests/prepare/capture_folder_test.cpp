@@ -80,7 +80,7 @@ TEST(WriteCapture, IsReadBackAsItWasPosed) {
   EXPECT_EQ(capture.test[0].id, "000013");  // the third that has a pose
   const View& view = capture.train[1];
   EXPECT_EQ(view.id, "000012");
-  EXPECT_FLOAT_EQ(view.time, 2.0F / 11);
+  EXPECT_FLOAT_EQ(view.time, 0.1F);  // from the first that has a pose, at 1, to the last at 11
   const ColmapImage& image = p.parts.model.images[1];
   EXPECT_NEAR(view.camera.focal_x, 50, 1e-4);
   EXPECT_NEAR(view.camera.focal_y, 51, 1e-4);

@@ -1,5 +1,6 @@
 #include "prepare/choose_frames.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -15,6 +16,7 @@
 #include "prepare/netpbm.h"
 #include "prepare/picture_source.h"
 #include "prepare/programs.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::prepare {
@@ -79,6 +81,11 @@ TEST(NearestFrames, AreWithinTheTolerance) {
   const std::vector<Candidate> candidates{{0.0, 0}, {0.5, 0}, {1.1, 0}};
   EXPECT_THAT(nearest_frames(candidates, {0.1, 0.45, 0.8, 1.0, 9.0}, 0.2), ElementsAre(0, 1, -1, 2, -1));
   EXPECT_THAT(nearest_frames({}, {1.0}, 5), ElementsAre(-1));
+}
+
+TEST(NearestFrames, GiveEachCandidateOnceToTheNearestTime) {
+  const std::vector<Candidate> candidates{{2.0, 0}, {5.0, 0}};
+  EXPECT_THAT(nearest_frames(candidates, {0.5, 1.6, 2.2, 2.9, 4.0}, 3), ElementsAre(-1, -1, 0, -1, 1));
 }
 
 TEST(PicturesIn, CountAsPeopleDo) {
@@ -151,9 +158,10 @@ TEST(Frames, AreReadAsTheyWereWritten) {
   EXPECT_EQ(frames.frames[2].height, 6);
 }
 
+using Matched = std::vector<std::optional<int64_t>>;
+
 TEST(MatchMasks, ByFrameBySourceOrByOrder) {
   const Frames frames = some_frames();
-  using Matched = std::vector<std::optional<int64_t>>;
   EXPECT_EQ(match_masks("m", {"000000.png", "000001.png", "000002.png"}, 3, frames), (Matched{0, 1, 2}));
   EXPECT_EQ(match_masks("m", {"other.png", "photo1.png", "photo3.png.png", "photo6.jpg"}, 4, frames),
             (Matched{1, 2, 3}));
@@ -165,8 +173,59 @@ TEST(MatchMasks, ByFrameBySourceOrByOrder) {
   } catch (const InputError& error) {
     EXPECT_THAT(
         error.what(),
-        HasSubstr("m: masks: found 2, of which 1 have a frame's name, expected one for each of 3 frames"));
+        HasSubstr(
+            "m: masks: found 2, not all of them with a frame's name, expected one for each of 3 frames"));
   }
+}
+
+std::vector<std::string> numbered(int64_t first, int64_t count) {
+  std::vector<std::string> names;
+  for (int64_t i = first; i < first + count; ++i) names.push_back(fmt::format("{:06}.png", i));
+  return names;
+}
+
+// A film's pictures and its frames are both named by numbers of six digits.
+TEST(MatchMasks, NumbersOfAFilmsPicturesAreNotThoseOfItsFrames) {
+  Frames frames = some_frames();
+  for (Frame& frame : frames.frames) frame.source.clear();
+  EXPECT_EQ(match_masks("m", numbered(0, 7), 7, frames), (Matched{1, 3, 6}));
+  EXPECT_EQ(match_masks("m", numbered(0, 3), 3, frames), (Matched{0, 1, 2}));
+  EXPECT_EQ(match_masks("m", numbered(0, 5), 5, frames), (Matched{0, 1, 2}));
+}
+
+TEST(MatchMasks, NumbersOfAFoldersPicturesAreNotThoseOfItsFrames) {
+  Frames frames = some_frames();
+  for (Frame& frame : frames.frames) frame.source = fmt::format("{:06}.png", frame.index);
+  EXPECT_EQ(match_masks("m", numbered(1, 6), 6, frames), (Matched{0, 2, 5}));
+  EXPECT_EQ(match_masks("m", numbered(0, 3), 3, frames), (Matched{0, 1, 2}));
+}
+
+TEST(MatchMasks, TheSecondCamerasNamesDoNotMakeUpForTheFirsts) {
+  Frames frames = some_frames();
+  frames.source_frames.push_back(7);
+  for (Frame& frame : frames.frames) frame.source.clear();
+  frames.frames.push_back({"000001_right", 1, "", 2, 0.25, 9.5, 8, 6});
+  EXPECT_THROW(match_masks("m", {"000000.png", "000001.png", "000001_right.png", "x.png"}, 4, frames),
+               InputError);
+  EXPECT_EQ(match_masks("m", {"000000.png", "000001.png", "000002.png", "000001_right.png"}, 4, frames),
+            (Matched{0, 1, 2, 3}));
+  EXPECT_EQ(match_masks("m", numbered(0, 3), 3, frames), (Matched{0, 1, 2, std::nullopt}));
+}
+
+TEST(MatchMasks, OneMaskForTwoFramesIsRefused) {
+  Frames frames = some_frames();
+  frames.frames[1].source = "photo1.png";
+  EXPECT_THAT(refusal_of([&] {
+                match_masks("m", {"photo1.png", "photo6.png"}, 2, frames);
+              }),
+              HasSubstr("one for both 000000 and 000001"));
+}
+
+TEST(Proportions, OfAPictureThatWasTurnedAreRefused) {
+  const Tensor<uint8_t> mask({192, 108});
+  EXPECT_THAT(refusal_of([&] { require_proportions("m", mask, "000003", 1080, 1920); }), "accepted");
+  EXPECT_THAT(refusal_of([&] { require_proportions("m", mask, "000003", 960, 540); }),
+              HasSubstr("m: masks: found 108×192 for 000003, expected the proportions of 960×540"));
 }
 
 }  // namespace

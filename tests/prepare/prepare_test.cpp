@@ -1,5 +1,6 @@
 #include "prepare/prepare.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +16,10 @@
 #include "capture/capture.h"
 #include "capture/synth/synth.h"
 #include "files/eight_bit.h"
+#include "files/json_document.h"
 #include "files/png.h"
+#include "prepare/poses.h"
+#include "prepare/steps.h"
 #include "support/file_bytes.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"
@@ -100,7 +104,7 @@ class PrepareTest : public testing::Test {
     for (const SynthView& view : synth_views(options)) {
       if (!view.is_test) views_.push_back(view);
     }
-    write_film(options);
+    write_film(options, film());
     write_model(options);
   }
   ~PrepareTest() override { set_variable("PATH", path_); }
@@ -110,11 +114,12 @@ class PrepareTest : public testing::Test {
     fs::permissions(folder_ / "bin" / name, fs::perms::owner_all);
   }
 
-  // Every picture twice, the second time sharper; a quarter of a second apart.
-  void write_film(const SynthOptions& options) const {
-    std::ofstream colour(film() + ".ppm", std::ios::binary), grey(film() + ".pgm", std::ios::binary),
-        times(film() + ".times");
-    std::ofstream(film()) << "a film";
+  // Every picture twice, the second time sharper; a quarter of a second apart, from one second on.
+  void write_film(const SynthOptions& options, const std::string& film) const {
+    std::ofstream colour(film + ".ppm", std::ios::binary), grey(film + ".pgm", std::ios::binary),
+        times(film + ".times");
+    std::ofstream(film) << "a film";
+    times << "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/4, frame_rate: 4/1\n";
     for (const SynthView& view : views_) {
       const Tensor<uint8_t> sharp = to_8bit(synth_images(options, view).colour);
       Tensor<uint8_t> blurred = sharp;
@@ -125,8 +130,8 @@ class PrepareTest : public testing::Test {
         grey << "P5\n64 40\n255\n";
         colour.write(reinterpret_cast<const char*>(picture->data()), picture->size());
         for (int64_t i = 0; i < picture->size(); i += 3) grey.put(static_cast<char>((*picture)[i + 1]));
-        times << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:      0 pts_time:"
-              << 1 + 0.5 * view.frame + (picture == &sharp ? 0.25 : 0) << "       fmt:rgb24\n";
+        times << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:      "
+              << 4 + 2 * view.frame + (picture == &sharp ? 1 : 0) << " pts_time:0       fmt:rgb24\n";
       }
     }
   }
@@ -164,14 +169,34 @@ class PrepareTest : public testing::Test {
     return o;
   }
 
-  bool prepare(const PrepareOptions& options) {
+  bool prepare(const PrepareOptions& options) { return prepare(film(), capture(), options); }
+  bool prepare(const fs::path& input, const fs::path& capture, const PrepareOptions& options) {
     lines_.clear();
+    told_.clear();
     fs::remove(folder_ / "calls");
-    return prepare_capture(
-        film(), capture(), options, [this](const std::string& line) { lines_.push_back(line); }, stop_);
+    return prepare_capture(input, capture, options,
+                           {[this](const std::string& line) { lines_.push_back(line); },
+                            [this](Step step, int64_t done, int64_t all) {
+                              told_.push_back(fmt::format("{} {}/{}", step_name(step), done, all));
+                            }},
+                           stop_);
   }
   std::string refusal(const PrepareOptions& options) {
     return refusal_of([&] { prepare(options); });
+  }
+  // A folder of a mask for each frame, white in its left half, for the ffmpeg of these tests to read.
+  fs::path write_masks(int width, int height) const {
+    fs::create_directory(folder_ / "mine");
+    for (int i = 0; i < frames; ++i) {
+      const std::string file = folder_ / fmt::format("mine/{:06}.png", i);
+      std::ofstream(file) << "a picture";
+      std::ofstream(file + ".times") << "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/25\n"
+                                     << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:   0\n";
+      std::ofstream grey(file + ".pgm", std::ios::binary);
+      grey << "P5\n" << width << " " << height << "\n255\n";
+      for (int k = 0; k < width * height; ++k) grey.put(k % width < width / 2 ? '\xff' : '\0');
+    }
+    return folder_ / "mine";
   }
   // Which programs were called: "ffmpeg pgm", "colmap mapper".
   std::vector<std::string> calls() const {
@@ -187,7 +212,7 @@ class PrepareTest : public testing::Test {
   std::string path_;
   TempFolder folder_;
   std::vector<SynthView> views_;
-  std::vector<std::string> lines_;
+  std::vector<std::string> lines_, told_;
   std::atomic<bool> stop_ = false;
 };
 
@@ -211,9 +236,26 @@ TEST_F(PrepareTest, MakesACaptureWithTheKnownCameras) {
     EXPECT_NEAR(view.camera.focal_x, truth.camera.focal_x, 1e-3);
     EXPECT_NEAR(view.time, static_cast<float>(truth.frame) / (frames - 1), 1e-6);
   }
+  EXPECT_THAT(told_, testing::IsSupersetOf({"frames 0/0", "frames 28/0", "frames 14/14", "features 0/0",
+                                            "matches 0/0", "poses 0/0", "capture 0/0", "capture 14/14"}));
   // The sharp ones of the film were taken.
   const Tensor<uint8_t> taken = read_png(capture() / "rgb/1x/000002.png");
   EXPECT_NE(*std::max_element(taken.data(), taken.data() + taken.size()), 90);
+}
+
+TEST(ShareSaid, IsWhatColmapSaysLast) {
+  const auto said = [](const std::string& text) {
+    const auto share = share_said(text, 87);
+    return share ? fmt::format("{}/{}", share->done, share->all) : "nothing";
+  };
+  EXPECT_EQ(
+      said("Processed file [1/87]\n  Name: 000000.png\nI2024 17 x.cc:9] Processed file [12/87]\n  Name:"),
+      "12/87");
+  EXPECT_EQ(said("Matching image [9/87] in 0.551s\nMatching image [10/87]"), "10/87");
+  EXPECT_EQ(said("Matching block [2/3, 1/3] in 0.5s"), "4/9");
+  EXPECT_EQ(said("Registering image #59 (36)\n\n  => Image sees 312 / 512 points"), "36/87");
+  EXPECT_EQ(said("tching image [9/8"), "nothing");
+  EXPECT_EQ(said(""), "nothing");
 }
 
 TEST_F(PrepareTest, WhatStandsIsNotDoneAgain) {
@@ -318,6 +360,140 @@ TEST_F(PrepareTest, ASecondOneIsRefusedWhileTheFirstWorks) {
   }
   EXPECT_TRUE(prepare(options()));
   EXPECT_FALSE(fs::exists(work / "lock"));
+}
+
+TEST_F(PrepareTest, SuppliedMasksKeepFeaturesOffAndComeIntoTheCapture) {
+  PrepareOptions supplied = options();
+  supplied.masks = write_masks(32, 20);
+  ASSERT_TRUE(prepare(supplied));
+  EXPECT_THAT(lines_[1], HasSubstr("14 of 14 supplied, covering 50.0% of the pixels"));
+  // COLMAP takes features where its mask is not black.
+  const Tensor<uint8_t> features = read_png(work_folder(capture()) / "colmap/masks/000005.png.png");
+  EXPECT_EQ(features(20, 10, 0), 0);
+  EXPECT_EQ(features(20, 50, 0), 255);
+  const Tensor<uint8_t> moving = read_png(capture() / "mask/1x/000005.png.png");
+  EXPECT_EQ(moving(20, 10, 0), 255);
+  EXPECT_EQ(moving(20, 50, 0), 0);
+}
+
+TEST_F(PrepareTest, SuppliedMasksThatWereTurnedAreRefused) {
+  PrepareOptions supplied = options();
+  supplied.masks = write_masks(20, 32);
+  EXPECT_THAT(refusal(supplied),
+              HasSubstr("masks: found 20×32 for 000000, expected the proportions of 64×40"));
+}
+
+TEST_F(PrepareTest, WhatLiesInItsOwnFoldersIsNotTakenForInput) {
+  PrepareOptions first = options();
+  first.masks = write_masks(64, 40);
+  first.until = Step::masks;
+  ASSERT_TRUE(prepare(first));
+  PrepareOptions second = options();
+  second.masks = work_folder(capture()) / "masks";
+  EXPECT_THAT(refusal(second), HasSubstr("found a folder that this preparation writes itself"));
+  EXPECT_TRUE(fs::exists(work_folder(capture()) / "masks/000000.png"));
+  const fs::path frames = work_folder(capture()) / "frames";
+  EXPECT_THAT(refusal_of([&] { prepare(frames, capture(), options()); }),
+              HasSubstr("capture.prepare/frames"));
+  EXPECT_TRUE(fs::exists(frames / "000000.png"));
+}
+
+TEST_F(PrepareTest, TheSecondCamerasPicturesTestAndNoneOfThemTrains) {
+  PrepareOptions two = options();
+  two.test_video = folder_ / "second.mp4";
+  SynthOptions same;
+  same.frames = frames;
+  same.width = 64;
+  same.height = 40;
+  same.samples = 1;
+  same.test_every = frames;
+  write_film(same, two.test_video);
+  two.test_offset = 1;  // its picture of frame 2 was taken when the first camera took frame 4
+  std::ofstream images(folder_ / "model/images.txt"), cameras(folder_ / "model/cameras.txt", std::ios::app);
+  images << std::setprecision(17);
+  cameras << "2 PINHOLE 64 40 70 70 32 20\n";
+  int id = 0;
+  for (const SynthView& view : views_) {
+    const glm::dquat q = glm::quat_cast(view.camera.camera_from_world);
+    const Vec3<double> t = -(view.camera.camera_from_world * view.camera.position);
+    for (const int camera : {1, 2}) {
+      images << ++id << " " << q.w << " " << q.x << " " << q.y << " " << q.z << " " << t.x << " " << t.y
+             << " " << t.z + camera << " " << camera << " "
+             << fmt::format("{:06}_{}.png", view.frame, camera == 1 ? "left" : "right") << "\n\n";
+    }
+  }
+  images.close();
+  cameras.close();
+  ASSERT_TRUE(prepare(two));
+  EXPECT_THAT(calls(),
+              ElementsAre("ffmpeg pgm", "ffmpeg pgm", "ffmpeg ppm", "ffmpeg ppm", "colmap feature_extractor",
+                          "colmap feature_extractor", "colmap exhaustive_matcher", "colmap mapper"));
+  EXPECT_THAT(lines_[0], HasSubstr("14 of 28 pictures"));
+  const Capture made = load_capture(capture(), {});
+  ASSERT_EQ(made.train.size(), 14U);
+  for (const View& view : made.train) EXPECT_THAT(view.id, testing::EndsWith("_left"));
+  std::vector<std::string> tests;
+  for (const View& view : made.test) {
+    tests.push_back(view.id);
+    EXPECT_NEAR(view.camera.focal_x, 70, 1e-4);
+    EXPECT_NEAR(view.time, std::stof(view.id) / (frames - 1), 1e-6);
+  }
+  EXPECT_THAT(tests, ElementsAre("000002_right", "000006_right", "000010_right"));
+  // The film's sharp picture of frame 4 is the second in its row of pairs.
+  const JsonFile list(work_folder(capture()) / "frames.list.json");
+  std::vector<int64_t> indices;
+  for (const JsonField& frame : list["frames"].elements()) {
+    if (frame["camera"].whole(0, 1) == 1) indices.push_back(frame["index"].whole(0, 100));
+  }
+  EXPECT_THAT(indices, ElementsAre(1, 9, 17));
+}
+
+TEST_F(PrepareTest, AFolderIsNoSecondCamera) {
+  PrepareOptions two = options();
+  two.test_video = write_masks(64, 40);
+  EXPECT_THAT(refusal(two), HasSubstr("found pictures without times, expected a film for --test-video"));
+}
+
+TEST_F(PrepareTest, ALowerShareGoesOnWithTheModelThatWasFound) {
+  const fs::path list = folder_ / "model/images.txt";
+  const std::string all = bytes_of(list);
+  size_t end = 0;
+  for (int line = 0; line < 2 * 11; ++line) end = all.find('\n', end) + 1;
+  write_bytes(list, all.substr(0, end));
+  PrepareOptions strict = options();
+  strict.least_registered = 0.9;
+  EXPECT_THAT(refusal(strict), testing::AllOf(HasSubstr("11 of 14 frames registered"), HasSubstr("90%")));
+  EXPECT_FALSE(fs::exists(capture()));
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_THAT(calls(), IsEmpty());
+  EXPECT_EQ(load_capture(capture(), {}).train.size(), 8U);
+}
+
+TEST_F(PrepareTest, ANameThatIsNotUtf8IsANameLikeOthers) {
+  const std::string odd = folder_ / "caf\xe9.mp4";
+  for (const char* ending : {"", ".ppm", ".pgm", ".times"}) fs::copy(film() + ending, odd + ending);
+  ASSERT_TRUE(prepare(odd, capture(), options()));
+  ASSERT_TRUE(prepare(fs::path(odd).parent_path() / "." / fs::path(odd).filename(), capture(), options()));
+  EXPECT_THAT(calls(), IsEmpty());
+}
+
+TEST_F(PrepareTest, ALinkToTheCapturesFolderStaysOne) {
+  fs::create_directory(folder_ / "disk");
+  fs::create_directory_symlink(folder_ / "disk", folder_ / "link");
+  ASSERT_TRUE(prepare(film(), folder_ / "link", options()));
+  EXPECT_TRUE(fs::is_symlink(folder_ / "link"));
+  EXPECT_TRUE(fs::exists(folder_ / "disk/dataset.json"));
+  EXPECT_TRUE(fs::exists(folder_ / "disk.prepare/frames"));
+}
+
+TEST_F(PrepareTest, TheFolderThatOneIsInIsNotReplaced) {
+  const fs::path before = fs::current_path();
+  fs::create_directory(capture());
+  fs::current_path(capture());
+  const std::string found = refusal_of([&] { prepare(film(), ".", options()); });
+  fs::current_path(before);
+  EXPECT_THAT(found, HasSubstr("output folder: found the folder that you are in"));
+  EXPECT_THAT(calls(), IsEmpty());
 }
 
 TEST_F(PrepareTest, AbsentProgramsAreNamed) {

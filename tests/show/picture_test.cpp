@@ -93,6 +93,17 @@ TEST(Shrink, AveragesBlocks) {
   EXPECT_EQ(shrink(image, 9).shape(), image.shape());
 }
 
+TEST(Shrink, FitsIntoTheHeightToo) {
+  Tensor<uint8_t> tall(Shape{32768, 1, 3}), image(Shape{60, 40, 3});
+  tall(0, 0, 1) = 200;
+  for (const auto& [height, width] : {std::pair{30, 20}, {60, 10}, {15, 40}}) {
+    const Shape fitted = shrink(image, width, height).shape();
+    EXPECT_EQ(fitted, (Shape{std::min(height, 60 * width / 40), std::min(width, 40 * height / 60), 3}));
+  }
+  EXPECT_EQ(shrink(tall, 20, 64).shape(), (Shape{64, 1, 3}));
+  EXPECT_EQ(shrink(tall, 20, 32768).shape(), tall.shape());
+}
+
 TEST(ContactSheet, HasNinePicturesARow) {
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / ("traceflow-sheet-" + std::to_string(::getpid()) + ".png");

@@ -1,13 +1,16 @@
 #include "train/event_log.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <tuple>
 
 #include "base/error.h"
+#include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -28,6 +31,26 @@ events::Step step(int64_t iteration, int64_t iterations) {
   e.iterations = iterations;
   return e;
 }
+
+// While one stands, no file grows beyond so many bytes: what is written ends there, as on a full disk.
+class SmallDisk {
+ public:
+  explicit SmallDisk(uintmax_t bytes) : signal_(std::signal(SIGXFSZ, SIG_IGN)) {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~SmallDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, signal_);
+  }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*signal_)(int);
+};
 
 TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   events::Step full = step(7, 10);
@@ -132,9 +155,46 @@ TEST(EventLog, TextThatIsNotUtf8StillMakesALine) {
   EXPECT_NO_THROW(std::ignore = json::parse(to_json_line(events::Warning{0, "\xFF"})));
 }
 
-TEST(EventLog, ADiskThatIsFullLosesLinesAndNothingElse) {
-  EventLog log("/dev/full");
-  EXPECT_NO_THROW(log(step(1, 9)));
+TEST(EventLog, ADiskThatIsFullLosesWholeLinesWhichAreCountedWhenThereIsRoom) {
+  const TempFolder folder;
+  const auto path = folder / "log.jsonl";
+  EventLog log(path);
+  log(step(1, 9));
+  const std::string first = bytes_of(path);
+  for (const uintmax_t room : {0, 1, 10}) {
+    SCOPED_TRACE(room);
+    const SmallDisk disk(first.size() + room);
+    log(step(2, 9));
+    EXPECT_EQ(bytes_of(path), first);
+  }
+  log(step(3, 9));
+  log(step(4, 9));
+  const std::vector<json> written = lines(path);
+  ASSERT_EQ(written.size(), 4U);
+  EXPECT_EQ(written[1]["event"], "warning");
+  EXPECT_EQ(written[1]["text"], "3 lines of the log could not be written here");
+  EXPECT_EQ(written[2]["iteration"], 3);
+  EXPECT_EQ(written[3]["iteration"], 4);
+}
+
+// Room for the count of what is missing, and for no more.
+TEST(EventLog, ALineLostAfterTheCountIsCountedAgain) {
+  const TempFolder folder;
+  const auto path = folder / "log.jsonl";
+  EventLog log(path);
+  {
+    const SmallDisk disk(0);
+    for (const int i : {1, 2}) log(step(i, 9));
+  }
+  const auto gap = [](const std::string& count) {
+    return to_json_line(events::Warning{0, count + " of the log could not be written here"}) + "\n";
+  };
+  {
+    const SmallDisk disk(gap("2 lines").size());
+    log(step(3, 9));
+  }
+  log(step(4, 9));
+  EXPECT_EQ(bytes_of(path), gap("2 lines") + gap("1 line") + to_json_line(step(4, 9)) + "\n");
 }
 
 TEST(EventLog, RefusesAPlaceThatCannotBeWritten) {

@@ -59,6 +59,50 @@ TEST(TrainingFaults, ASaveThatTheDiskRefusesIsAWarningAndTriedAgain) {
   EXPECT_EQ(scene_bytes(trainer.scene()), whole_bytes(options));
 }
 
+// A folder of which nothing can be said, not even what is in it: a connection that dropped.
+TEST(TrainingFaults, AFolderThatIsAwayForOneSaveCostsThatSave) {
+  TrainOptions options = small_run(20);
+  options.save_every = 5;
+  const fs::path run = new_run("dropped"), away = new_run("away");
+  Trainer trainer(options, load_capture(capture_folder(), options.capture), run);
+  std::vector<int64_t> refused;
+  trainer.stream().listen([&](const events::Event& event) {
+    const auto* warning = std::get_if<events::Warning>(&event);
+    if (warning != nullptr && warning->text.find("not saved") != std::string::npos)
+      refused.push_back(warning->iteration);
+  });
+  after(trainer, 9, [&] {
+    fs::rename(run, away);
+    fs::create_directory_symlink(run, run);
+  });
+  after(trainer, 12, [&] {
+    fs::remove(run);
+    fs::rename(away, run);
+  });
+  EXPECT_EQ(trainer.run(never).ending, events::Ending::completed);
+  EXPECT_EQ(refused, std::vector<int64_t>{10});
+  EXPECT_EQ(scene_bytes(trainer.scene()), whole_bytes(options));
+}
+
+TEST(TrainingFaults, AWorkingDirectoryThatIsGoneIsNotMissed) {
+  TrainOptions options = small_run(12);
+  const fs::path here = fs::current_path(), base = new_run("left_behind");
+  fs::create_directories(base / "work");
+  fs::copy(capture_folder(), base / "capture", fs::copy_options::recursive);
+  fs::current_path(base / "work");
+  const fs::path capture = fs::path("..") / "capture";
+  Trainer trainer(options, load_capture(capture, options.capture), fs::path("..") / "run");
+  after(trainer, 8, [&] { fs::remove(base / "work"); });  // when every photograph is in the cache
+  const events::Finished end = trainer.run(never);
+  fs::current_path(here);
+  EXPECT_EQ(end.ending, events::Ending::completed);
+  std::string note;
+  const Safetensors saved = read_checkpoint(RunFolder{base / "run"}, note);
+  EXPECT_EQ(saved.number("iteration"), 12);
+  EXPECT_EQ(fs::path(saved.text("capture_folder")), fs::canonical(base / "capture"));
+  fs::remove_all(base);
+}
+
 TEST(TrainingFaults, TheLastSaveRefusedIsAnErrorAndTheOneBeforeStands) {
   TrainOptions options = small_run(8);
   options.save_every = 5;
@@ -90,6 +134,36 @@ TEST(TrainingFaults, ACaptureThatVanishesEndsInTheStateBeforeThatIteration) {
   EXPECT_EQ(resumed.run(never).ending, events::Ending::completed);
   EXPECT_EQ(scene_bytes(resumed.scene()), whole_bytes(options));
   fs::remove_all(fleeting);
+}
+
+// However often somebody saves a run whose PSNR falls, the state from before stays.
+TEST(TrainingFaults, ACollapseDoesNotPushTheLastSoundStateOut) {
+  TrainOptions options = small_run(20);
+  options.collapse_decibels = 10;
+  const RunFolder run{new_run("collapsing")};
+  const auto stopped_at = [&](int iteration) {
+    Trainer trainer(options, load_capture(capture_folder(), options.capture), run.folder);
+    if (run.holds_a_run()) trainer.resume();
+    std::atomic<bool> stop{false};
+    after(trainer, iteration - 2, [&] { trainer.save(); });
+    after(trainer, iteration - 1, [&] { trainer.save(); });
+    after(trainer, iteration, [&] { stop = true; });
+    trainer.run(stop);
+    EXPECT_EQ(Safetensors::read(run.checkpoint()).number("iteration"), iteration);
+  };
+  stopped_at(6);
+  // A mean PSNR far above what this run has: sound for the moment.
+  Safetensors file = Safetensors::read(run.checkpoint());
+  Tensor<double> health(Shape{3});
+  health[0] = 35.01;
+  health[1] = 40;
+  health[2] = 400;
+  file.add("health", health);
+  file.write(run.checkpoint());
+  stopped_at(9);
+  EXPECT_EQ(Safetensors::read(run.previous_checkpoint()).number("iteration"), 6);
+  stopped_at(12);
+  EXPECT_EQ(Safetensors::read(run.previous_checkpoint()).number("iteration"), 6);
 }
 
 // Checkpoints of version 1 had no checksums and are else the same.

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <streambuf>
 
 #include "support/temp_folder.h"
 #include "train/event_log.h"
@@ -90,8 +92,14 @@ TEST(LogHistory, DamagedLinesAreLeftOut) {
     EXPECT_EQ(told(read(step_line(1) + text + "\n" + step_line(2))), "step 1, step 2") << text.substr(0, 40);
   // Deep inside of an event: the event stays, without it.
   const std::string deep =
-      R"({"event":"x","iteration":3,"a":)" + std::string(50'000, '[') + std::string(50'000, ']') + "}";
-  for (const LoggedEvent& e : read(deep)) EXPECT_LT(e.line.size(), 200U);
+      R"({"event":"x","iteration":3,"a":)" + std::string(2000, '[') + std::string(2000, ']') + "}";
+  const auto events = read(deep);
+  EXPECT_EQ(told(events), "x 3");
+  for (const LoggedEvent& e : events) EXPECT_LT(e.line.size(), 200U);
+  // More than an event holds.
+  std::string full = R"({"event":"x","iteration":3,"a":[0)";
+  for (int i = 0; i < 5000; ++i) full += ",0";
+  EXPECT_EQ(told(read(full + "]}")), "");
 }
 
 // Wherever a log is cut, what is read is a beginning of the whole.
@@ -186,11 +194,58 @@ TEST(LogHistory, PhasesOfOddEventsAreNoError) {
   }
 }
 
+// A text, as often as wanted, of which nothing is kept.
+class Repeated : public std::streambuf {
+ public:
+  Repeated(std::string text, int64_t times) : text_(std::move(text)), left_(times) {}
+  int64_t taken() const { return taken_; }
+
+ protected:
+  int_type underflow() override {
+    if (left_-- <= 0) return traits_type::eof();
+    taken_ += static_cast<int64_t>(text_.size());
+    setg(text_.data(), text_.data(), text_.data() + text_.size());
+    return traits_type::to_int_type(text_[0]);
+  }
+
+ private:
+  std::string text_;
+  int64_t left_, taken_ = 0;
+};
+
+TEST(LogHistory, ALineThatIsTooLongIsPassedOver) {
+  for (const int64_t length : {int64_t{1} << 20, (int64_t{1} << 20) + 1, int64_t{3} << 20}) {
+    const std::string line(static_cast<size_t>(length), ' ');
+    EXPECT_EQ(told(read(step_line(1) + line + "\n" + step_line(2))), "step 1, step 2") << length;
+  }
+}
+
+// A run's folder may come from anywhere.
+TEST(LogHistory, ALogWithoutEndIsReadToALimit) {
+  constexpr int64_t limit = int64_t{256} << 20;
+  Repeated zeros(std::string(size_t{1} << 20, '\0'), 100'000);
+  std::istream endless(&zeros);
+  EXPECT_TRUE(read_log(endless).empty());
+  EXPECT_LE(zeros.taken(), 2 * limit);
+
+  Repeated events(std::string(1000, ' ') + R"({"event":"x","iteration":1})" + "\n", 1'000'000);
+  std::istream many(&events);
+  EXPECT_EQ(read_log(many).size(), 200'000U);
+}
+
 TEST(LogHistory, AFileThatIsNotThereHoldsNothing) {
   const TempFolder folder;
   EXPECT_TRUE(read_log(folder / "log.jsonl").empty());
   std::ofstream(folder / "log.jsonl") << step_line(3);
   EXPECT_EQ(told(read_log(folder / "log.jsonl")), "step 3");
+}
+
+// Nobody writes to the pipe: whoever opens it waits.
+TEST(LogHistory, WhatIsNoFileHoldsNothing) {
+  const TempFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "log.jsonl").c_str(), 0600), 0);
+  EXPECT_TRUE(read_log(folder / "log.jsonl").empty());
+  EXPECT_TRUE(read_log(folder.path()).empty());
 }
 
 }  // namespace

@@ -110,6 +110,26 @@ TEST(LogTail, DamagedLinesAreLeftOut) {
   EXPECT_EQ(log.next(), "step 2");
 }
 
+TEST(LogTail, ALineThatIsTooLongIsPassedOver) {
+  Followed log;
+  log.write(loss_line(1) + std::string(size_t{2} << 20, '['));
+  EXPECT_EQ(log.next(), "new step 1");
+  log.write(std::string(size_t{1} << 20, '[') + "\n" + loss_line(2));
+  EXPECT_EQ(log.next(), "step 2");
+  log.write(loss_line(3));
+  EXPECT_EQ(log.next(), "step 3");
+}
+
+// A hole: it takes no room on the disk.
+TEST(LogTail, ALogWithoutEndIsReadToALimit) {
+  Followed log;
+  log.write(loss_line(1));
+  std::filesystem::resize_file(log.path, uintmax_t{100} << 30);
+  EXPECT_EQ(log.next(), "new step 1");
+  log.write("\n" + loss_line(2));
+  EXPECT_EQ(log.next(), "");
+}
+
 // In whatever pieces a log is written and read, at its end as much is known as of the whole file.
 RC_GTEST_PROP(LogTail, knows_what_read_log_knows, ()) {
   std::string text = start_line(0);

@@ -1,17 +1,25 @@
 #include "train/trainer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <functional>
+#include <map>
 #include <thread>
 
+#include "base/machine.h"
 #include "base/parallel.h"
 #include "support/narrow_lpips.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 #include "train/small_run.h"
 
 namespace traceflow {
 namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 TEST(Trainer, LearnsTheCapture) {
   TrainOptions options = small_run(300);
@@ -180,11 +188,99 @@ TEST(Trainer, ResumingWithAnotherCaptureIsRefused) {
   TrainOptions options = small_run(3);
   Trainer trainer = make_trainer(options, "mismatch");
   trainer.run(never);
+  const fs::path run = fs::path(::testing::TempDir()) / ("mismatch_" + std::to_string(::getpid()));
+  const auto refusal_with = [&](const std::function<void(Capture&)>& change) {
+    Capture other = load_capture(capture_folder(), options.capture);
+    change(other);
+    Trainer resumed(options, std::move(other), run);
+    return refusal_of([&] { resumed.resume(); });
+  };
+  EXPECT_EQ(refusal_with([](Capture&) {}), "accepted");
+  EXPECT_THAT(refusal_with([](Capture& c) { c.train.pop_back(); }), HasSubstr(capture_folder().string()));
+  EXPECT_THAT(refusal_with([](Capture& c) { c.train[0].camera.position.x += 0.01F; }),
+              AllOf(HasSubstr("--data: found "), HasSubstr("other names, times or poses")));
+}
+
+// Writes an entry into the metadata of a run's checkpoint.
+void rewrite(const fs::path& run, const std::map<std::string, std::string>& entries) {
+  Safetensors file = Safetensors::read(RunFolder{run}.checkpoint());
+  for (const auto& [key, value] : entries) file.metadata.at(key) = value;
+  file.write(RunFolder{run}.checkpoint());
+}
+
+TEST(Trainer, AResumedRunKeepsItsCapsUnlessItIsGivenABudget) {
+  const auto with_cap = [](int surfels) {
+    TrainOptions options = small_run(20);
+    options.density.max_surfels = surfels;
+    Trainer trainer = make_trainer(options, "capped");
+    trainer.run(never);
+    return scene_bytes(trainer.scene());
+  };
+  const std::string few = with_cap(310), many = with_cap(330);
+  ASSERT_TRUE(few != many);
+  const fs::path run = fs::path(::testing::TempDir()) / ("begun_small_" + std::to_string(::getpid()));
+  for (const bool budget : {false, true}) {
+    TrainOptions options = small_run(20);
+    Trainer first = make_trainer(options, "begun_small");
+    std::atomic<bool> stop{false};
+    first.stream().listen([&](const events::Event& event) {
+      const auto* step = std::get_if<events::Step>(&event);
+      stop = step != nullptr && step->iteration == 1;
+    });
+    first.run(stop);
+    rewrite(run, {{"cap_main", "310"}});  // as where less memory was free
+    if (budget) options.memory_budget = 1 << 20;
+    for (const int pause : {6, 20}) {
+      Trainer resumed(options, load_capture(capture_folder(), options.capture), run);
+      resumed.resume();
+      resumed.stream().listen([&](const events::Event& event) {
+        const auto* step = std::get_if<events::Step>(&event);
+        stop = step != nullptr && step->iteration == pause;
+      });
+      stop = false;
+      resumed.run(stop);
+      if (pause == 20) {
+        EXPECT_TRUE(scene_bytes(resumed.scene()) == (budget ? many : few));
+      }
+    }
+  }
+}
+
+TEST(Trainer, ResumingSaysWhatMakesTheEndAnother) {
+  TrainOptions options = small_run(6);
+  options.density.max_surfels = 2'000'000'000;
+  make_trainer(options, "told").run(never);
+  const fs::path run = fs::path(::testing::TempDir()) / ("told_" + std::to_string(::getpid()));
+  const auto said = [&] {
+    Trainer resumed(options, load_capture(capture_folder(), options.capture), run);
+    std::string text;
+    resumed.stream().listen([&](const events::Event& event) {
+      if (const auto* warning = std::get_if<events::Warning>(&event)) text += warning->text + "\n";
+    });
+    resumed.resume();
+    return text;
+  };
+  EXPECT_EQ(said(), "");
+  rewrite(run, {{"arithmetic", "the CPU with pencils"}});
+  EXPECT_THAT(said(), AllOf(HasSubstr("the CPU with pencils and goes on on the CPU with "),
+                            HasSubstr("other bytes")));
+  // More than any machine has.
+  rewrite(run, {{"cap_main", "2000000000"}});
+  EXPECT_THAT(said(), AllOf(HasSubstr(" MiB, as when it began"), HasSubstr("--memory-budget")));
+}
+
+TEST(Trainer, ARefusedResumeLeavesADamagedCheckpointWhereItIs) {
+  TrainOptions options = small_run(6);
+  options.save_every = 3;
+  make_trainer(options, "untouched").run(never);
+  const RunFolder run{fs::path(::testing::TempDir()) / ("untouched_" + std::to_string(::getpid()))};
+  std::ofstream(run.checkpoint(), std::ios::trunc) << "damaged";
   Capture other = load_capture(capture_folder(), options.capture);
   other.train.pop_back();
-  const fs::path run = fs::path(::testing::TempDir()) / ("mismatch_" + std::to_string(::getpid()));
-  Trainer resumed(options, std::move(other), run);
-  EXPECT_THROW(resumed.resume(), InputError);
+  EXPECT_THROW(Trainer(options, std::move(other), run.folder).resume(), InputError);
+  EXPECT_EQ(bytes_of(run.checkpoint()), "damaged");
+  Trainer(options, load_capture(capture_folder(), options.capture), run.folder).resume();
+  EXPECT_EQ(bytes_of(run.damaged_checkpoint()), "damaged");
 }
 
 TEST(Trainer, BondsThatDoNotFitTheSurfelsAreRefused) {
@@ -248,6 +344,17 @@ TEST(Trainer, ThePerceptualTermIsToldFromWhereItStarts) {
   EXPECT_EQ(told, (std::vector<int64_t>{10, 11, 12}));
 }
 
+TEST(Trainer, ACheckpointNamesTheWeightsByTheirWholePath) {
+  const TempFolder folder;
+  testing::lpips_file(testing::narrow_lpips_weights(2)).write(folder / "weights");
+  TrainOptions options = small_run(2);
+  options.loss.lpips = 0.1F;
+  options.loss.lpips_weights = fs::relative(folder / "weights").string();
+  Trainer trainer = make_trainer(options, "weights");
+  EXPECT_EQ(fs::canonical(trainer.options().loss.lpips_weights), fs::canonical(folder / "weights"));
+  EXPECT_TRUE(fs::path(trainer.options().loss.lpips_weights).is_absolute());
+}
+
 TEST(Memory, TheLargestViewOfEitherSplitCounts) {
   Capture capture;
   const auto add = [](std::vector<View>& split, int width, int height) {
@@ -264,6 +371,13 @@ TEST(Memory, TheLargestViewOfEitherSplitCounts) {
   const TrainOptions options = preset("paper");
   EXPECT_GT(unlimited_forecast({options, Device::cpu, 3000}),
             unlimited_forecast({options, Device::cpu, 1200}));
+}
+
+// What the page cache holds is given back when it is wanted.
+TEST(Memory, TheAutomaticBudgetIsOfWhatTheMachineCanGive) {
+  const auto available = static_cast<double>(memory_available());
+  EXPECT_NEAR(static_cast<double>(memory_budget_bytes(preset("paper"), Device::cpu)), 0.75 * available,
+              0.02 * available);
 }
 
 TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {

@@ -51,6 +51,7 @@ void check_angles(const std::vector<ViewFacts>& facts, Findings& findings) {
     finding.threshold = wide_angle;
     return;
   }
+  if (angles.size() < fewest_views) return;
   const double limit = usual + std::max(odd_angle, odd_deviations * robust_deviation(angles));
   std::vector<std::string> odd;
   double worst = 0;

@@ -12,7 +12,8 @@ namespace traceflow {
 namespace {
 
 constexpr size_t fewest_times = 5;
-constexpr double gap_steps = 5;  // in median steps between training times
+constexpr double gap_steps = 5;    // in median steps between training times
+constexpr double rounding = 1e-3;  // of steps between times in single precision, as a share
 // Where more views than this share a time with another, there are several cameras that nobody told apart.
 constexpr double repeated_share = 0.5;
 
@@ -31,7 +32,7 @@ void check_gaps(const Capture& capture, Findings& findings) {
   std::vector<std::string> ends;
   size_t worst = 0, gaps = 0;
   for (size_t i = 0; i < steps.size(); ++i) {
-    if (steps[i] <= gap_steps * usual) continue;
+    if (steps[i] <= (1 + rounding) * gap_steps * usual) continue;
     ends.insert(ends.end(), {views[i]->id, views[i + 1]->id});
     if (gaps++ == 0 || steps[i] > steps[worst]) worst = i;
   }

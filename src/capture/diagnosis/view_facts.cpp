@@ -46,8 +46,7 @@ void measure_colour(const ViewSource& source, ViewFacts& facts) {
   int64_t sum = 0;
   for (const uint8_t v : colour.values()) sum += v;
   facts.mean_colour = static_cast<double>(sum) / 255 / static_cast<double>(colour.size());
-  facts.is_uniform =
-      std::all_of(colour.data(), colour.data() + colour.size(), [&](uint8_t v) { return v == colour[0]; });
+  facts.is_uniform = std::equal(colour.data() + 3, colour.data() + colour.size(), colour.data());
   const Tensor<uint8_t> grey = grey_of(colour);
   facts.exposure = exposure_of(grey);
   const double contrast = variance(grey);

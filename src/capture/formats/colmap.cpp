@@ -24,8 +24,9 @@ std::string model_folder(const FileTree& tree) {
                    "cameras and images (.bin or .txt) in sparse/0, sparse or the folder itself");
 }
 
-std::string in_folder(const std::string& folder, const std::string& name) {
-  return folder.empty() ? name : folder + "/" + name;
+// The folder's name at a lower size. What lies at the top has none beside it.
+std::string folder_at(const std::string& folder, int stored) {
+  return stored == 1 || folder.empty() ? folder : folder + "_" + std::to_string(stored);
 }
 
 // Reads step by step into `found_`.
@@ -42,8 +43,9 @@ class ColmapReader {
 
   FoundCapture read() {
     found_.format = "colmap";
+    found_.times = CaptureTimes::names;
     warn_about_models();
-    choose_images();
+    find_images();
     split();
     for (const ColmapPoint& point : model_.points) found_.points.push_back(point.position);
     if (!found_.points.empty()) found_.points_file = model_.points_file;
@@ -67,40 +69,44 @@ class ColmapReader {
     }
   }
 
-  // The folder where some image of the model lies.
-  void choose_images() {
-    const auto has_some = [&](const std::string& folder) {
-      return std::any_of(names_.begin(), names_.end(), [&](const std::string& name) {
-        return !find_image(*tree_, in_folder(folder, name)).empty();
-      });
+  // In the first folder where some image of the model lies at a size that is wanted, or else at any.
+  void find_images() {
+    const auto is_stored_in = [&](const std::string& folder) {
+      return [&, folder](int stored) { return has_some(folder, stored); };
     };
-    const auto root = std::find_if(image_folders.begin(), image_folders.end(), has_some);
+    const auto* root = std::find_if(image_folders.begin(), image_folders.end(), [&](const char* folder) {
+      return fitting_scale(options_.downscale, is_stored_in(folder)) > 0;
+    });
+    if (root == image_folders.end()) {
+      root = std::find_if(image_folders.begin(), image_folders.end(),
+                          [&](const char* folder) { return !stored_scales(is_stored_in(folder)).empty(); });
+    }
     if (root == image_folders.end()) {
       throw InputError(tree_->path().string(), "images",
                        "none of the " + std::to_string(names_.size()) + " photographs that " +
                            model_.images_file + " names",
                        "them in images/", names_.empty() ? "" : "the first is " + names_.front());
     }
-    root_ = *root;
-    const auto first = std::find_if(names_.begin(), names_.end(), [&](const std::string& name) {
-      return !find_image(*tree_, in_folder(root_, name)).empty();
-    });
-    found_.images = choose_stored_images(*tree_, options_.downscale,
-                                         [&](int stored) { return in_folder(folder_at(stored), *first); });
-    found_.images.folder = folder_at(found_.images.stored);
+    found_.images = choose_images(tree_->name_of(*root), options_.downscale, is_stored_in(*root),
+                                  [&](int stored) { return folder_at(*root, stored); });
   }
 
-  std::string folder_at(int stored) const {
-    return stored == 1 || root_.empty() ? root_ : root_ + "_" + std::to_string(stored);
+  bool has_some(const std::string& root, int stored) const {
+    const std::string folder = folder_at(root, stored);
+    if (stored > 1 && (root.empty() || !tree_->has_folder(folder))) return false;
+    return std::any_of(names_.begin(), names_.end(), [&](const std::string& name) {
+      return !find_image(*tree_, in_folder(folder, name)).empty();
+    });
   }
+
   std::string path_of(const std::string& name) const {
     return find_image(*tree_, in_folder(found_.images.folder, name));
   }
 
   void split() {
-    found_.all_ids = image_ids(names_, tree_->name_of(model_.images_file));
-    const std::vector<double> times = times_by_names(names_);
-    found_.says_times = options_.times != CaptureTimes::none;
+    found_.all_ids = image_ids(names_, [&](size_t) { return tree_->name_of(model_.images_file); });
+    for (const std::string& name : names_)
+      found_.listed_images.push_back(without_extension(in_folder(found_.images.folder, name)));
     std::map<std::string, size_t> place;
     for (size_t i = 0; i < names_.size(); ++i) place.emplace(found_.all_ids[i], i);
     const auto exists = [&](const std::string& id) { return !path_of(names_[place.at(id)]).empty(); };
@@ -111,21 +117,20 @@ class ColmapReader {
                                   "missing-image", usual_path);
     for (size_t n = 0; n < whole.size(); ++n) {
       const size_t i = place.at(whole[n]);
-      const double time = options_.times == CaptureTimes::none ? 0 : times[i];
       const bool is_test = tests(n, options_.test_every);
-      (is_test ? found_.test : found_.train).push_back(view_of(model_.images[i], whole[n], time));
+      (is_test ? found_.test : found_.train).push_back(view_of(model_.images[i], whole[n]));
       if (!is_test) found_.train_ids.push_back(whole[n]);
     }
   }
 
-  FoundView view_of(const ColmapImage& image, const std::string& id, double time) const {
+  FoundView view_of(const ColmapImage& image, const std::string& id) const {
     return {id,
             {tree_, path_of(image.name)},
             model_.camera(image.camera_id)->lens,
             tree_->name_of(model_.cameras_file) + ": camera " + std::to_string(image.camera_id),
             image.camera_from_world,
             image.position,
-            time,
+            0,
             std::filesystem::path(image.name).parent_path().generic_string()};
   }
 
@@ -134,7 +139,6 @@ class ColmapReader {
   const std::string folder_;
   ColmapModel model_;
   std::vector<std::string> names_;
-  std::string root_;  // of the photographs at full size
   FoundCapture found_;
 };
 

@@ -101,13 +101,15 @@ Vec3<double> take_vector(Lines& lines, const std::string& field) {
   return {x, y, z};
 }
 
-// Of the triples "x y id" of the line, those with a point's id.
-int64_t count_points(Lines& lines) {
-  int64_t count = 0;
-  for (std::string_view x = lines.word(); !x.empty(); x = lines.word()) {
-    lines.word();
-    const std::string_view id = lines.word();
-    count += !id.empty() && id != "-1" ? 1 : 0;
+// Of the triples "x y id" of the line, those with a point's id. A line of something else is the next image's.
+int64_t count_points(Lines& lines, const std::string& field) {
+  int64_t count = 0, words = 0;
+  for (std::string_view word = lines.word(); !word.empty(); word = lines.word()) {
+    count += ++words % 3 == 0 && word != "-1" ? 1 : 0;
+  }
+  if (words % 3 != 0) {
+    lines.fail(field, std::to_string(words) + " words",
+               "x, y and a point's id of each, in a line that may be empty");
   }
   return count;
 }
@@ -141,7 +143,7 @@ std::vector<ColmapImageRow> read_colmap_images_text(const InputFile& file) {
     row.camera_id = lines.number<uint32_t>(field + ".camera_id");
     row.name = lines.rest();
     // The line after it may be empty, or, in models written by hand, missing at the end.
-    if (lines.next()) row.points_seen = count_points(lines);
+    if (lines.next()) row.points_seen = count_points(lines, field + ".points2D");
   }
   return rows;
 }

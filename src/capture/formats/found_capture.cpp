@@ -24,19 +24,29 @@ std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const s
   return kept;
 }
 
-StoredImages choose_images(const FileTree& tree, int downscale,
-                           const std::function<std::string(int stored)>& folder_of) {
+int fitting_scale(int downscale, const IsStored& is_stored) {
   for (int stored = downscale; stored >= 1; --stored) {
-    if (downscale % stored == 0 && tree.has_folder(folder_of(stored))) {
-      return {folder_of(stored), stored, downscale / stored};
-    }
+    if (downscale % stored == 0 && is_stored(stored)) return stored;
   }
+  return 0;
+}
+
+std::vector<int> stored_scales(const IsStored& is_stored) {
   constexpr int largest = 64;
-  std::string found;
+  std::vector<int> scales;
   for (int stored = 1; stored <= largest; ++stored) {
-    if (tree.has_folder(folder_of(stored))) found += (found.empty() ? "" : ", ") + folder_of(stored);
+    if (is_stored(stored)) scales.push_back(stored);
   }
-  throw InputError(tree.name_of(folder_of(1)), "", found.empty() ? "no images" : found,
+  return scales;
+}
+
+StoredImages choose_images(const std::string& where, int downscale, const IsStored& is_stored,
+                           const StoredFolder& folder_of) {
+  const int stored = fitting_scale(downscale, is_stored);
+  if (stored > 0) return {folder_of(stored), stored, downscale / stored};
+  std::string found;
+  for (const int scale : stored_scales(is_stored)) found += (found.empty() ? "" : ", ") + folder_of(scale);
+  throw InputError(where, "", found.empty() ? "no images" : found,
                    "images at full size or at a divisor of the downscale (" + std::to_string(downscale) + ")",
                    found.empty() ? "" : "use a --downscale that the folder has");
 }

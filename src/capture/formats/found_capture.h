@@ -21,13 +21,13 @@ struct FoundView {
   std::string camera_name;  // of the file and field that say the lens, for errors
   Mat3<double> camera_from_world{1};  // camera axes x right, y down, z forward
   Vec3<double> position{0};
-  double time = 0;         // in any unit, at least 0
+  double time = 0;         // in any unit, from any beginning
   std::string rig_camera;  // which of a rig's cameras took it; empty: not known
 };
 
 // Stored images at 1/stored of the full size, to be filtered by `factor`: stored · factor is the downscale.
 struct StoredImages {
-  std::string folder;
+  std::string folder;  // which may hold one for each camera of a rig
   int stored = 1;
   int factor = 1;
 };
@@ -36,9 +36,13 @@ struct FoundCapture {
   std::string format;
   StoredImages images;
   std::vector<FoundView> train, test;  // whole ones alone
-  bool says_times = true;              // else all are 0, as for a scene that stands still
+  // Where times come from by the format's custom; `automatic`: as the views have them. Of what read_capture
+  // returns: where they came from.
+  CaptureTimes times = CaptureTimes::automatic;
   // As the capture lists them, those left out included: what arrays with one element per view count.
   std::vector<std::string> train_ids, all_ids;
+  // Paths, without extension, of all images that the capture names, those left out included.
+  std::vector<std::string> listed_images;
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;  // scene units; 0: not given
   std::vector<Vec3<double>> points;
@@ -55,9 +59,17 @@ std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const s
                                     std::vector<Finding>& warnings, const std::string& kind,
                                     const std::function<std::string(const std::string& id)>& path_of);
 
-// The folder with the largest stored images that `downscale` is a multiple of. folder_of: the folder's name
-// by the scale that it is stored at. Throws InputError where there is none.
-StoredImages choose_images(const FileTree& tree, int downscale,
-                           const std::function<std::string(int stored)>& folder_of);
+// By the scale that images are stored at.
+using IsStored = std::function<bool(int stored)>;
+using StoredFolder = std::function<std::string(int stored)>;
+
+// The largest scale of stored images that `downscale` is a multiple of; 0 where there is none.
+int fitting_scale(int downscale, const IsStored& is_stored);
+// The scales at which images are stored, whether one wants them or not.
+std::vector<int> stored_scales(const IsStored& is_stored);
+// The images at the fitting scale. Throws InputError naming `where`, and the folders that there are, where
+// there is none.
+StoredImages choose_images(const std::string& where, int downscale, const IsStored& is_stored,
+                           const StoredFolder& folder_of);
 
 }  // namespace traceflow

@@ -1,6 +1,7 @@
 #include "capture/formats/image_names.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 #include <map>
@@ -8,6 +9,7 @@
 
 #include "base/error.h"
 #include "base/printable.h"
+#include "files/image.h"
 
 namespace traceflow {
 
@@ -23,8 +25,18 @@ std::string_view take_number(const std::string& text, size_t& at) {
   return std::string_view(text).substr(begin, at - begin);
 }
 
-std::string without_extension(const std::string& path) {
-  return std::filesystem::path(path).replace_extension().generic_string();
+// What programs call pictures of kinds that are not read. Whoever names such may have converted them.
+bool has_foreign_name(const std::filesystem::path& name) {
+  constexpr std::array<std::string_view, 9> kinds = {".tif", ".tiff", ".bmp", ".webp", ".heic",
+                                                     ".exr", ".dng",  ".ppm", ".jp2"};
+  std::string extension = name.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(kinds.begin(), kinds.end(), extension) != kinds.end();
+}
+
+std::string bare_name(const std::string& path) {
+  return std::filesystem::path(without_extension(path)).filename().string();
 }
 
 // Of all paths, up to and with its last "/".
@@ -64,9 +76,19 @@ std::string tidy_path(std::string path) {
   return std::filesystem::path(path).lexically_normal().generic_string();
 }
 
+std::string in_folder(const std::string& folder, const std::string& name) {
+  return folder.empty() ? name : folder + "/" + name;
+}
+
+std::string without_extension(const std::string& path) {
+  const std::filesystem::path whole(path);
+  if (!has_image_name(whole) && !has_foreign_name(whole)) return path;
+  return std::filesystem::path(whole).replace_extension().generic_string();
+}
+
 std::string find_image(const FileTree& tree, const std::string& path) {
   if (tree.has(path)) return path;
-  for (const std::string& stem : {without_extension(path), path}) {
+  for (const std::string& stem : {path, without_extension(path)}) {
     for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"}) {
       if (tree.has(stem + extension)) return stem + extension;
     }
@@ -74,33 +96,23 @@ std::string find_image(const FileTree& tree, const std::string& path) {
   return "";
 }
 
-StoredImages choose_stored_images(const FileTree& tree, int downscale,
-                                  const std::function<std::string(int stored)>& path_at) {
-  const auto is_there = [&](int scale) {
-    // Images at the top have no folder beside theirs for smaller ones.
-    return downscale % scale == 0 && path_at(scale) != path_at(1) &&
-           !find_image(tree, path_at(scale)).empty();
-  };
-  int stored = downscale;
-  while (stored > 1 && !is_there(stored)) --stored;
-  const std::string folder = std::filesystem::path(path_at(stored)).parent_path().generic_string();
-  return {folder, stored, downscale / stored};
-}
-
-std::vector<std::string> image_ids(const std::vector<std::string>& paths, const std::string& where) {
+std::vector<std::string> image_ids(const std::vector<std::string>& paths,
+                                   const std::function<std::string(size_t i)>& where) {
   const size_t shared = shared_folder(paths);
   std::vector<std::string> ids;
   std::map<std::string, std::string> path_of;
-  for (const std::string& path : paths) {
+  for (size_t i = 0; i < paths.size(); ++i) {
+    const std::string& path = paths[i];
     std::string id = without_extension(path).substr(shared);
     std::replace(id.begin(), id.end(), '/', '_');
     constexpr size_t longest = 200;
     if (id.empty() || id == "." || id == ".." || printable(id, longest) != id) {
-      throw InputError(where, "image names", "\"" + printable(path, 60) + "\"", "names that can name a file");
+      throw InputError(where(i), "image names", "\"" + printable(path, 60) + "\"",
+                       "names that can name a file");
     }
     const auto [other, is_new] = path_of.emplace(id, path);
     if (!is_new) {
-      throw InputError(where, "image names", other->second + " and " + path,
+      throw InputError(where(i), "image names", other->second + " and " + path,
                        "names that differ by more than their extensions");
     }
     ids.push_back(std::move(id));
@@ -108,15 +120,17 @@ std::vector<std::string> image_ids(const std::vector<std::string>& paths, const 
   return ids;
 }
 
-std::vector<double> times_by_names(const std::vector<std::string>& paths) {
+std::vector<double> times_by_names(const std::vector<std::string>& paths,
+                                   const std::vector<std::string>& others) {
   std::set<std::string, decltype(&natural_less)> names(&natural_less);
-  for (const std::string& path : paths) names.insert(std::filesystem::path(path).filename().string());
+  for (const auto* list : {&paths, &others}) {
+    for (const std::string& path : *list) names.insert(bare_name(path));
+  }
   std::map<std::string, double> place;
   for (const std::string& name : names) place.emplace(name, static_cast<double>(place.size()));
   std::vector<double> times(paths.size());
-  std::transform(paths.begin(), paths.end(), times.begin(), [&](const std::string& path) {
-    return place.at(std::filesystem::path(path).filename().string());
-  });
+  std::transform(paths.begin(), paths.end(), times.begin(),
+                 [&](const std::string& path) { return place.at(bare_name(path)); });
   return times;
 }
 

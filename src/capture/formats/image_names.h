@@ -15,22 +15,25 @@ bool natural_less(const std::string& a, const std::string& b);
 // The path with "/" between folders and without "./".
 std::string tidy_path(std::string path);
 
-// The image of this path, or one of the same path but its extension, or with one where it has none; empty
-// where there is neither.
+// The name in a folder; "" is the top.
+std::string in_folder(const std::string& folder, const std::string& name);
+
+// The path without the extension of a picture; "train/f_1.5" has none.
+std::string without_extension(const std::string& path);
+
+// The image of this path, or of this path and an extension, or of the same path but its extension; empty
+// where there is none.
 std::string find_image(const FileTree& tree, const std::string& path);
 
-// The largest scale that `downscale` is a multiple of and at which path_at(scale) is an image; else full
-// size.
-StoredImages choose_stored_images(const FileTree& tree, int downscale,
-                                  const std::function<std::string(int stored)>& path_at);
-
 // For each path, in any order, an id: without the folder that all share and the extension, "/" as "_". Throws
-// InputError naming `where` for paths that make no id, or the same.
-std::vector<std::string> image_ids(const std::vector<std::string>& paths, const std::string& where);
+// InputError for paths that make no id, or the same; where: the file that names the i-th path, for it.
+std::vector<std::string> image_ids(const std::vector<std::string>& paths,
+                                   const std::function<std::string(size_t i)>& where);
 
-// For each path its place among the file names in natural order; the same names in several folders have the
-// same place: cameras side by side.
-std::vector<double> times_by_names(const std::vector<std::string>& paths);
+// For each path its place among the names of all, and of `others`, in natural order and without extensions;
+// the same names in several folders have the same place: cameras side by side.
+std::vector<double> times_by_names(const std::vector<std::string>& paths,
+                                   const std::vector<std::string>& others = {});
 
 // Of views in their order every n-th, from the first on.
 bool tests(size_t i, int test_every);

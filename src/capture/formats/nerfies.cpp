@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "capture/formats/dycheck.h"
+#include "capture/formats/image_names.h"
 #include "capture/formats/nerfies_camera.h"
 #include "capture/formats/nerfies_layout.h"
 #include "files/npy.h"
@@ -11,27 +12,28 @@ namespace traceflow {
 
 namespace {
 
-bool is_wanted_as_dycheck(const FileTree& tree, CaptureFormat format) {
-  return format == CaptureFormat::dycheck || (format == CaptureFormat::automatic && is_dycheck(tree));
-}
+using ReadLayout = NerfiesLayout (*)(const FileTree& tree, std::vector<Finding>& warnings);
 
 std::string camera_path(const std::string& id) { return "camera/" + id + ".json"; }
 
 // Reads step by step into `found`.
 class NerfiesReader {
  public:
-  NerfiesReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
-      : tree_(std::move(tree)),
-        layout_(is_wanted_as_dycheck(*tree_, options.format) ? read_dycheck_layout(*tree_, found_.warnings)
-                                                             : read_nerfies_layout(*tree_, found_.warnings)) {
+  NerfiesReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options, ReadLayout read_layout)
+      : tree_(std::move(tree)), layout_(read_layout(*tree_, found_.warnings)) {
     found_.format = layout_.format;
     found_.normalisation = layout_.normalisation;
     found_.near_plane = layout_.near_plane;
     found_.far_plane = layout_.far_plane;
     found_.train_ids = layout_.train_ids;
     found_.all_ids = layout_.all_ids;
-    found_.images = choose_images(*tree_, options.downscale,
-                                  [](int stored) { return "rgb/" + std::to_string(stored) + "x"; });
+    const auto folder_at = [](int stored) { return "rgb/" + std::to_string(stored) + "x"; };
+    found_.images = choose_images(
+        tree_->name_of(folder_at(1)), options.downscale,
+        [&](int stored) { return tree_->has_folder(folder_at(stored)); }, folder_at);
+    for (const auto* ids : {&layout_.all_ids, &layout_.train_ids, &layout_.test_ids}) {
+      for (const std::string& id : *ids) found_.listed_images.push_back(in_folder(found_.images.folder, id));
+    }
   }
 
   FoundCapture read() {
@@ -103,10 +105,14 @@ class NerfiesReader {
 
 }  // namespace
 
-bool is_nerfies(const FileTree& tree) { return tree.has("dataset.json") || tree.has("metadata.json"); }
+bool is_nerfies(const FileTree& tree) { return tree.has("dataset.json"); }
 
 FoundCapture read_nerfies(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
-  return NerfiesReader(tree, options).read();
+  return NerfiesReader(tree, options, read_nerfies_layout).read();
+}
+
+FoundCapture read_dycheck(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {
+  return NerfiesReader(tree, options, read_dycheck_layout).read();
 }
 
 }  // namespace traceflow

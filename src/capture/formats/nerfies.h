@@ -7,9 +7,11 @@
 namespace traceflow {
 
 // The layout of Nerfies, HyperNeRF and NeRF-DS: dataset.json, metadata.json, scene.json, camera/ID.json and
-// rgb/Kx/ID.png; or DyCheck's, which differs in its splits.
+// rgb/Kx/ID.png.
 bool is_nerfies(const FileTree& tree);
 // Throws InputError.
 FoundCapture read_nerfies(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);
+// DyCheck's, which differs in its splits (capture/formats/dycheck.h). Throws InputError.
+FoundCapture read_dycheck(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);
 
 }  // namespace traceflow

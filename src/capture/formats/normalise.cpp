@@ -48,6 +48,15 @@ Vec3<double> axis_of(const FoundView& view) {
   return transpose(view.camera_from_world) * Vec3<double>(0, 0, 1);
 }
 
+// That gives the box a diagonal of 1. One that is a place but for rounding keeps the capture's units.
+double scale_of(const Box& box) {
+  constexpr double rounding = 1e-9, largest = 1e12;
+  const Vec3<double> reach = glm::max(glm::abs(box.low), glm::abs(box.high));
+  const double diagonal = box.diagonal(), farthest = std::max({reach.x, reach.y, reach.z});
+  if (!(diagonal > rounding * (1 + farthest))) return 1;
+  return std::clamp(1 / diagonal, 1 / largest, largest);
+}
+
 // The point with the least squared distance to all optical axes; none where they run side by side, or where
 // most cameras look away from it.
 std::optional<Vec3<double>> common_sight(const std::vector<FoundView>& views) {
@@ -87,8 +96,7 @@ SceneNormalisation normalise(const std::vector<FoundView>& views, const std::vec
     if (sight) box.take(*sight);
     centre = sight.value_or(box.centre());
   }
-  const double diagonal = box.diagonal();
-  return {centre, diagonal > 0 && std::isfinite(1 / diagonal) ? 1 / diagonal : 1};
+  return {centre, scale_of(box)};
 }
 
 }  // namespace traceflow

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -28,17 +30,37 @@ std::string at_scale(const std::string& path, int stored) {
   return path.substr(0, slash) + "_" + std::to_string(stored) + path.substr(slash);
 }
 
+// Of "images/left/a.png": "images"; "" where it lies at the top.
+std::string top_folder(const std::string& path) {
+  const size_t slash = path.find('/');
+  return slash == std::string::npos ? "" : path.substr(0, slash);
+}
+
+// 1, and N where some folder at the top is called anything_N.
+std::set<int> scales_of(const FileTree& tree) {
+  std::set<int> scales{1};
+  const std::vector<std::string> folders = tree.folders_in("");
+  for (int stored = 2; stored <= 64; ++stored) {
+    const std::string end = "_" + std::to_string(stored);
+    if (std::any_of(folders.begin(), folders.end(), [&](const auto& name) { return name.ends_with(end); }))
+      scales.insert(stored);
+  }
+  return scales;
+}
+
 // Reads step by step into `found_`.
 class TransformsReader {
  public:
   TransformsReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
-      : tree_(std::move(tree)), options_(options) {}
+      : tree_(std::move(tree)), options_(options), scales_(scales_of(*tree_)) {}
 
   FoundCapture read() {
     tree_->has(train_file) ? read_split_files() : read_whole_file();
+    list_other_files();
     settle_paths();
-    choose_images();
-    choose_times();
+    choose_sizes();
+    list_images();
+    read_times();
     make_views();
     read_points();
     std::vector<FoundView> all = found_.train;
@@ -52,38 +74,45 @@ class TransformsReader {
     return found_.warnings.emplace_back(text, kind, severity);
   }
 
+  TransformsFile file_called(const char* name) {
+    files_.insert(name);
+    return read_transforms_file(*tree_, name);
+  }
+
   void read_split_files() {
     found_.background = Background::white;
     found_.format = "nerf-synthetic";
     origin_ = train_file;
-    take(read_transforms_file(*tree_, train_file));
+    take(file_called(train_file));
     is_test_.assign(frames_.size(), false);
     const char* other = tree_->has(test_file) ? test_file : tree_->has(val_file) ? val_file : nullptr;
     if (other == nullptr) {
       warn("transforms_test.json is missing: there is nothing to evaluate on", "no-test", Severity::notice);
       return;
     }
-    take(read_transforms_file(*tree_, other));
+    take(file_called(other));
     is_test_.resize(frames_.size(), true);
   }
 
   void read_whole_file() {
     origin_ = whole_file;
-    TransformsFile file = read_transforms_file(*tree_, whole_file);
+    TransformsFile file = file_called(whole_file);
     found_.format = file.is_nerfstudio ? "nerfstudio" : "instant-ngp";
     std::stable_sort(file.frames.begin(), file.frames.end(),
                      [](const auto& a, const auto& b) { return natural_less(a.path, b.path); });
     const std::set<std::string> train(file.train.begin(), file.train.end()),
         test(file.test.begin(), file.test.end());
     if (!train.empty()) {
-      const size_t all = file.frames.size();
-      std::erase_if(file.frames,
-                    [&](const auto& f) { return !train.contains(f.path) && !test.contains(f.path); });
-      if (file.frames.size() < all) {
-        warn(std::to_string(all - file.frames.size()) +
+      const auto in_no_split = std::stable_partition(
+          file.frames.begin(), file.frames.end(),
+          [&](const auto& f) { return train.contains(f.path) || test.contains(f.path); });
+      for (auto frame = in_no_split; frame != file.frames.end(); ++frame) unused_.push_back(frame->path);
+      if (!unused_.empty()) {
+        warn(std::to_string(unused_.size()) +
                  " frames are in neither train_filenames nor test_filenames: left out",
              "in-no-split");
       }
+      file.frames.erase(in_no_split, file.frames.end());
     }
     take(std::move(file));
     if (train.empty()) return;
@@ -117,75 +146,114 @@ class TransformsReader {
       warn(ids_text(repeated) + " named more than once: used once", "repeated-id").files = repeated;
   }
 
-  // Paths of the machine that wrote the file: their ends may be here.
+  // The frames of files that are not used: their images are not left over.
+  void list_other_files() {
+    for (const char* file : {whole_file, train_file, test_file, val_file}) {
+      if (files_.contains(file) || !tree_->has(file)) continue;
+      const std::vector<std::string> paths = list_frames(*tree_, file);
+      unused_.insert(unused_.end(), paths.begin(), paths.end());
+    }
+  }
+
+  // Whether there is an image of this path at full size or another that is stored.
+  bool is_there(const std::string& path) const {
+    return std::any_of(scales_.begin(), scales_.end(),
+                       [&](int stored) { return !find_image(*tree_, at_scale(path, stored)).empty(); });
+  }
+
+  // The longest end of the path that is an image here. Where there is none, the path itself, or its last part
+  // if it leads out of the capture.
+  std::string end_of_path(const std::string& path) const {
+    constexpr size_t most_parts = 8;
+    std::vector<std::string> ends;
+    for (size_t slash = path.rfind('/'); slash != std::string::npos && ends.size() < most_parts;
+         slash = slash == 0 ? std::string::npos : path.rfind('/', slash - 1))
+      ends.push_back(path.substr(slash + 1));
+    const auto found = std::find_if(ends.rbegin(), ends.rend(), [&](const std::string& end) {
+      return path_in_tree(end) && is_there(end);
+    });
+    if (found != ends.rend()) return *found;
+    return path_in_tree(path) || ends.empty() ? path : ends.front();
+  }
+
+  // Paths of another machine, or from another folder: their ends may be here.
   void settle_paths() {
+    const bool as_written = std::any_of(frames_.begin(), frames_.end(),
+                                        [&](const TransformsFrame& frame) { return is_there(frame.path); });
+    const auto settled = [&](const std::string& path) {
+      return as_written && path_in_tree(path) ? path : end_of_path(path);
+    };
     std::vector<std::string> moved;
     for (TransformsFrame& frame : frames_) {
-      if (path_in_tree(frame.path)) continue;
-      const std::string written = frame.path;
-      for (size_t slash = frame.path.find('/'); slash != std::string::npos; slash = frame.path.find('/')) {
-        frame.path = frame.path.substr(slash + 1);
-        if (path_in_tree(frame.path) && !find_image(*tree_, frame.path).empty()) break;
-      }
-      moved.push_back(written);
+      const std::string written = std::exchange(frame.path, settled(frame.path));
+      if (frame.path != written) moved.push_back(written);
     }
+    std::transform(unused_.begin(), unused_.end(), unused_.begin(), settled);
     if (moved.empty()) return;
-    warn(
-        "the paths of " + ids_text(moved) + " lead out of the capture: their last parts are looked for in it",
-        "path-outside", Severity::notice)
+    warn("the paths of " + ids_text(moved) +
+             " are not in the capture as written: their last parts are looked for in it",
+         "path-outside", Severity::notice)
         .files = moved;
   }
 
-  void choose_images() {
-    const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const TransformsFrame& frame) {
-      return !find_image(*tree_, frame.path).empty();
-    });
+  void choose_sizes() {
+    const auto has_some = [&](int stored) {
+      return scales_.contains(stored) &&
+             std::any_of(frames_.begin(), frames_.end(), [&](const TransformsFrame& frame) {
+               return !find_image(*tree_, at_scale(frame.path, stored)).empty();
+             });
+    };
+    const auto first = std::find_if(frames_.begin(), frames_.end(),
+                                    [&](const TransformsFrame& frame) { return is_there(frame.path); });
     if (first == frames_.end()) {
       throw InputError(tree_->name_of(origin_), "frames",
                        "none of " + std::to_string(frames_.size()) + " images",
                        "files at their file_path, with or without .png or .jpg",
                        frames_.empty() ? "" : "the first is " + frames_.front().path);
     }
-    found_.images = choose_stored_images(*tree_, options_.downscale,
-                                         [&](int stored) { return at_scale(first->path, stored); });
+    const auto folder_at = [&](int stored) { return top_folder(at_scale(first->path, stored)); };
+    found_.images = choose_images(tree_->name_of(folder_at(1)), options_.downscale, has_some, folder_at);
   }
+  std::string stored_path(const std::string& path) const { return at_scale(path, found_.images.stored); }
   std::string image_of(const TransformsFrame& frame) const {
-    return find_image(*tree_, at_scale(frame.path, found_.images.stored));
+    return find_image(*tree_, stored_path(frame.path));
   }
 
-  void choose_times() {
-    std::vector<std::string> paths, without;
+  void list_images() {
+    const auto list = [&](const std::string& path) {
+      found_.listed_images.push_back(without_extension(stored_path(path)));
+    };
+    for (const TransformsFrame& frame : frames_) list(frame.path);
+    for (const std::string& path : unused_) list(path);
+  }
+
+  void read_times() {
+    std::vector<std::string> without;
+    std::optional<double> first;
     for (const TransformsFrame& frame : frames_) {
-      paths.push_back(frame.path);
       if (!frame.time) without.push_back(frame.path);
+      if (frame.time) first = std::min(first.value_or(*frame.time), *frame.time);
     }
-    times_.assign(frames_.size(), 0);
-    const bool timed = without.size() < frames_.size();
-    found_.says_times =
-        options_.times == CaptureTimes::names || (options_.times == CaptureTimes::automatic && timed);
-    if (options_.times == CaptureTimes::names) {
-      times_ = times_by_names(paths);
-    } else if (options_.times == CaptureTimes::automatic && timed) {
-      if (found_.format == "nerf-synthetic") found_.format = "d-nerf";
-      if (!without.empty())
-        warn("frames without a time (" + ids_text(without) + "): taken for the first", "missing-time").files =
-            without;
-      double first = 0;
-      for (const TransformsFrame& frame : frames_) first = std::min(first, frame.time.value_or(0));
-      for (size_t i = 0; i < times_.size(); ++i) times_[i] = frames_[i].time.value_or(first) - first;
+    if (!first) {
+      found_.times = CaptureTimes::none;
+      return;
+    }
+    if (found_.format == "nerf-synthetic") found_.format = "d-nerf";
+    for (TransformsFrame& frame : frames_) frame.time = frame.time.value_or(*first);
+    if (!without.empty() && options_.times == CaptureTimes::automatic) {
+      warn("frames without a time (" + ids_text(without) + "): taken for the first", "missing-time").files =
+          without;
     }
   }
 
   void make_views() {
     std::vector<std::string> paths;
     for (const TransformsFrame& frame : frames_) paths.push_back(frame.path);
-    found_.all_ids = image_ids(paths, tree_->name_of(origin_));
+    found_.all_ids = image_ids(paths, [&](size_t i) { return frames_[i].file; });
     std::map<std::string, size_t> place;
     for (size_t i = 0; i < paths.size(); ++i) place.emplace(found_.all_ids[i], i);
     const auto exists = [&](const std::string& id) { return !image_of(frames_[place.at(id)]).empty(); };
-    const auto usual_path = [&](const std::string& id) {
-      return at_scale(frames_[place.at(id)].path, found_.images.stored);
-    };
+    const auto usual_path = [&](const std::string& id) { return stored_path(frames_[place.at(id)].path); };
     const auto whole =
         keep_whole(found_.all_ids, "listed", "image", exists, found_.warnings, "missing-image", usual_path);
     std::vector<FoundView> views(whole.size());
@@ -208,10 +276,10 @@ class TransformsReader {
     FoundView view{id,
                    {tree_, image_of(frame)},
                    {},
-                   tree_->name_of(origin_) + ": " + frame.path,
+                   frame.file + ": " + frame.path,
                    frame.pose.camera_from_world,
                    frame.pose.position,
-                   times_[i],
+                   frame.time.value_or(0),
                    ""};
     ImageSize size{0, 0, 0};
     if (!frame.lens.width || !frame.lens.height) size = read_image_size(view.image.open());
@@ -236,11 +304,13 @@ class TransformsReader {
 
   const std::shared_ptr<const FileTree> tree_;
   const CaptureOptions options_;
-  std::string origin_;  // the file to name in errors
+  const std::set<int> scales_;  // that folders are called by
+  std::string origin_;          // the file to name in errors
   std::vector<std::shared_ptr<const JsonFile>> documents_;
   std::vector<TransformsFrame> frames_;
-  std::vector<bool> is_test_;  // of frames_; empty where nobody says
-  std::vector<double> times_;
+  std::vector<bool> is_test_;        // of frames_; empty where nobody says
+  std::vector<std::string> unused_;  // paths of frames that make no view
+  std::set<std::string> files_;      // that were read
   std::set<std::string> seen_;
   std::string points_path_;
   FoundCapture found_;

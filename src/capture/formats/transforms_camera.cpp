@@ -40,6 +40,10 @@ bool is_fisheye_model(const JsonField& field) {
 void TransformsLens::take(const JsonField& field) {
   take_positive(field, "w", width);
   take_positive(field, "h", height);
+  // An angle counts more than what the file says for all frames.
+  if (field.has("camera_angle_x") || field.has("camera_angle_y")) {
+    for (auto* inherited : {&focal_x, &focal_y, &angle_x, &angle_y}) inherited->reset();
+  }
   for (const auto& [key, focal] :
        {std::pair{"fl_x", &focal_x}, {"fl_y", &focal_y}, {"fx", &focal_x}, {"fy", &focal_y}})
     take_positive(field, key, *focal);
@@ -83,7 +87,8 @@ Lens TransformsLens::lens(double image_width, double image_height, const JsonFie
     return angle ? std::optional<double>(0.5 * side / std::tan(0.5 * *angle)) : std::nullopt;
   };
   const std::optional<double> x = focal_x ? focal_x : focal_of(angle_x, lens.width);
-  const std::optional<double> y = focal_y ? focal_y : x ? x : focal_of(angle_y, lens.height);
+  const std::optional<double> by_angle = focal_x ? std::nullopt : focal_of(angle_y, lens.height);
+  const std::optional<double> y = focal_y ? focal_y : by_angle ? by_angle : x;
   if (!y) field.fail("no focal length", "fl_x, camera_angle_x or K");
   lens.focal = {x.value_or(*y), *y};
   lens.centre = {centre_x.value_or(lens.width / 2), centre_y.value_or(lens.height / 2)};

@@ -1,5 +1,6 @@
 #include "capture/formats/transforms_file.h"
 
+#include "base/error.h"
 #include "capture/formats/image_names.h"
 
 namespace traceflow {
@@ -13,8 +14,9 @@ std::vector<std::string> paths_of(const JsonField& file, const char* key) {
   return paths;
 }
 
-TransformsFrame read_frame(const JsonField& json, const TransformsLens& common) {
+TransformsFrame read_frame(const std::string& file, const JsonField& json, const TransformsLens& common) {
   TransformsFrame frame;
+  frame.file = file;
   frame.json = std::make_shared<JsonField>(json);
   frame.path = tidy_path(json["file_path"].text());
   frame.lens = common;
@@ -33,7 +35,7 @@ TransformsFile read_transforms_file(const FileTree& tree, const std::string& pat
   TransformsLens common;
   common.take(json);
   for (const JsonField& field : json["frames"].elements()) {
-    file.frames.push_back(read_frame(field, common));
+    file.frames.push_back(read_frame(tree.name_of(path), field, common));
     file.masks += field.has("mask_path") ? 1 : 0;
     file.depths += field.has("depth_file_path") || field.has("depth_path") ? 1 : 0;
   }
@@ -44,6 +46,18 @@ TransformsFile read_transforms_file(const FileTree& tree, const std::string& pat
   file.is_nerfstudio = json.has("camera_model") || json.has("ply_file_path") || !file.train.empty() ||
                        json.has("applied_transform");
   return file;
+}
+
+std::vector<std::string> list_frames(const FileTree& tree, const std::string& path) {
+  try {
+    const JsonFile json(tree.open_file(path));
+    std::vector<std::string> paths;
+    for (const JsonField& field : json["frames"].elements())
+      paths.push_back(tidy_path(field["file_path"].text()));
+    return paths;
+  } catch (const InputError&) {
+    return {};
+  }
 }
 
 }  // namespace traceflow

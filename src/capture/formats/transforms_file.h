@@ -11,7 +11,8 @@
 namespace traceflow {
 
 struct TransformsFrame {
-  std::string path;  // as written, "/" between folders
+  std::string file;  // that it stands in, as errors call it
+  std::string path;  // of its image as written, "/" between folders
   TransformsLens lens;
   TransformsPose pose;
   std::optional<double> time;
@@ -30,5 +31,8 @@ struct TransformsFile {
 
 // Throws InputError naming file, field and value.
 TransformsFile read_transforms_file(const FileTree& tree, const std::string& path);
+
+// The paths of a file's frames, where it is one of this kind; of one that is not, none.
+std::vector<std::string> list_frames(const FileTree& tree, const std::string& path);
 
 }  // namespace traceflow

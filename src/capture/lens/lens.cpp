@@ -190,6 +190,10 @@ Vec2<double> Lens::ideal_from_pixel(const Vec2<double>& pixel) const {
   return undistort({(pixel.x - centre.x - skew * y) / focal.x, y});
 }
 
+bool same_proportions(double width, double height, double other_width, double other_height) {
+  return std::abs(width / other_width / (height / other_height) - 1) <= 0.02;
+}
+
 double pinhole_zoom(const Lens& lens, const std::string& origin) {
   const double zoom = least_zoom(lens, origin);
   const bool keeps_order = everywhere(lens, zoom, false, [&](const Vec2<double>& ideal, const Vec2<double>&) {

@@ -48,6 +48,10 @@ struct Lens {
   Vec2<double> ideal_from_pixel(const Vec2<double>& pixel) const;
 };
 
+// Whether a picture of one size shows the same when it is stretched to the other: their proportions differ by
+// 2 % at most.
+bool same_proportions(double width, double height, double other_width, double other_height);
+
 // The factor ≥ 1 by which the focal length of an ideal pinhole must exceed the lens's, principal point and
 // size the same, so that each of its pixels lies within the photograph; what a fisheye sees beyond that
 // pinhole is lost. Throws InputError naming `origin` when the distortion folds the image over, when more than

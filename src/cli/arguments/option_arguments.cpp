@@ -1,5 +1,7 @@
 #include "cli/arguments/option_arguments.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
@@ -42,8 +44,45 @@ std::string placeholder(const OptionField& field) {
   return "";
 }
 
+// With the value that is taken where none is given.
 std::string help_text(const OptionField& field) {
-  return field.unit.empty() ? field.full_help() : field.full_help() + " In " + field.unit + ".";
+  const std::string value = option_text(field.get());
+  if (value.empty()) return field.full_help();
+  return fmt::format("{} [{}{}{}]", field.full_help(), value, field.unit.empty() ? "" : " ", field.unit);
+}
+
+// Paths that --set alone reaches.
+std::vector<std::string> paths_without_flag(const std::vector<OptionField>& fields,
+                                            const std::vector<std::string>& promoted) {
+  std::vector<std::string> paths;
+  for (const OptionField& field : fields) {
+    if (!has_flag(field, promoted)) paths.push_back(field.path);
+  }
+  return paths;
+}
+
+// More are left to the page of all options.
+constexpr size_t most_listed = 5;
+
+// An assignment that changes nothing, of an option that --set alone reaches where there is one.
+std::string example_of(const std::vector<OptionField>& fields, const std::vector<std::string>& without_flag) {
+  for (const OptionField& field : fields) {
+    const std::string value = option_text(field.get());
+    if (!value.empty() && (without_flag.empty() || field.path == without_flag.front()))
+      return field.path + "=" + value;
+  }
+  return "PATH=VALUE";
+}
+
+std::string help_of_set(const std::vector<OptionField>& fields,
+                        const std::vector<std::string>& without_flag) {
+  std::string what = "Any of these";
+  if (without_flag.size() > most_listed) {
+    what = fmt::format("Any option that `{}` lists", training_options_page);
+  } else if (!without_flag.empty()) {
+    what = fmt::format("Any of these and {}", fmt::join(without_flag, ", "));
+  }
+  return fmt::format("{}, as in {}; may be repeated", what, example_of(fields, without_flag));
 }
 
 }  // namespace
@@ -58,6 +97,7 @@ struct OptionArguments::State {
   std::deque<Flag> flags;  // CLI11 keeps references to its elements
   std::vector<std::string> assignments;
   std::string config;
+  std::string listed_by;  // the command whose output has the names of all options
 };
 
 OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>& fields,
@@ -77,8 +117,10 @@ OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>&
     }
     flag.option->group("Settings");
   }
-  verb.add_option("--set", state_->assignments,
-                  "Any option by its path, as in loss.normal=0; may be repeated")
+  const std::vector<std::string> without_flag = paths_without_flag(fields, promoted);
+  state_->listed_by = without_flag.size() > most_listed ? std::string(training_options_page)
+                                                        : "traceflow " + verb.get_name() + " --help";
+  verb.add_option("--set", state_->assignments, help_of_set(fields, without_flag))
       ->option_text("PATH=VALUE")
       ->expected(1)
       ->take_all()
@@ -89,9 +131,9 @@ OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>&
 }
 
 void OptionArguments::apply(const std::vector<OptionField>& fields) const {
-  if (!state_->config.empty()) options_from_toml(state_->config, fields);
+  if (!state_->config.empty()) options_from_toml(state_->config, fields, state_->listed_by);
   for (const std::string& assignment : state_->assignments)
-    set_option_assignment(fields, assignment, "--set");
+    set_option_assignment(fields, assignment, "--set", state_->listed_by);
   for (const State::Flag& flag : state_->flags) {
     if (flag.option->count() == 0) continue;
     const OptionField& field = find_option(fields, flag.path, "command line");

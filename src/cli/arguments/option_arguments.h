@@ -14,7 +14,7 @@ namespace traceflow::cli {
 
 // An options struct on a verb's command line: a flag for every field that stands in no group or in one of the
 // `promoted` groups (`--save-every N`, `--no-low-pass`), `--set loss.normal=0` for every field, and `--config
-// FILE.toml`.
+// FILE.toml`. The help shows what the fields hold at that time as their defaults.
 //
 //   auto options = std::make_shared<TrainOptions>();
 //   OptionArguments arguments(*verb, option_fields(*options), {"capture"});

@@ -16,7 +16,7 @@ struct OptionColumn {
 // A markdown table: option, a value for each column, unit, help.
 std::string option_table(const std::vector<OptionColumn>& columns);
 
-// docs/options.md: every option that --set and --config take, with its value in every preset.
+// docs/options.md: every option of a training, with its value in every preset.
 std::string option_page();
 
 }  // namespace traceflow::cli

@@ -120,15 +120,15 @@ std::optional<OptionValue> option_value(const toml::node& node) {
 }
 
 void read_table(const toml::table& table, const std::string& prefix, const std::filesystem::path& path,
-                const std::vector<OptionField>& fields) {
+                const std::vector<OptionField>& fields, std::string_view listed_by) {
   for (const auto& [key, node] : table) {
     const std::string name = prefix + std::string(key.str());
     if (const auto* nested = node.as_table()) {
-      read_table(*nested, name + ".", path, fields);
+      read_table(*nested, name + ".", path, fields, listed_by);
       continue;
     }
     const std::string where = place(path, node.source());
-    const OptionField& field = find_option(fields, name, where);
+    const OptionField& field = find_option(fields, name, where, listed_by);
     const auto value = option_value(node);
     if (!value) throw InputError(where, name, kind_of(node), field.expected());
     set_option(field, *value, where);
@@ -137,10 +137,11 @@ void read_table(const toml::table& table, const std::string& prefix, const std::
 
 }  // namespace
 
-void options_from_toml(const std::filesystem::path& path, const std::vector<OptionField>& fields) {
+void options_from_toml(const std::filesystem::path& path, const std::vector<OptionField>& fields,
+                       std::string_view listed_by) {
   const std::string text = read_settings(path);
   try {
-    read_table(toml::parse(text, path.string()), "", path, fields);
+    read_table(toml::parse(text, path.string()), "", path, fields, listed_by);
   } catch (const toml::parse_error& e) {
     throw InputError(place(path, e.source()), "", std::string(e.description()), "TOML");
   }

@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/machine.h"
+#include "base/printable.h"
 #include "capture/image_cache.h"
 #include "capture/prior_axes.h"
 #include "train/memory.h"
@@ -16,7 +17,11 @@ namespace traceflow::cli {
 
 namespace {
 
-void row(const std::string& name, const std::string& text) { fmt::print("{:<16}{}\n", name, text); }
+// Names and paths come from outside.
+void row(const std::string& name, const std::string& text) {
+  constexpr size_t longest = 4096;
+  fmt::print("{:<16}{}\n", name, printable(text, longest));
+}
 
 void row(const std::string& name, const Inspection::Split& split) {
   std::string text = fmt::format("{} views", split.views);

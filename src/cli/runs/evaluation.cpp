@@ -62,8 +62,11 @@ void put_log(const std::filesystem::path& log, eval::ReportPage& page) {
 void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& a) {
   verb.add_option("RUN", a.run, "Folder of the run")->required();
   verb.add_option("--split", a.split, "Views to measure: test or train")
-      ->check(CLI::IsMember({"test", "train"}));
-  verb.add_option("-d,--data", a.capture, "The capture's folder, where it is not where the run found it");
+      ->check(CLI::IsMember({"test", "train"}))
+      ->capture_default_str();
+  verb.add_option("-d,--data", a.capture,
+                  "The capture, a folder or a zip archive, where it is not where the run found it")
+      ->option_text("CAPTURE");
   verb.add_option("--downscale", a.downscale, "Measure at another size than the run was trained at")
       ->check(CLI::Range(1, 64));
   verb.add_option("--lpips", a.lpips, "Weights for LPIPS, as scripts/export_lpips.py writes them")

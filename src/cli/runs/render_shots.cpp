@@ -244,7 +244,9 @@ void add_shot_arguments(CLI::App& verb, ShotArguments& a) {
   verb.add_flag(
       "--compare", a.compare,
       "Put the photograph left of the render: of captured views, or at each time of a frozen camera");
-  verb.add_option("-d,--data", a.capture, "The capture's folder, where it is not where the run found it");
+  verb.add_option("-d,--data", a.capture,
+                  "The capture, a folder or a zip archive, where it is not where the run found it")
+      ->option_text("CAPTURE");
   verb.add_option("--downscale", a.downscale, "Another size of the capture than the run was trained at")
       ->check(CLI::Range(1, 64));
 }

@@ -5,11 +5,11 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 
+#include "base/work.h"
 #include "cli/arguments/option_arguments.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
-#include "prepare/programs.h"
 
 namespace traceflow::cli {
 
@@ -29,7 +29,7 @@ void add_attach_priors(CLI::App& program) {
       prepare::attach_priors(
           a->capture, a->options, [](const std::string& line) { fmt::print(stderr, "{}\n", line); },
           stop_on_signals());
-    } catch (const prepare::Stopped&) {
+    } catch (const Stopped&) {
       fmt::print(stderr, "stopped; the capture is as it was\n");
       throw Exit{exit_interrupted};
     }

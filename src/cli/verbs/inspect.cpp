@@ -53,10 +53,10 @@ void add_inspect(CLI::App& program) {
       ->option_text("FILE");
   verb->add_flag("--quick", arguments->quick, "Decode 32 views of each split and do not compare neighbours");
   verb->add_option("--preset", arguments->preset_name,
-                   "Whose memory is told, with the settings below: as in train")
+                   "Whose memory is told, with the settings below, whose defaults are paper's: as in train")
       ->option_text("NAME")
       ->capture_default_str();
-  const auto defaults = std::make_shared<TrainOptions>();
+  const auto defaults = std::make_shared<TrainOptions>(preset(arguments->preset_name));
   const auto given =
       std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
   verb->callback([arguments, given] { inspect_capture(*arguments, *given); });

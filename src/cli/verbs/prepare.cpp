@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <CLI/CLI.hpp>
 #include <memory>
 
 #include "cli/arguments/option_arguments.h"
+#include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
+#include "prepare/steps.h"
 
 namespace traceflow::cli {
 
@@ -19,12 +22,36 @@ struct PrepareArguments {
   prepare::PrepareOptions options;
 };
 
-void run_prepare(const PrepareArguments& a) {
-  const auto say = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
-  if (!prepare::prepare_capture(a.input, a.capture, a.options, say, stop_on_signals())) {
-    say("stopped; the same command goes on with the step that it was in");
-    throw Exit{exit_interrupted};
+// What each step found, a line for each, and under it the step at work.
+class Watcher {
+ public:
+  void found(const std::string& line) {
+    progress_.finish();
+    fmt::print(stderr, "{}\n", line);
   }
+  void at_work(prepare::Step step, int64_t done, int64_t all) {
+    const auto now = std::chrono::steady_clock::now();
+    // Every count of a step begins anew: its pictures are looked at, then written.
+    if (done == 0 || done < done_) began_ = now;
+    done_ = done;
+    progress_.show({prepare::step_name(step), "", done, all},
+                   std::chrono::duration<double>(now - began_).count());
+  }
+
+ private:
+  CountProgress progress_ = CountProgress::for_stderr();
+  std::chrono::steady_clock::time_point began_;
+  int64_t done_ = 0;
+};
+
+void run_prepare(const PrepareArguments& a) {
+  Watcher watcher;
+  const prepare::Audience audience{
+      [&](const std::string& line) { watcher.found(line); },
+      [&](prepare::Step step, int64_t done, int64_t all) { watcher.at_work(step, done, all); }};
+  if (prepare::prepare_capture(a.input, a.capture, a.options, audience, stop_on_signals())) return;
+  watcher.found("stopped; the same command goes on with the step that it was in");
+  throw Exit{exit_interrupted};
 }
 
 }  // namespace

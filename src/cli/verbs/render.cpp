@@ -8,8 +8,8 @@
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
 #include "cli/runs/render_shots.h"
+#include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
-#include "cli/terminal/frame_progress.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
 #include "files/png.h"
@@ -79,7 +79,7 @@ class Output {
 size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, Output& output) {
   const std::atomic<bool>& stop = stop_on_signals();
   const auto start = std::chrono::steady_clock::now();
-  FrameProgress progress = FrameProgress::for_stderr(static_cast<int64_t>(shots.size()));
+  CountProgress progress = CountProgress::for_stderr();
   Renderer renderer(subject.render);
   size_t done = 0;
   while (done < shots.size() && !stop) {
@@ -88,7 +88,7 @@ size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, 
     request.time = *shots[done].time;
     output.add(done, renderer.forward(subject.scene, request));
     ++done;
-    progress.show(static_cast<int64_t>(done),
+    progress.show({"", "frames", static_cast<int64_t>(done), static_cast<int64_t>(shots.size())},
                   std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
   }
   output.finish();
@@ -141,6 +141,8 @@ void add_render(CLI::App& program) {
   verb->add_option("--video", a->video, "Film of the first layer, by ffmpeg: FILE.mp4");
   const auto defaults = std::make_shared<RenderOptions>();
   const OptionArguments options(*verb, option_fields(*defaults));
+  verb->footer(
+      "The defaults in brackets are those of a .ply that names none. A run has those of its training.");
   const DeviceArguments devices(*verb);
   verb->callback([a, defaults, options, devices] { run_render(*a, options, devices); });
 }

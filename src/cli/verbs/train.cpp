@@ -2,10 +2,10 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 
+#include "base/atomic_file.h"
 #include "base/folder_lock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
@@ -15,8 +15,8 @@
 #include "cli/terminal/progress.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
-#include "files/options_json.h"
 #include "serve/live_view.h"
+#include "train/continuation.h"
 #include "train/event_log.h"
 #include "train/log_history.h"
 #include "train/trainer.h"
@@ -33,27 +33,40 @@ struct TrainArguments {
   bool quiet = false;
   bool view = false;
   serve::ViewOptions view_options;
+  const CLI::Option* preset = nullptr;
+
+  bool names_preset() const { return preset->count() > 0; }
+};
+
+// What a checkpoint says of the run that is resumed.
+struct Checkpoint {
+  TrainOptions options;
+  std::string capture_folder;
 };
 
 // The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
 // either.
 TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given,
-                      const std::map<std::string, std::string>& checkpoint) {
-  TrainOptions options = preset(arguments.preset_name);
-  if (arguments.resume) options_from_json(checkpoint.at("options"), option_fields(options), "checkpoint");
-  given.apply(option_fields(options));
+                      const Checkpoint& checkpoint) {
+  const auto with_given = [&](TrainOptions options) {
+    given.apply(option_fields(options));
+    return options;
+  };
+  const auto of_preset = [&] { return with_given(preset(arguments.preset_name)); };
+  TrainOptions options = arguments.resume ? with_given(checkpoint.options) : of_preset();
   options.validate();
+  if (arguments.resume) refuse_reshaping(checkpoint.options, options);
+  if (arguments.resume && arguments.names_preset())
+    refuse_other_preset(arguments.preset_name, of_preset(), options);
   return options;
 }
 
-// What the checkpoint says beside its tensors; nothing for a run that begins.
-std::map<std::string, std::string> metadata_to_resume(const TrainArguments& arguments) {
-  const RunFolder run{arguments.output};
+// Nothing for a run that begins.
+Checkpoint checkpoint_to_resume(const TrainArguments& arguments) {
   if (!arguments.resume) return {};
   std::string note;
-  const Safetensors checkpoint = read_checkpoint(run, note);
-  for (const char* key : {"options", "capture_folder"}) checkpoint.text(key);
-  return checkpoint.metadata;
+  const Safetensors file = read_checkpoint(RunFolder{arguments.output}, note);
+  return {options_in(file), file.text("capture_folder")};
 }
 
 void refuse_another_run(const TrainArguments& arguments) {
@@ -72,10 +85,11 @@ class HeldFolder {
   void make() {
     if (!lock_) hold();
   }
+  bool keeps_others_out() const { return lock_ && lock_->keeps_others_out(); }
 
  private:
   void hold() {
-    if (!arguments_->resume) std::filesystem::create_directories(arguments_->output);
+    if (!arguments_->resume) make_folder(arguments_->output);
     const RunFolder run{arguments_->output};
     if (arguments_->resume && !run.holds_a_run()) return;  // refused when it is read
     lock_.emplace(run.lock(), run.folder, "training");
@@ -131,11 +145,11 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
            const ServerArguments& where) {
   arguments.view_options.validate();
   HeldFolder folder(arguments);
-  const std::map<std::string, std::string> checkpoint = metadata_to_resume(arguments);
+  const Checkpoint checkpoint = checkpoint_to_resume(arguments);
   const TrainOptions options = settings(arguments, given, checkpoint);
   std::string data = arguments.data;
-  if (data.empty() && arguments.resume) data = checkpoint.at("capture_folder");
-  if (data.empty()) throw InputError("--data", "", "nothing", "a capture's folder");
+  if (data.empty()) data = checkpoint.capture_folder;
+  if (data.empty()) throw InputError("--data", "", "nothing", "a capture: a folder or a zip archive");
 
   Capture capture = load_capture(data, options.capture);
   const Device device = devices.choose(arguments.quiet);
@@ -144,6 +158,11 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   if (!arguments.quiet) trainer.stream().listen(Progress::for_stderr());
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
   trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
+  if (!folder.keeps_others_out()) {
+    trainer.stream().emit(events::Warning{
+        0,
+        arguments.output + " is on a file system without locks: see that no second training writes there"});
+  }
   if (arguments.resume) trainer.resume();
   const std::atomic<bool>& stop = stop_on_signals();
   std::optional<Watched> watched;
@@ -162,16 +181,19 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
 void add_train(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("train", "Reconstruct a scene from a capture.");
   auto arguments = std::make_shared<TrainArguments>();
-  verb->add_option("-d,--data", arguments->data, "The capture's folder")->option_text("FOLDER");
+  verb->add_option("-d,--data", arguments->data, "The capture: a folder or a zip archive")
+      ->option_text("CAPTURE");
   verb->add_option("-o,--output", arguments->output, "The run's folder: checkpoints and log")
       ->required()
       ->option_text("RUN");
-  verb->add_option("--preset", arguments->preset_name,
-                   "paper (60,000 iterations), cpu (a quarter of an hour on two cores at "
-                   "240x135) or demo (minutes)")
-      ->option_text("NAME")
-      ->capture_default_str();
-  verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint");
+  arguments->preset =
+      verb->add_option(
+              "--preset", arguments->preset_name,
+              "paper (60,000 iterations; its values are the defaults below), cpu (a quarter of an hour on "
+              "two cores at 240x135) or demo (minutes)")
+          ->option_text("NAME")
+          ->capture_default_str();
+  verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint, with its settings");
   verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
   CLI::Option* view =
       verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
@@ -182,7 +204,7 @@ void add_train(CLI::App& program) {
       ->capture_default_str();
   const ServerArguments where(*verb, view);
   // The presets differ in values alone, so any of them names the flags.
-  auto defaults = std::make_shared<TrainOptions>();
+  auto defaults = std::make_shared<TrainOptions>(preset(arguments->preset_name));
   auto given =
       std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});
   const DeviceArguments devices(*verb);

@@ -74,7 +74,9 @@ void add_view(CLI::App& program) {
   verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder that export wrote")
       ->required();
   verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
-  verb->add_option("-d,--data", a->capture, "The capture's folder, where it is not where the run found it");
+  verb->add_option("-d,--data", a->capture,
+                   "The capture, a folder or a zip archive, where it is not where the run found it")
+      ->option_text("CAPTURE");
   verb->add_option("--downscale", a->downscale, "Another size of the capture than the run was trained at")
       ->check(CLI::Range(1, 64));
   const ServerArguments where(*verb);

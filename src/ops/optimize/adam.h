@@ -47,7 +47,8 @@ struct LeftAlone {
 
 // parameter −= rate · m̂ / (√v̂ + ε) for all tasks, whose tensors are on one device. Increments their step. A
 // gradient entry that is not finite, or whose square is not, leaves its parameter and moments alone and is
-// noted: left_alone gets one entry a task there, for which nobody waits until it is read.
+// noted: left_alone gets one entry a task there, for which nobody waits until it is read. Where there is no
+// memory for those, nothing has changed.
 void adam_step(std::span<const AdamTask> tasks, const AdamOptions& options, Tensor<LeftAlone>& left_alone);
 // The same for one tensor. Returns how many entries were left alone, for which the host waits.
 int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,

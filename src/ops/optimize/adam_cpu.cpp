@@ -78,6 +78,8 @@ int64_t update_block(const AdamBlock& b) {
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <vector>
 
@@ -91,6 +93,7 @@ HWY_EXPORT(update_block);
 namespace {
 
 constexpr int64_t block_size = 1 << 14;
+static_assert(block_size >= most_rates);
 
 // 1 / (1 − β^step)
 float inverse_correction(float beta, int64_t step) {
@@ -105,6 +108,7 @@ void note(const Tensor<float>& gradient, int64_t count, LeftAlone& left_alone) {
                 LeftAlone::largest_index - static_cast<int32_t>(bad - values.begin())};
 }
 
+// Asks for no memory: whoever finds none has changed no tensor.
 void step_on_host(const AdamTask& task, const AdamOptions& options, LeftAlone& left_alone) {
   Tensor<float>& parameter = *task.parameter;
   const Tensor<float>& gradient = *task.gradient;
@@ -112,11 +116,12 @@ void step_on_host(const AdamTask& task, const AdamOptions& options, LeftAlone& l
   const std::vector<float>& learning_rates = task.learning_rates;
   // Blocks begin at multiples of the row, so that one block's rates serve them all.
   const auto columns = static_cast<int64_t>(learning_rates.size());
-  const int64_t grain = std::max<int64_t>(1, block_size / columns) * columns;
-  std::vector<float> rates(static_cast<size_t>(grain));
-  for (size_t i = 0; i < rates.size(); ++i) rates[i] = learning_rates[i % learning_rates.size()];
+  const int64_t grain = block_size / columns * columns;
+  std::array<float, block_size> rates;
+  for (size_t i = 0; i < static_cast<size_t>(grain); ++i)
+    rates[i] = learning_rates[i % learning_rates.size()];
 
-  std::vector<int64_t> not_finite(static_cast<size_t>((parameter.size() + grain - 1) / grain));
+  std::atomic<int64_t> not_finite{0};
   parallel_blocks("optimize: adam", parameter.size(), grain, [&](int64_t begin, int64_t end) {
     AdamBlock block;
     block.parameter = parameter.data() + begin;
@@ -130,11 +135,9 @@ void step_on_host(const AdamTask& task, const AdamOptions& options, LeftAlone& l
     block.epsilon = options.epsilon;
     block.inverse_correction1 = inverse_correction(options.beta1, state.step);
     block.inverse_correction2 = inverse_correction(options.beta2, state.step);
-    not_finite[static_cast<size_t>(begin / grain)] = HWY_DYNAMIC_DISPATCH(update_block)(block);
+    not_finite += HWY_DYNAMIC_DISPATCH(update_block)(block);
   });
-  int64_t total = 0;
-  for (const int64_t n : not_finite) total += n;
-  note(gradient, total, left_alone);
+  note(gradient, not_finite, left_alone);
 }
 
 void add_to(cuda::AdamTable& table, const AdamTask& task) {

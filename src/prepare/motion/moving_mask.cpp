@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <utility>
 
@@ -135,13 +136,14 @@ Tensor<uint8_t> moving_mask(const Shape& shape, const std::vector<Motion>& motio
 
 std::vector<Tensor<uint8_t>> moving_masks(
     int64_t count, const std::function<Tensor<uint8_t>(int64_t i)>& picture,
-    const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& still, const std::atomic<bool>& stop) {
+    const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& still, const Work& work) {
   std::vector<Tensor<uint8_t>> masks(static_cast<size_t>(count));
   const int64_t step = count > 1 ? choose_step(count, picture) : 1;
+  std::atomic<int64_t> done = 0;
   parallel_for(
       "moving masks", count,
       [&](int64_t i) {
-        if (stop) return;
+        work.check();
         const Pyramid here = make_pyramid(as_float(picture(i)));
         const std::vector<Vec2<double>> corners = find_corners(here, spacing);
         std::vector<Motion> motions;
@@ -150,13 +152,16 @@ std::vector<Tensor<uint8_t>> moving_masks(
           if (j < 0 || j >= count) continue;
           const Pyramid there = make_pyramid(as_float(picture(j)));
           Motion motion{track(here, there, corners), {}};
-          const auto known = still(i, j);
+          auto ground = still(i, j);
           const uint64_t seed = static_cast<uint64_t>(i) * neighbours.size() + n;
-          motion.still = known ? *known : fit_two_view(motion.tracks, stillness, seed);
+          if (!ground) ground = fit_two_view(motion.tracks, stillness, seed);
+          if (!ground) continue;
+          motion.still = *ground;
           look_again(motion, here, there);
           motions.push_back(std::move(motion));
         }
         masks[static_cast<size_t>(i)] = moving_mask({here.height(), here.width()}, motions);
+        work.tell(++done, count);
       },
       1);
   return masks;

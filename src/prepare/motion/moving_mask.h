@@ -1,11 +1,11 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <optional>
 #include <vector>
 
 #include "base/tensor.h"
+#include "base/work.h"
 #include "prepare/motion/motion.h"
 
 // Where something moves by itself, told from motion alone.
@@ -20,10 +20,9 @@ Tensor<uint8_t> moving_mask(const Shape& shape, const std::vector<Motion>& motio
 // The same for every picture (8-bit grey, H×W×1, all of one size, in the order of time) from its motions to
 // the neighbours one and two steps away; a step is as many pictures (up to 8) as it takes for most of the
 // picture to move. `still` says how the still part goes from picture i to picture j, or nothing where that is
-// to be found from the tracks. `picture(i)` is called from several threads. Stops early, with what there is,
-// when `stop` turns true.
+// to be found from the tracks. `picture(i)` is called from several threads. Throws Stopped.
 std::vector<Tensor<uint8_t>> moving_masks(
     int64_t count, const std::function<Tensor<uint8_t>(int64_t i)>& picture,
-    const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& still, const std::atomic<bool>& stop);
+    const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& still, const Work& work);
 
 }  // namespace traceflow::prepare

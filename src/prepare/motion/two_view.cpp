@@ -156,15 +156,15 @@ TwoView fit_fundamental(const std::vector<Track>& tracks) {
   return {Kind::fundamental, normalised(transpose(to) * rank_two(f) * from)};
 }
 
-TwoView fit_two_view(const std::vector<Track>& tracks, double tolerance, uint64_t seed) {
-  constexpr size_t fewest = 12;
-  constexpr double nearly = 0.85;
-  if (tracks.size() < fewest) return {};
+std::optional<TwoView> fit_two_view(const std::vector<Track>& tracks, double tolerance, uint64_t seed) {
+  constexpr double fewest = 12, nearly = 0.85;
+  if (static_cast<double>(tracks.size()) < fewest) return std::nullopt;
   Random random(seed);
   const TwoView plane = sample_consensus(Kind::homography, tracks, tolerance, random);
   const TwoView lines = sample_consensus(Kind::fundamental, tracks, tolerance, random);
   const auto in_plane = static_cast<double>(obeying(plane, tracks, tolerance).size());
   const auto on_lines = static_cast<double>(obeying(lines, tracks, tolerance).size());
+  if (std::max(in_plane, on_lines) < fewest) return std::nullopt;
   return in_plane >= nearly * on_lines ? plane : lines;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "math/types.h"
@@ -23,8 +24,8 @@ struct TwoView {
 
 // What most tracks obey to within `tolerance` pixels, by random sampling and least squares over those that
 // do: the homography where it explains nearly as many as the epipolar lines, which would explain much of what
-// moves as well. Fewer than 12 tracks obey the identity.
-TwoView fit_two_view(const std::vector<Track>& tracks, double tolerance, uint64_t seed);
+// moves as well. Nothing where fewer than 12 tracks obey either, which does not tell.
+std::optional<TwoView> fit_two_view(const std::vector<Track>& tracks, double tolerance, uint64_t seed);
 
 // The epipolar lines between two cameras of known place: x_to^T F x_from = 0 over pixels whose first has its
 // centre at (0, 0). Matrices are of the cameras' pixels from their directions.

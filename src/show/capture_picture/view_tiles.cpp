@@ -17,6 +17,7 @@ namespace {
 constexpr int64_t columns = 6;
 constexpr size_t most_tiles = 24, most_marked = 8;
 constexpr int64_t cell_width = (picture_width - (columns - 1) * picture_gap) / columns;
+constexpr int64_t tallest_cell = 2 * cell_width;
 constexpr int64_t line_height = letter_height + 3;
 constexpr int64_t caption_height = 2 * line_height + 3;
 
@@ -75,18 +76,23 @@ void outline(const Tensor<uint8_t>& mask, Tensor<uint8_t>& picture) {
   }
 }
 
-// The view, cell_width pixels wide or less.
+// In the place of a view that cannot be decoded.
+Tensor<uint8_t> blank(const View& view) {
+  const int64_t height = cell_width * view.camera.height / std::max(1, view.camera.width);
+  Tensor<uint8_t> picture(Shape{std::clamp(height, 2 * line_height, tallest_cell), cell_width, 3});
+  write_text("cannot be read", {8, 8}, alarm_ink, picture);
+  return picture;
+}
+
+// The view, within cell_width × tallest_cell pixels.
 Tensor<uint8_t> thumbnail(const Capture& capture, const View& view) {
   try {
     const auto pixels = load_pixels(capture, view);
-    Tensor<uint8_t> small = shrink(pixels->colour, cell_width);
+    Tensor<uint8_t> small = shrink(pixels->colour, cell_width, tallest_cell);
     if (!pixels->mask.empty()) outline(pixels->mask, small);
     return small;
   } catch (const InputError&) {
-    Tensor<uint8_t> blank(
-        Shape{cell_width * view.camera.height / std::max(1, view.camera.width), cell_width, 3});
-    write_text("cannot be read", {8, 8}, alarm_ink, blank);
-    return blank;
+    return blank(view);
   }
 }
 

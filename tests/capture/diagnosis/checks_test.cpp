@@ -142,6 +142,19 @@ TEST(Diagnosis, finds_gaps_in_time) {
   EXPECT_THAT(found.text, HasSubstr("10 times the usual step"));
 }
 
+// Times are kept in single precision: of 46 steps some five are a little more than five.
+TEST(Diagnosis, says_nothing_of_five_steps_and_what_rounding_adds) {
+  const BrokenCapture capture;
+  capture.edit_json("metadata.json", [](auto& json) {
+    for (auto& [id, entry] : json.items()) {
+      const int frame = entry["time_id"];
+      entry["time_id"] = frame + (frame > 7 ? 4 : 0) + (frame == 39 ? 3 : 0);
+    }
+  });
+  const Inspection found = capture.inspection();
+  EXPECT_TRUE(found.findings.empty()) << all(found);
+}
+
 TEST(Diagnosis, finds_two_views_of_a_camera_at_one_time) {
   const BrokenCapture capture;
   capture.edit_json("metadata.json", [](auto& json) { json["000005_left"]["time_id"] = 4; });
@@ -201,6 +214,11 @@ TEST(Diagnosis, finds_pictures_of_one_colour) {
   capture.edit_image(BrokenCapture::image(9), [](auto& pixels) { pixels.fill(90); });
   const Finding found = only(capture, "one-colour");
   EXPECT_THAT(found.views, ElementsAre("000009_left"));
+  const BrokenCapture green;
+  green.edit_image(BrokenCapture::image(9), [](auto& pixels) {
+    for (int64_t i = 0; i < pixels.size(); ++i) pixels[i] = i % 3 == 1 ? 100 : 80;
+  });
+  EXPECT_THAT(only(green, "one-colour").views, ElementsAre("000009_left"));
 }
 
 TEST(Diagnosis, finds_masks_that_are_empty_full_or_inverted) {
@@ -227,6 +245,15 @@ TEST(Diagnosis, finds_priors_that_are_empty_or_turned) {
   const Finding found = only(turned, "prior-disagrees");
   EXPECT_THAT(found.views, ElementsAre("000010_left"));
   EXPECT_GT(*found.value, 120);
+}
+
+TEST(Diagnosis, does_not_compare_the_priors_of_four_views) {
+  const BrokenCapture capture;
+  for (int frame = 4; frame < 40; ++frame) std::filesystem::remove(capture / BrokenCapture::prior(frame));
+  capture.edit_image(BrokenCapture::prior(2), [](auto& pixels) {
+    for (uint8_t& v : pixels.values()) v = static_cast<uint8_t>(255 - v);
+  });
+  EXPECT_EQ(only(capture, "missing-prior").views.size(), 36U);
 }
 
 TEST(Diagnosis, finds_points_behind_the_cameras_and_far_out) {

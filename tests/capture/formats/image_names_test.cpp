@@ -15,6 +15,8 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
+std::string in_x(size_t) { return "x"; }
+
 TEST(ImageNames, digits_compare_as_numbers) {
   const std::vector<std::string> sorted = {"",
                                            "1",
@@ -49,11 +51,14 @@ TEST(ImageNames, digits_compare_as_numbers) {
 }
 
 TEST(ImageNames, ids_drop_what_all_share_and_the_extension) {
-  EXPECT_THAT(image_ids({"images/a.png", "images/left/b.c.jpg"}, "x"), ElementsAre("a", "left_b.c"));
-  EXPECT_THAT(image_ids({"train/r_0", "test/r_0"}, "x"), ElementsAre("train_r_0", "test_r_0"));
-  EXPECT_THAT(image_ids({"images/10.png", "images/1.png"}, "x"), ElementsAre("10", "1"));
-  EXPECT_THAT(image_ids({"images/a.png"}, "x"), ElementsAre("a"));
-  EXPECT_THAT(image_ids({}, "x"), ElementsAre());
+  EXPECT_THAT(image_ids({"images/a.png", "images/left/b.c.jpg"}, in_x), ElementsAre("a", "left_b.c"));
+  EXPECT_THAT(image_ids({"train/r_0", "test/r_0"}, in_x), ElementsAre("train_r_0", "test_r_0"));
+  EXPECT_THAT(image_ids({"images/10.png", "images/1.png"}, in_x), ElementsAre("10", "1"));
+  EXPECT_THAT(image_ids({"images/a.png"}, in_x), ElementsAre("a"));
+  EXPECT_THAT(image_ids({}, in_x), ElementsAre());
+  // Fractions of seconds are no extensions; those of pictures that somebody converted are.
+  EXPECT_THAT(image_ids({"train/1616.12", "train/1616.34"}, in_x), ElementsAre("1616.12", "1616.34"));
+  EXPECT_THAT(image_ids({"a/1.5.TIF", "a/1.6.png"}, in_x), ElementsAre("1.5", "1.6"));
 }
 
 TEST(ImageNames, ids_that_cannot_name_a_file_or_collide_are_refused) {
@@ -65,11 +70,12 @@ TEST(ImageNames, ids_that_cannot_name_a_file_or_collide_are_refused) {
       {{"", "b"}, "found \"\""}};
   for (const auto& [paths, expected] : cases) {
     try {
-      image_ids(paths, "images.bin");
+      image_ids(paths, [](size_t i) { return "images.bin " + std::to_string(i); });
       if (paths[0] != "a/..") ADD_FAILURE() << expected;
     } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), HasSubstr("images.bin: image names"));
+      EXPECT_THAT(error.what(), HasSubstr(": image names"));
       EXPECT_THAT(error.what(), HasSubstr(expected));
+      EXPECT_EQ(std::string(error.what()).starts_with("images.bin 0"), paths[0] == ".." || paths[0].empty());
     }
   }
 }
@@ -78,29 +84,27 @@ TEST(ImageNames, times_follow_names_and_cameras_side_by_side_share_them) {
   EXPECT_THAT(times_by_names({"10.png", "9.png", "1.png"}), ElementsAre(2, 1, 0));
   EXPECT_THAT(times_by_names({"left/1.png", "left/2.png", "right/1.png", "right/2.png"}),
               ElementsAre(0, 1, 0, 1));
+  EXPECT_THAT(times_by_names({"left/1.png", "right/1.jpg"}), ElementsAre(0, 0));
+  // Others have places too.
+  EXPECT_THAT(times_by_names({"a/99.png", "a/200.png"}, {"a/100.png", "a/101.jpg", "a/99", "b/300"}),
+              ElementsAre(0, 3));
 }
 
 TEST(ImageNames, images_are_found_with_another_extension) {
   const TempFolder folder;
-  std::filesystem::create_directories(folder / "images_2");
-  for (const char* name : {"a.png", "b.JPG", "v1.5.jpg", "images_2/a.jpg"})
+  for (const char* name : {"a.png", "b.JPG", "v1.5.jpg", "v1.png", "c.d.png", "c.tif.png"})
     std::ofstream(folder / name) << "x";
   const auto tree = FileTree::open(folder.path());
   EXPECT_EQ(find_image(*tree, "a.png"), "a.png");
   EXPECT_EQ(find_image(*tree, "a.jpg"), "a.png");
   EXPECT_EQ(find_image(*tree, "b"), "b.JPG");
   EXPECT_EQ(find_image(*tree, "v1.5"), "v1.5.jpg");
+  EXPECT_EQ(find_image(*tree, "v1.6"), "");
+  EXPECT_EQ(find_image(*tree, "c.d"), "c.d.png");
+  EXPECT_EQ(find_image(*tree, "c.tif"), "c.tif.png");
+  EXPECT_EQ(find_image(*tree, "a.tif"), "a.png");
   EXPECT_EQ(find_image(*tree, "c.png"), "");
   EXPECT_EQ(find_image(*tree, "../a.png"), "");
-
-  const auto at = [](int stored) {
-    return stored == 1 ? std::string("a.png") : "images_" + std::to_string(stored) + "/a.png";
-  };
-  for (const int downscale : {1, 2, 3, 4, 6}) {
-    const StoredImages images = choose_stored_images(*tree, downscale, at);
-    EXPECT_EQ(images.stored, downscale % 2 == 0 ? 2 : 1);
-    EXPECT_EQ(images.stored * images.factor, downscale);
-  }
 }
 
 }  // namespace

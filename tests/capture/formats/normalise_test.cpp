@@ -79,5 +79,22 @@ TEST(Normalise, nothing_to_measure_leaves_the_units) {
   EXPECT_EQ(normalise(one, {}).centre, Vec3<double>(3, 4, 5));
 }
 
+// A camera that turns on a tripod, as a solver finds it.
+TEST(Normalise, rounding_is_no_scene_and_no_scale_is_beyond_what_is_held) {
+  for (const double away : {0.0, 1.0, 1e6}) {
+    std::vector<FoundView> turning;
+    for (int i = 0; i < 10; ++i) {
+      const Vec3<double> at(away + 1e-13 * (1 + away) * i, away, 0);
+      turning.push_back(looking(at, at + Vec3<double>(0, 0, 1)));
+    }
+    EXPECT_EQ(normalise(turning, {}).scale, 1) << away;
+  }
+  const std::vector<FoundView> apart = {looking({-1e15, 0, 0}, {-1e15, 0, 9}),
+                                        looking({1e15, 0, 0}, {1e15, 0, 9})};
+  EXPECT_EQ(normalise(apart, {}).scale, 1e-12);
+  const std::vector<FoundView> small = {looking({0, 0, 0}, {0, 0, 9}), looking({1e-6, 0, 0}, {1e-6, 0, 9})};
+  EXPECT_NEAR(normalise(small, {}).scale, 1e6, 1);
+}
+
 }  // namespace
 }  // namespace traceflow

@@ -46,6 +46,26 @@ TEST(TransformsLens, all_fields_and_a_frame_over_its_file) {
   EXPECT_EQ(lens_of(common, R"({"fl_x": 99, "k2": 0})").radial.y, 0);
 }
 
+TEST(TransformsLens, each_side_has_its_angle_and_lengths_count_more) {
+  const double x = 40 / std::tan(0.4), y = 30 / std::tan(0.2);
+  const auto expect = [](const Lens& lens, double focal_x, double focal_y) {
+    EXPECT_NEAR(lens.focal.x, focal_x, 1e-9);
+    EXPECT_NEAR(lens.focal.y, focal_y, 1e-9);
+  };
+  expect(lens_of(R"({"camera_angle_x": 0.8, "camera_angle_y": 0.4})"), x, y);
+  expect(lens_of(R"({"camera_angle_y": 0.4})"), y, y);
+  expect(lens_of(R"({"fl_x": 50, "camera_angle_y": 0.4})"), 50, 50);
+  expect(lens_of(R"({"camera_angle_x": 0.8, "fl_y": 50})"), x, 50);
+}
+
+TEST(TransformsLens, a_frames_angle_counts_more_than_its_files_lengths) {
+  const double x = 40 / std::tan(0.4);
+  const char* file = R"({"fl_x": 100, "fl_y": 110, "camera_angle_y": 1})";
+  EXPECT_NEAR(lens_of(file, R"({"camera_angle_x": 0.8})").focal.x, x, 1e-9);
+  EXPECT_NEAR(lens_of(file, R"({"camera_angle_x": 0.8})").focal.y, x, 1e-9);
+  EXPECT_EQ(lens_of(file, R"({"camera_angle_x": 0.8, "fl_x": 90})").focal, Vec2<double>(90));
+}
+
 TEST(TransformsLens, fisheyes_and_matrices) {
   const Lens fisheye = lens_of(R"({"fl_x": 50, "k1": 0.1, "p1": 1, "camera_model": "OPENCV_FISHEYE"})");
   EXPECT_EQ(fisheye.projection, Projection::equidistant);

@@ -1,4 +1,4 @@
-// What can be made to fail inside the program, in place of the system's own.
+// Memory and clocks that fail inside the program, in place of the system's own.
 #include <dlfcn.h>
 #include <execinfo.h>
 #include <sys/syscall.h>
@@ -79,6 +79,8 @@ namespace traceflow::faults {
 
 void arm() {
   clock_jumps = number("FAULTS_CLOCK") != 0;
+  const char* const disk = std::getenv("FAULTS_DISK");  // NOLINT(concurrency-mt-unsafe): as above
+  if (disk != nullptr) arm_disk(DiskFault::from_text(disk));
   const int64_t n = number("FAULTS_ALLOCATION");
   if (n == 0) return;
   first_failing = n == count_only ? INT64_MAX : n;

@@ -88,10 +88,8 @@ TEST_F(Faults, AClockThatJumpsChangesNothing) {
   EXPECT_EQ(end.code, 0) << end.error;
   EXPECT_TRUE(state_of(path("timeless")) == whole_state());
   // Times in the log are spans, and spans are not negative.
-  std::ifstream log(run_in("timeless").log());
   double last = 0;
-  for (std::string line; std::getline(log, line);) {
-    const auto json = nlohmann::json::parse(line);
+  for (const nlohmann::json& json : logged("timeless")) {
     if (json["event"] != "step") continue;
     EXPECT_GE(json["seconds"].get<double>(), last);
     EXPECT_LT(json["seconds"].get<double>(), 1e4);
@@ -135,8 +133,7 @@ TEST_F(Faults, ATrainingOutlivesWhatItTalksTo) {
     words.erase(std::find(words.begin(), words.end(), "-q"));
     EXPECT_EQ(run(words, world).code, 0);
     EXPECT_TRUE(state_of(path("silent")) == whole_state());
-    std::ifstream log(run_in("silent").log());
-    for (std::string line; std::getline(log, line);) EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    EXPECT_EQ(logged("silent").back()["ending"], "completed");
   }
 }
 
@@ -153,13 +150,35 @@ TEST_F(Faults, ATrainingOutlivesWhoReadsWhatItSays) {
   EXPECT_TRUE(state_of(path("unheard")) == whole_state());
 }
 
-TEST_F(Faults, ATerminalThatGoesAwayEndsTheTrainingInASavedState) {
-  Process training(this->training("hung_up", {"-i", "100000"}), {});
-  wait_for(run_in("hung_up").checkpoint(), training);
+TEST_F(Faults, ASignalToStopEndsTheTrainingInASavedState) {
+  const RunFolder stopped = run_in("stopped");
+  for (const int signal_number : {SIGINT, SIGTERM, SIGHUP}) {
+    SCOPED_TRACE(signal_number);
+    fs::remove_all(stopped.folder);
+    Process training(this->training("stopped", {"-i", "100000"}), {});
+    wait_for(stopped.checkpoint(), training);
+    training.send(signal_number);
+    const Outcome end = training.wait();
+    EXPECT_EQ(end.code, 130);
+    EXPECT_EQ(end.error, "");
+    const nlohmann::json last = logged("stopped").back();
+    EXPECT_EQ(last["event"], "finished");
+    EXPECT_EQ(last["ending"], "interrupted");
+    EXPECT_EQ(last["iteration"], iteration_saved("stopped"));
+  }
+}
+
+TEST_F(Faults, UnderNohupATrainingOutlivesItsTerminal) {
+  Process training(this->training("nohup", {"-i", "100000"}), {.hangup_ignored = true});
+  wait_for(run_in("nohup").checkpoint(), training);
   training.send(SIGHUP);
+  // Past two more checkpoints: one might have been due before the signal came.
+  const double then = iteration_saved("nohup");
+  while (iteration_saved("nohup") < then + 6 && !training.has_ended())
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  ASSERT_FALSE(training.has_ended());
+  training.send(SIGTERM);
   EXPECT_EQ(training.wait().code, 130);
-  std::string note;
-  EXPECT_GE(read_checkpoint(run_in("hung_up"), note).number("iteration"), 3);
 }
 
 TEST_F(Faults, OutputThatFindsNoRoomIsAnError) {

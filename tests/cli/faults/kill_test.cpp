@@ -85,8 +85,7 @@ class Kill : public Faults {
 
   void check_the_end() {
     EXPECT_TRUE(state_of(run_.folder) == whole_state());
-    std::ifstream log(run_.log());
-    for (std::string line; std::getline(log, line);) EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+    EXPECT_EQ(logged("killed").back()["ending"], "completed");
     EXPECT_EQ(run({"export", run_.folder.string(), "-o", path("ply")}).code, 0);
     for (const char* name : {"main.ply", "environment.ply"})
       EXPECT_EQ(bytes_of(fs::path(path("ply")) / name), bytes_of(fs::path(path("whole_ply")) / name));

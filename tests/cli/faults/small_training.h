@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -26,6 +28,14 @@ inline int number_from_environment(const char* name, int usual) {
 
 inline int lines(const std::string& text) {
   return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
+}
+
+// Of what lies in a folder, sorted.
+inline std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end());
+  return names;
 }
 
 // A run's state in bytes, without how long it took.
@@ -88,6 +98,21 @@ class Faults : public testing::Test {
   static std::vector<std::string> resuming(const std::string& name) {
     return {"train", "-o", path(name), "--resume", "-q", "--device", "cpu"};
   }
+  // That a run would go on from.
+  static double iteration_saved(const std::string& name) {
+    std::string note;
+    return read_checkpoint(run_in(name), note).number("iteration");
+  }
+  // The lines of a run's log, each of which is JSON.
+  static std::vector<nlohmann::json> logged(const std::string& name) {
+    std::vector<nlohmann::json> result;
+    std::ifstream log(run_in(name).log());
+    for (std::string line; std::getline(log, line);) {
+      EXPECT_TRUE(nlohmann::json::accept(line)) << line;
+      result.push_back(nlohmann::json::parse(line, nullptr, false));
+    }
+    return result;
+  }
   // Of a run that nothing went wrong with.
   static std::string whole_state() { return state_of(path("whole")); }
 
@@ -98,13 +123,7 @@ class Faults : public testing::Test {
     EXPECT_TRUE(outcome.error.starts_with("traceflow: ")) << outcome.error;
     EXPECT_EQ(outcome.output, "");
   }
-  static std::vector<std::string> files_in(const std::string& name) {
-    std::vector<std::string> names;
-    for (const auto& entry : fs::directory_iterator(path(name)))
-      names.push_back(entry.path().filename().string());
-    std::sort(names.begin(), names.end());
-    return names;
-  }
+  static std::vector<std::string> files_in(const std::string& name) { return names_in(path(name)); }
 
  private:
   static inline const TempFolder* shared_folder = nullptr;

@@ -49,6 +49,7 @@ void lead(int stream, const char* path) {
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(99);
   }
   for (const int number : {SIGHUP, SIGPIPE, SIGXFSZ}) ::signal(number, SIG_DFL);
+  if (world.hangup_ignored) ::signal(SIGHUP, SIG_IGN);
   lead(STDOUT_FILENO, output);
   lead(STDERR_FILENO, error);
   if (world.output_closed) ::close(STDOUT_FILENO);
@@ -59,6 +60,11 @@ void lead(int stream, const char* path) {
   }
   ::fexecve(program, words, environment);
   ::_exit(99);
+}
+
+int64_t number_after(const std::string& before, const std::string& text) {
+  const size_t at = text.rfind(before);
+  return at == std::string::npos ? 0 : std::atoll(text.c_str() + at + before.size());
 }
 
 std::vector<char*> pointers(std::vector<std::string>& words) {
@@ -79,6 +85,7 @@ Process::Process(const std::vector<std::string>& words, const World& world)
   for (char** entry = environ; *entry != nullptr; ++entry) told.emplace_back(*entry);
   told.push_back("FAULTS_ALLOCATION=" + std::to_string(world.failing_allocation));
   told.push_back(std::string("FAULTS_FROM_THERE=") + (world.failing_from_there ? "1" : "0"));
+  told.push_back("FAULTS_DISK=" + world.disk.to_text());
   told.push_back(std::string("FAULTS_CLOCK=") + (world.clock_jumps ? "1" : "0"));
   const std::vector<char*> arguments = pointers(all), environment = pointers(told);
   const int program = ::open("/proc/self/exe", O_RDONLY | O_CLOEXEC);
@@ -124,10 +131,7 @@ Outcome run(const std::vector<std::string>& words, const World& world) {
   return Process(words, world).wait();
 }
 
-int64_t allocations_said(const std::string& error) {
-  const std::string before = "allocations: ";
-  const size_t at = error.rfind(before);
-  return at == std::string::npos ? 0 : std::atoll(error.c_str() + at + before.size());
-}
+int64_t allocations_said(const std::string& error) { return number_after("allocations: ", error); }
+int64_t disk_calls_said(const std::string& error) { return number_after("calls to the disk: ", error); }
 
 }  // namespace traceflow::faults

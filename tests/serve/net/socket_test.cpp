@@ -242,17 +242,27 @@ TEST(Socket, AGuestThatVanishesHasLeft) {
 }
 
 TEST(Socket, SendingIsHarmlessWhenTheServerIsGone) {
-  Send send;
-  std::optional<House> house(std::in_place);
+  EchoRoom room;
+  Limits limits;
+  limits.waiting_messages = 100'000;  // none is lost for being too many
+  std::optional<House> house(std::in_place, limits, ServerOptions{}, &room);
   SocketClient guest = house->guest();
-  house->room.wait_entered(1);
-  send = house->room.send_to(1);
+  room.wait_entered(1);
+  const Send send = room.send_to(1);
   std::thread writer([send] {
-    for (int i = 0; i < 20'000; ++i) send(outgoing("to whom it may concern"));
+    for (int i = 0; i < 20'000; ++i) send(outgoing(std::to_string(i)));
   });
   house.reset();
   writer.join();
-  send(outgoing("to nobody"));
+  EXPECT_EQ(room.left(), std::vector<uint64_t>{1});
+  const Outgoing late = outgoing("to nobody");
+  send(late);
+  EXPECT_EQ(late.bytes.use_count(), 1) << "what cannot be sent is not kept";
+  // What came to the guest is the beginning of what was sent.
+  int heard = 0;
+  for (auto message = guest.message(); message; message = guest.message())
+    EXPECT_EQ(message->payload, std::to_string(heard++));
+  EXPECT_TRUE(guest.client().ends());
 }
 
 TEST(Socket, DropsAGuestThatDoesNotAnswerPings) {

@@ -14,7 +14,7 @@ using DensityOnDevice = OnDevice;
 std::vector<float> statistics(Device device) {
   constexpr int64_t count = 300;
   Random random(1);
-  DensityControl density("main", {}, count);
+  DensityControl density("main", {}, count, device);
   for (int iteration = 0; iteration < 2; ++iteration) {
     Tensor<float> signal = random_tensor<float>({count}, random, 0, 1);
     Tensor<uint8_t> touched({count});
@@ -53,7 +53,7 @@ Edited edited(Device device) {
     state.second = random_tensor<float>(state.second.shape(), random, 0, 1).on(device);
     state.step = 5;
   });
-  DensityControl density("main", {}, count);
+  DensityControl density("main", {}, count, device);
   const Tensor<float> signal = random_tensor<float>({count}, random, 0, 4e-4);
   Tensor<uint8_t> touched({count});
   touched.fill(1);

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "capture/capture.h"
+#include "files/safetensors.h"
+#include "train/memory.h"
+#include "train/options.h"
+
+// What a run that goes on must have in common with the run as it began, so that it ends in the same bytes:
+// written into the checkpoint's metadata, and compared when it is resumed. Checkpoints from before these were
+// written are taken as they are.
+namespace traceflow {
+
+// The options that a checkpoint was written with.
+TrainOptions options_in(const Safetensors& checkpoint);
+
+// Throws InputError for a setting that is part of what the checkpoint holds already, so that another value
+// would do nothing: what the scene started from and what its fields are.
+void refuse_reshaping(const TrainOptions& before, const TrainOptions& now);
+// Throws InputError where a preset has another value, of whatever option, than the run has.
+void refuse_other_preset(const std::string& name, const TrainOptions& of_preset, const TrainOptions& now);
+
+void put_views(const Capture& capture, Safetensors& checkpoint);
+// Throws InputError where the capture is not the one that the run, whose scene is normalised so, was begun
+// with: by the views' names, times and poses, not by their pixels.
+void check_views(const Safetensors& checkpoint, const SceneNormalisation& normalisation,
+                 const Capture& capture);
+
+void put_caps(const SurfelCaps& caps, Safetensors& checkpoint);
+// Those that the run was dealt when it began, unless it is told to take other sizes or another budget now.
+std::optional<SurfelCaps> caps_to_keep(const Safetensors& checkpoint, const TrainOptions& now);
+
+// On what numbers are computed: other bytes come of it where it differs.
+void put_arithmetic(Device device, Safetensors& checkpoint);
+// What is to be said where it is another than the checkpoint's; else nothing.
+std::string other_arithmetic(const Safetensors& checkpoint, Device device);
+
+}  // namespace traceflow
