@@ -1,6 +1,6 @@
-// Bytes as files of a capture: the first says of which format, "@NAME" in a line begins the file of that
-// name, of those that are listed below; the others are whole. It is loaded, looked at, and its views are
-// decoded.
+// Bytes as files of a capture: the first says of which format, and whether they come in an archive; "@NAME"
+// in a line begins the file of that name, of those that are listed below; the others are whole. It is loaded,
+// looked at, and its views are decoded.
 #include <array>
 #include <cmath>
 #include <map>
@@ -10,6 +10,7 @@
 #include "files/jpeg.h"
 #include "files/png.h"
 #include "fuzz/scratch_file.h"
+#include "support/zip_writer.h"
 
 using namespace traceflow;
 using fuzz::promise;
@@ -89,9 +90,21 @@ const std::map<std::string, std::string>& whole_capture(char format) {
   return format == 'd' ? dycheck : format == 'c' ? colmap : format == 't' ? transforms : files;
 }
 
+// What the first byte says: its highest bit that the files come in an archive, and then its fourth that they
+// are deflated there.
+struct Form {
+  explicit Form(char first)
+      : packed((first & 0x80) != 0),
+        deflated(packed && (first & 0x08) != 0),
+        format(packed ? static_cast<char>(first & 0x77) : first) {}
+
+  bool packed, deflated;
+  char format;
+};
+
 // The files that the bytes name, in the place of those that stand there.
-std::map<std::string, std::string> changed_capture(std::string_view bytes) {
-  std::map<std::string, std::string> files = whole_capture(bytes.empty() ? ' ' : bytes.front());
+std::map<std::string, std::string> changed_capture(char format, std::string_view bytes) {
+  std::map<std::string, std::string> files = whole_capture(format);
   std::string* into = nullptr;
   while (!bytes.empty()) {
     const std::string_view line = bytes.substr(0, bytes.find('\n') + 1);
@@ -110,27 +123,37 @@ std::map<std::string, std::string> changed_capture(std::string_view bytes) {
   return files;
 }
 
-class CaptureFolder {
+class CapturePlace {
  public:
-  CaptureFolder() {
-    for (const char* name : names) std::filesystem::create_directories((path() / name).parent_path());
+  CapturePlace() {
+    for (const char* name : names) std::filesystem::create_directories((folder() / name).parent_path());
     // Loops over views would start threads, which take longer than the views.
     set_threads(1);
   }
-  std::filesystem::path path() const { return folder_.path() / "capture"; }
-  void fill(const std::map<std::string, std::string>& files) const {
+  // Puts the files there, and says where they are.
+  std::filesystem::path put(const std::map<std::string, std::string>& files, const Form& form) const {
+    if (form.packed) return pack(files, form.deflated);
     for (const char* name : names) {
       const auto found = files.find(name);
       if (found != files.end()) {
-        folder_.write(path() / name, found->second);
+        place_.write(folder() / name, found->second);
       } else {
-        std::filesystem::remove(path() / name);
+        std::filesystem::remove(folder() / name);
       }
     }
+    return folder();
   }
 
  private:
-  fuzz::ScratchFolder folder_;
+  std::filesystem::path folder() const { return place_.path() / "capture"; }
+  std::filesystem::path pack(const std::map<std::string, std::string>& files, bool deflated) const {
+    std::vector<std::pair<std::string, std::string>> members;
+    members.reserve(files.size());
+    for (const auto& [name, bytes] : files) members.emplace_back("capture/" + name, bytes);
+    return place_.write("capture.zip", zip_archive(members, deflated));
+  }
+
+  fuzz::ScratchFolder place_;
 };
 
 void check(const View& view) {
@@ -183,12 +206,14 @@ void check_pixels(const Capture& capture, const View& view) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   constexpr int64_t most_pixels = int64_t{1} << 16;
-  static const CaptureFolder folder;
-  folder.fill(changed_capture(fuzz::text_of(data, size)));
-  const std::string where = folder.path().string();
+  static const CapturePlace place;
+  const std::string_view bytes = fuzz::text_of(data, size);
+  const Form form(bytes.empty() ? ' ' : bytes.front());
+  const std::filesystem::path path = place.put(changed_capture(form.format, bytes), form);
+  const std::string where = path.string();
   // What is open stays so while the capture is there.
   fuzz::accepts(where, [&] {
-    const Capture capture = load_capture(folder.path(), {});
+    const Capture capture = load_capture(path, {});
     check(capture);
     int64_t pixels = 0;
     for (const auto* split : {&capture.train, &capture.test}) {

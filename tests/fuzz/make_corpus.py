@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Writes the first inputs of the fuzzers that read files: small whole files of every kind, into corpus/NAME/."""
+"""Writes the first inputs of the fuzzers that read files, small whole files of every kind, and of the one that reads what
+a page says, into corpus/NAME/."""
 import io
 import json
 import pathlib
@@ -165,6 +166,23 @@ def captures():
     put("cameras", "path", json.dumps(
         {"format": "traceflow camera path", "version": 1, "width": 4, "height": 2, "fps": 30, "closed": False,
          "keyframes": [key, {**key, "position": [1, 0, 0]}]}))
+    turned = [[0, -1, 0], [0, 0, -1], [1, 0, 0]]
+    bare = {"width": 4, "height": 2, "position": [1e3, -2, 0.5], "rotation": turned, "fx": 3.5, "fy": 3}
+    put("cameras", "nameless", json.dumps([bare, {**bare, "time": 1}]))
+    put("cameras", "ids", json.dumps(
+        [{**bare, "id": "left/é 1"}, {**bare, "id": -7}, {**bare, "id": 7}], ensure_ascii=False))
+    put("cameras", "twice", json.dumps([{**bare, "img_name": "a"}, {**bare, "img_name": "a"}]))
+    put("cameras", "outside", json.dumps([{**bare, "img_name": "../a"}]))
+    put("cameras", "large", json.dumps([{**bare, "width": 32768, "height": 1, "cx": -5, "cy": 1e4, "time": 0}]))
+    put("cameras", "not_turned", json.dumps([{**bare, "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}]))
+    along = {"format": "traceflow camera path", "version": 1, "width": 6, "height": 4, "fps": 12.5, "closed": True}
+    stops = [{**key, "fov_y": 0.1, "time": 0, "seconds": 1e-3},
+             {**key, "position": [2, 0, 1], "rotation": turned, "fov_y": 90, "time": 0.5, "seconds": 2},
+             {**key, "position": [0, 1, 1], "fov_y": 179, "time": 1, "seconds": 0.5}]
+    put("cameras", "round", json.dumps({**along, "keyframes": stops}))
+    put("cameras", "along", json.dumps({**along, "closed": False, "keyframes": stops[::-1] + stops}))
+    put("cameras", "still", json.dumps({**along, "closed": False, "keyframes": [{**key, "seconds": 0}]}))
+    put("cameras", "long", json.dumps({**along, "fps": 1000, "keyframes": [{**key, "seconds": 1e6}] * 2}))
     camera = {"orientation": rotation, "position": [0, 0, -1], "focal_length": 5, "principal_point": [3, 2],
               "image_size": [6, 4], "skew": 0.1, "pixel_aspect_ratio": 1.1,
               "radial_distortion": [0.01, -0.02, 0.003], "tangential_distortion": [0.001, -0.002]}
@@ -181,7 +199,6 @@ def captures():
     put("capture", "photographs", b" \n@rgb/1x/a.png\n" + png(6, 4, 8, 0, [bytes(6)] * 4)
         + b"\n@rgb/1x/b.png\n" + png(3, 2, 8, 6, [bytes(12)] * 2))
 
-
     put("capture", "dycheck", 'd\n@splits/val.json\n{"frame_names":["b","c"],"camera_ids":[1,2],"time_ids":[1,2]}')
     put("capture", "colmap", "c\n@sparse/0/cameras.txt\n1 OPENCV_FISHEYE 6 4 5 5 3 2 0.01 0 0 0\n"
         "@sparse/0/images.txt\n3 0.9 0.1 0 0 0 0 1 1 b.jpg\n1 2 -1\n7 1 0 0 0 1e-3 0 1 1 a.png\n")
@@ -195,6 +212,57 @@ def captures():
                     {"file_path": "/home/me/images/b.jpg", "fl_x": 6, "transform_matrix": pose}]})
         + "\n@points.ply\nply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
         "property float z\nend_header\n0 0 1\n")
+    put("capture", "fisheye", "t\n@transforms.json\n" + json.dumps(
+        {"is_fisheye": True, "k1": 0.01, "k2": -0.02, "k3": 0.003, "k4": -0.001,
+         "frames": [{"file_path": "images/a.png", "K": [[5, 0.1, 3], [0, 5, 2], [0, 0, 1]], "transform_matrix": pose},
+                    {"file_path": "images/b.jpg", "camera_angle_y": 0.6, "transform_matrix": pose[:3]}]}))
+    # What is binary ends with the input, or else with the end of a line.
+    for part, data in [("cameras", colmap_cameras([LENSES[6]])), ("images", colmap_images(["a.png", "b.jpg"])),
+                       ("points3D", colmap_points(2))]:
+        put("capture", "binary_" + part.lower(), f"c\n@sparse/0/{part}.bin\n".encode() + data)
+    put("capture", "array", b" \n@normal.npy\n" + npy("<f4", "(2, 2, 3, 3)", floats(36)))
+
+    # As an archive: the same letters with the highest bit set, and with the fourth what lies in it deflated.
+    prior = archive({"normals.npy": npy("<f2", "(1, 2, 3, 3)", bytes(36))})
+    tight = archive({"normals.npy": npy("<f2", "(1, 2, 3, 3)", bytes(36))}, zipfile.ZIP_DEFLATED)
+    for name, first, npz in [("stored", 0xa0, prior), ("deflated", 0xa8, prior), ("tight", 0xa0, tight),
+                             ("twice_tight", 0xa8, tight)]:
+        put("capture", "packed_" + name, bytes([first]) + b"\n@normal.npz\n" + npz)
+    put("capture", "packed_dycheck", b"\xe4\n@points.npy\n" + npy("<f4", "(2, 3)", floats(6)))
+    put("capture", "packed_colmap", b"\xeb\n@sparse/0/points3D.txt\n1 0 0 2 9 9 9 0.5 1 0\n")
+    put("capture", "packed_transforms", b"\xfc\n")
+
+
+# COLMAP's lenses by their numbers: the name, and numbers that fit.
+LENSES = [("SIMPLE_PINHOLE", [5, 3, 2]), ("PINHOLE", [5, 4, 3, 2]), ("SIMPLE_RADIAL", [5, 3, 2, 0.01]),
+          ("RADIAL", [5, 3, 2, 0.01, -0.02]), ("OPENCV", [5, 4, 3, 2, 0.01, -0.02, 0.001, 0]),
+          ("OPENCV_FISHEYE", [5, 4, 3, 2, 0.01, -0.02, 0.003, 0]),
+          ("FULL_OPENCV", [5, 4, 3, 2, 0.01, -0.02, 0.001, 0, 0.003, 0.1, 0.01, 0]), ("FOV", [5, 4, 3, 2, 0.9]),
+          ("SIMPLE_RADIAL_FISHEYE", [5, 3, 2, 0.01]), ("RADIAL_FISHEYE", [5, 3, 2, 0.01, -0.02]),
+          ("THIN_PRISM_FISHEYE", [5, 4, 3, 2, 0.01, -0.02, 0.001, 0, 0.003, 0, 0.01, 0.02]),
+          ("RAD_TAN_THIN_PRISM_FISHEYE", [5, 4, 3, 2] + [0.01] * 12), ("SIMPLE_DIVISION", [5, 3, 2, 0.01]),
+          ("DIVISION", [5, 4, 3, 2, 0.01]), ("SIMPLE_FISHEYE", [5, 3, 2]), ("FISHEYE", [5, 4, 3, 2]),
+          ("EUCM", [5, 4, 3, 2, 0.5, 1]), ("EQUIRECTANGULAR", [6, 4])]
+NOT_READ = {"RAD_TAN_THIN_PRISM_FISHEYE", "SIMPLE_DIVISION", "DIVISION", "EUCM", "EQUIRECTANGULAR"}
+
+
+def colmap_cameras(lenses):
+    names = [name for name, _ in LENSES]
+    return struct.pack("<Q", len(lenses)) + b"".join(
+        struct.pack(f"<IiQQ{len(numbers)}d", i + 1, names.index(name), 6, 4, *numbers)
+        for i, (name, numbers) in enumerate(lenses))
+
+
+def colmap_images(names, cameras=1, seen=(7, -1)):
+    data = struct.pack("<Q", len(names))
+    for i, name in enumerate(names):
+        data += struct.pack("<I7dI", i + 1, 0.9, 0.1, 0, -0.1, 0, 0.5 * i, 1, i % cameras + 1) + name.encode() + b"\0"
+        data += struct.pack("<Q", len(seen)) + b"".join(struct.pack("<ddq", 1.5, 2.5, point) for point in seen)
+    return data
+
+
+def colmap_points(track):
+    return struct.pack("<QQ3d3BdQ", 1, 7, 0.5, 0.5, 2, 255, 0, 9, 0.4, track) + struct.pack("<2I", 1, 0) * track
 
 
 def models_of_colmap():
@@ -204,6 +272,61 @@ def models_of_colmap():
     image = struct.pack("<QI7dI", 1, 1, 1, 0, 0, 0, 0, 0, 1, 1) + b"a.png\0" + struct.pack("<Qddq", 1, 1.5, 2.5, 7)
     point = struct.pack("<QQ3d3BdQII", 1, 7, 0.5, 0.5, 2, 255, 0, 9, 0.4, 1, 1, 0)
     put("colmap", "binary", b"b@cameras\n" + camera + b"@images\n" + image + b"@points\n" + point)
+    read = [lens for lens in LENSES if lens[0] not in NOT_READ]
+    names = [f"{name.lower()}.png" for name, _ in read]
+    put("colmap", "lenses_binary", b"b@cameras\n" + colmap_cameras(read) + b"@images\n"
+        + colmap_images(names, len(read)) + b"@points\n" + colmap_points(3))
+    put("colmap", "lenses_text", "t@cameras\n" + "".join(
+        f"{i + 1} {name} 6 4 {' '.join(map(str, numbers))}\n" for i, (name, numbers) in enumerate(read))
+        + "@images\n" + "".join(f"{i + 1} 1 0 0 0 0 0 1 {i + 1} {name}\n\n" for i, name in enumerate(names)))
+    for lens in LENSES:
+        if lens[0] in NOT_READ:
+            put("colmap", lens[0].lower(),
+                b"b@cameras\n" + colmap_cameras([lens]) + b"@images\n" + colmap_images(["a.png"]))
+    one = "t@cameras\n1 PINHOLE 6 4 5 4 3 2\n@images\n"
+    put("colmap", "spaces", "t@cameras\n# a\r\n\r\n 1\tPINHOLE 6 4 5 4 3 2 \r\n"
+        "@images\n1 -2 0 0 1e-9 0 0 1 1 a b/ä.png\r\n1 2 -1 3 4 7\r\n# b\n2 0 0 0 -1 0 0 1 1 b.png")
+    put("colmap", "absent", one + "1 1 0 0 0 0 0 1 2 a.png\n")
+    put("colmap", "twice", one + "1 1 0 0 0 0 0 1 1 a.png\n\n1 1 0 0 0 0 0 1 1 a.png\n\n")
+    put("colmap", "tracks", one + "1 1 0 0 0 0 0 1 1 a.png\n\n"
+        "@points\n18446744073709551615 1e9 -1e-9 0 0 255 7 0 1 2 3 4 5 6\n2 0 0 0 0 0 0 -1\n")
+    put("colmap", "no_images",
+        b"b@cameras\n" + colmap_cameras([LENSES[0]]) + b"@images\n" + bytes(8) + b"@points\n" + bytes(8))
+
+
+def messages():
+    camera = {"position": [1, 2, 3], "rotation": [[0, -1, 0], [0, 0, -1], [1, 0, 0]], "fov_y": 40}
+    shape = {"time": 0, "width": 96, "height": 54, "layer": "rgb", "exposure": 0, "map": "viridis", "moving": True}
+    look = {"type": "look", "id": 1, "camera": camera, **shape}
+    key = {**camera, "time": 0, "seconds": 1}
+    path = {"format": "traceflow camera path", "version": 1, "width": 96, "height": 54, "fps": 30, "closed": True,
+            "keyframes": [key, {**key, "position": [0, 0, 0], "time": 1}]}
+    layers = [("normal", "turbo"), ("depth", "viridis"), ("specular", ""), ("é", "\t"), ("x" * 64, "y" * 64)]
+    talks = {
+        "moves": [look, {**look, "id": 2, "time": 0.5}, {**look, "id": 3, "moving": False},
+                  {"type": "seen", "frame": 1}, {"type": "seen", "frame": 3},
+                  {**look, "id": 4, "width": 4096, "height": 4096}],
+        "layers": [{**look, "id": i, "layer": layer, "map": colours, "exposure": 2 * i - 5, "moving": False}
+                   for i, (layer, colours) in enumerate(layers)],
+        "photos": [{"type": "look", "id": 1, "photo": {"split": "train", "index": 0}, **shape},
+                   {"type": "look", "id": 2, "photo": {"split": "test", "index": 1000000}, **shape},
+                   {"type": "photo", "split": "test", "index": 2, "width": 4096},
+                   {"type": "photo", "split": "all", "index": 0, "width": 50}],
+        "probes": [look, {"type": "probe", "id": 2, "x": 0, "y": 1}, {"type": "probe", "id": 3, "x": 1e-300, "y": 0.5},
+                   {"type": "probe", "id": 4, "x": -0.1, "y": 2}],
+        "stills": [{"type": "still", "id": 1, "width": 8192, "height": 1}, look,
+                   {"type": "still", "id": 2, "width": 1, "height": 8192},
+                   {"type": "still", "id": 2 ** 53, "width": 0, "height": 8193}],
+        "paths": [{"type": "path", "id": 5, "path": path}, {"type": "path", "id": 6, "path": [None, {}, "text", -0.0]}],
+        "commands": [{"type": "command", "do": word} for word in ("pause", "resume", "save", "stop", "start")],
+        "rests": [look, {"type": "sleep"}, {"type": "seen", "frame": 2 ** 53}, {**look, "id": 9}, {"type": "sleep"}],
+        "refused": [{"type": "look"}, {"type": 1}, {**look, "time": 2}, {**look, "id": 0.5}, {**look, "camera": {}},
+                    [], None],
+    }
+    for name, talk in talks.items():
+        put("message", name, "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in talk))
+    put("message", "broken", b'{"type":"look"\n\n{"type":"sleep"}}\n\xff\n' + b"[" * 300
+        + b'\n{"type":"\\ud800","id":1}\n1e400')
 
 
 def archives():
@@ -214,5 +337,5 @@ def archives():
     put("zip", "outside", archive({"../a": b"a", "b": b"b"}))
 
 
-for make in (arrays, images, models, settings, captures, models_of_colmap, archives):
+for make in (arrays, images, models, settings, captures, models_of_colmap, messages, archives):
     make()
