@@ -24,8 +24,6 @@ export interface PhotoRef {
   index: number; // in Hello.cameras
 }
 
-// ---- page → server, JSON text
-
 // What the server takes at most; src/serve/audience/messages.cpp and src/serve/net/limits.h have these too.
 export const look_side = 4096; // pixels, width and height
 export const still_side = 8192;
@@ -91,6 +89,7 @@ export interface Command {
   do: 'pause' | 'resume' | 'save' | 'stop';
 }
 
+// What the page sends, as JSON text.
 export type Request = Look | Sleep | Seen | Probe | Still | PhotoRequest | PathRequest | Command;
 
 // The file that `traceflow render --camera-path` takes.
@@ -108,8 +107,6 @@ export interface Keyframe extends Camera {
   time: number; // of the scene, 0 to 1
   seconds: number; // from here to the next keyframe
 }
-
-// ---- server → page, JSON text
 
 export interface Hello {
   type: 'hello';
@@ -185,9 +182,8 @@ export interface Trouble {
   text: string;
 }
 
+// What the server sends as JSON text.
 export type Reply = Hello | State | Events | ProbeReply | PathReply | Refused | Trouble;
-
-// ---- server → page, binary: length of the header (32 bit, little endian), header (JSON text), picture
 
 export interface FrameHeader {
   type: 'frame';
@@ -216,15 +212,15 @@ export interface PhotoHeader extends PhotoRef {
   format: 'jpeg';
 }
 
+// What the server sends as bytes: length of the header (32 bit, little endian), header (JSON text), picture.
 export type PictureHeader = FrameHeader | StillHeader | PhotoHeader;
-
-// ---- lines of log.jsonl (docs/train.md)
 
 export interface SurfelCounts {
   main: number;
   environment: number;
 }
 
+// A line of log.jsonl (docs/train.md).
 export type TrainingEvent =
   | {
       event: 'started';

@@ -6,7 +6,7 @@ import type { Link } from '../net/connection.ts';
 
 // What the page knows and what its user wants. Everything on the screen follows from these.
 
-// ---- from the server
+// What the server says.
 export const link = signal<Link>({ kind: 'connecting', again: false });
 export const hello = signal<Hello | null>(null);
 export const server = signal<State | null>(null);
@@ -14,7 +14,7 @@ export const trouble = signal('');
 export const notices = signal<{ key: number; text: string }[]>([]);
 export const events = signal<TrainingEvent[]>([]);
 
-// ---- what is looked at
+// What is looked at, and from where.
 export const camera = signal<Camera | null>(null); // of a picture at least as wide as high
 export const pivot = signal<Vec3>([0, 0, 0]);
 export const photo = signal<PhotoRef | null>(null); // the captured camera that is looked from
@@ -24,7 +24,7 @@ export const exposure = signal(0);
 export const map = signal('');
 export const asleep = signal(document.hidden);
 
-// ---- tools
+// How its user looks: what the tools are set to.
 export type Mode = 'orbit' | 'fly';
 export const mode = signal<Mode>('orbit');
 export const rays_on = signal(false);
@@ -36,7 +36,6 @@ export const previewing = signal(false); // of the camera path
 export const speed = signal(1);
 export const looping = signal(true);
 
-// ---- the stage
 export const stage = signal<Size>({ width: 1, height: 1 }); // CSS pixels
 export const pixel_ratio = signal(1); // device pixels to a CSS pixel, at most 2
 
