@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -37,14 +36,6 @@ void hold(const Descriptor& file, const std::filesystem::path& path, PartialFile
   }
 }
 
-// Whether a name, that of no link, is still this file's.
-bool is_name_of(const std::filesystem::path& name, const Descriptor& file) {
-  struct stat named {
-  }, open{};
-  return ::lstat(name.c_str(), &named) == 0 && ::fstat(file.number(), &open) == 0 &&
-         named.st_ino == open.st_ino && named.st_dev == open.st_dev;
-}
-
 // What a failed sync of a folder says where there is no such thing, or where only others may ask for it.
 bool means_no_sync(int error) {
   return error == EINVAL || error == ENOTSUP || error == ENOSYS || error == EBADF || error == EACCES;
@@ -59,7 +50,7 @@ PartialFile::PartialFile(std::filesystem::path path, OtherWriter other, const st
     file_ = Descriptor(::open(name_.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (!file_) fail(path_, "open");
     hold(file_, path_, other);
-  } while (!is_name_of(name_, file_));
+  } while (!file_.is_named(name_));
   if (::ftruncate(file_.number(), 0) != 0) fail(path_, "open");
 }
 

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <filesystem>
 #include <utility>
 
 namespace traceflow {
@@ -22,6 +23,8 @@ class Descriptor {
 
   int number() const { return number_; }
   explicit operator bool() const { return number_ >= 0; }
+  // Whether this name, and no link of that name, is still the file's: others may have taken it away.
+  bool is_named(const std::filesystem::path& name) const;
   void close() {
     if (number_ >= 0) ::close(std::exchange(number_, -1));
   }

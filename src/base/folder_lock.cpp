@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,6 +19,7 @@ namespace traceflow {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path) {
+  if (errno == ELOOP) throw InputError(path.string(), "", "a link", "the lock of a folder", "remove it");
   throw InputError(path.string(), "", std::generic_category().message(errno), "a writable folder",
                    "check permissions, or choose another folder");
 }
@@ -51,47 +51,32 @@ std::string holder(int descriptor) {
   return has_ended(who) ? "a program that outlived " + who : who;
 }
 
-// Whether the path still leads to this file: whoever held it before may have removed it meanwhile.
-bool leads_to(const std::filesystem::path& path, int descriptor) {
-  struct stat named {
-  }, open{};
-  return ::stat(path.c_str(), &named) == 0 && ::fstat(descriptor, &open) == 0 &&
-         named.st_ino == open.st_ino && named.st_dev == open.st_dev;
-}
-
 }  // namespace
 
 FolderLock::FolderLock(const std::filesystem::path& file, const std::filesystem::path& folder,
                        const std::string& work)
     : file_(file) {
-  while (descriptor_ < 0) {
+  do {
     // Programs that are started inherit it (there is no O_CLOEXEC): where this one is killed, the lock stands
     // until they end, and with them what they still write. That they end with their parent
     // (PR_SET_PDEATHSIG) could be asked of the first of them alone, not of what a script then starts.
-    const int opened = ::open(file_.c_str(), O_RDWR | O_CREAT, 0644);
-    if (opened < 0) fail(file_);
-    keeps_others_out_ = ::flock(opened, LOCK_EX | LOCK_NB) == 0;
+    // A link may lead to anybody's file, and what is locked is written to.
+    lock_ = Descriptor(::open(file_.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW, 0644));
+    if (!lock_) fail(file_);
+    keeps_others_out_ = ::flock(lock_.number(), LOCK_EX | LOCK_NB) == 0;
     // Any other error is that of a file system which knows no locks.
     if (!keeps_others_out_ && errno == EWOULDBLOCK) {
-      const std::string who = holder(opened);
-      ::close(opened);
-      throw InputError(folder.string(), "", who + " " + work + " in it", "a folder of its own",
-                       "wait for that process or stop it, or choose another folder");
+      throw InputError(folder.string(), "", holder(lock_.number()) + " " + work + " in it",
+                       "a folder of its own", "wait for that process or stop it, or choose another folder");
     }
-    if (leads_to(file_, opened)) {
-      descriptor_ = opened;
-    } else {
-      ::close(opened);
-    }
-  }
+  } while (!lock_.is_named(file_));
   const std::string who = name_of_process(::getpid()) + "\n";
   // A name that cannot be written is only missed in a message.
-  if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, who.data(), who.size(), 0) < 0) return;
+  if (::ftruncate(lock_.number(), 0) != 0 || ::pwrite(lock_.number(), who.data(), who.size(), 0) < 0) return;
 }
 
 FolderLock::~FolderLock() {
-  if (leads_to(file_, descriptor_)) ::unlink(file_.c_str());
-  ::close(descriptor_);
+  if (lock_.is_named(file_)) ::unlink(file_.c_str());
 }
 
 }  // namespace traceflow

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <string>
 
+#include "base/descriptor.h"
+
 namespace traceflow {
 
 // Keeps a second program out of a folder's work for as long as this stands. Readers are free. The system lets
@@ -22,7 +24,7 @@ class FolderLock {
 
  private:
   std::filesystem::path file_;
-  int descriptor_ = -1;
+  Descriptor lock_;
   bool keeps_others_out_ = true;
 };
 

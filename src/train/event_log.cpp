@@ -157,9 +157,12 @@ std::string to_json_line(const events::Event& event) {
 }
 
 EventLog::EventLog(const std::filesystem::path& path, int64_t step_interval)
-    : descriptor_(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0644)),
+    // A link may lead to anybody's file: a run may be a stranger's that goes on here.
+    : descriptor_(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644)),
       step_interval_(step_interval) {
   if (descriptor_ < 0) {
+    if (errno == ELOOP)
+      throw InputError(path.string(), "", "a link", "a place to write the log", "remove it");
     throw InputError(path.string(), "", std::generic_category().message(errno), "a place to write the log");
   }
   const int64_t size = ::lseek(descriptor_, 0, SEEK_END), whole = end_of_lines(descriptor_, size);

@@ -45,6 +45,17 @@ TEST(FolderLock, KeepsOthersOutUntilItGoes) {
   EXPECT_THROW(FolderLock(folder / "nowhere" / "lock", folder / "nowhere", "training"), InputError);
 }
 
+TEST(FolderLock, WritesToNothingThatALinkLeadsTo) {
+  const TempFolder folder;
+  write_bytes(folder / "letter", "dear all");
+  std::filesystem::create_symlink(folder / "letter", folder / "lock");
+  EXPECT_THAT(
+      refusal_of([&] { FolderLock(folder / "lock", folder / "run", "training"); }),
+      HasSubstr((folder / "lock").string() + ": found a link, expected the lock of a folder; remove it"));
+  EXPECT_EQ(bytes_of(folder / "letter"), "dear all");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "lock"));
+}
+
 // As `prepare` killed while COLMAP works: what COLMAP writes must not meet what a second `prepare` does.
 TEST(FolderLock, OutlivesAKilledHolderForAsLongAsWhatItStartedGoesOn) {
   const TempFolder folder;

@@ -1,5 +1,6 @@
 #include "train/event_log.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -11,6 +12,7 @@
 
 #include "base/error.h"
 #include "support/file_bytes.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -199,6 +201,15 @@ TEST(EventLog, ALineLostAfterTheCountIsCountedAgain) {
 
 TEST(EventLog, RefusesAPlaceThatCannotBeWritten) {
   EXPECT_THROW(EventLog("/nowhere/at/all/log.jsonl"), InputError);
+}
+
+TEST(EventLog, WritesToNothingThatALinkLeadsTo) {
+  const TempFolder folder;
+  write_bytes(folder / "letter", "dear all");
+  std::filesystem::create_symlink(folder / "letter", folder / "log.jsonl");
+  EXPECT_THAT(refusal_of([&] { EventLog(folder / "log.jsonl", 1); }),
+              testing::HasSubstr("log.jsonl: found a link, expected a place to write the log; remove it"));
+  EXPECT_EQ(bytes_of(folder / "letter"), "dear all");
 }
 
 TEST(EventStream, CallsListenersInOrder) {
