@@ -303,6 +303,14 @@ class Assembly {
       }
       capture_.has_masks |= static_cast<bool>(source.mask);
     }
+    // Of one kind for all views, or figures would compare one thing with another.
+    if (!capture_.has_masks) {
+      for (auto& [id, source] : sources_) {
+        source.mask = in("motion_mask", id);
+        capture_.has_masks |= static_cast<bool>(source.mask);
+      }
+      capture_.masks_are_estimated = capture_.has_masks;
+    }
     const auto has = [](const ViewSource& source) { return static_cast<bool>(source.mask); };
     warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has), "training views have no mask",
                     "missing-mask");

@@ -28,8 +28,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* marker = "prepare.json";
-constexpr std::array<const char*, 8> own_names{"rgb",        "camera",        "mask",         "points.npy",
-                                               "scene.json", "metadata.json", "dataset.json", marker};
+constexpr std::array<const char*, 9> own_names{"rgb",           "camera",       "mask",
+                                               "motion_mask",   "points.npy",   "scene.json",
+                                               "metadata.json", "dataset.json", marker};
 
 // A frame that has a pose.
 struct PosedFrame {
@@ -146,7 +147,8 @@ void write_estimated_masks(const std::vector<PosedFrame>& posed, double typical_
         },
         work,
         [&](int64_t i, const Tensor<uint8_t>& mask) {
-          write_mask(folder / "mask/1x" / (mine[static_cast<size_t>(i)]->frame->id + ".png.png"), mask);
+          write_mask(folder / "motion_mask/1x" / (mine[static_cast<size_t>(i)]->frame->id + ".png.png"),
+                     mask);
         });
   }
 }
@@ -217,13 +219,12 @@ std::string write_capture(const PrepareOptions& options, const CaptureParts& par
   std::vector<Camera<double>> cameras;
   cameras.reserve(posed.size());
   for (const PosedFrame& p : posed) cameras.push_back(p.camera);
-  if (wants_masks(options)) {
+  if (options.masks == "estimate") {
+    fs::create_directories(folder / "motion_mask/1x");
+    write_estimated_masks(posed, typical_depth(points, cameras), folder, work);
+  } else if (wants_masks(options)) {
     fs::create_directories(folder / "mask/1x");
-    if (options.masks == "estimate") {
-      write_estimated_masks(posed, typical_depth(points, cameras), folder, work);
-    } else {
-      write_given_masks(posed, parts.masks, folder);
-    }
+    write_given_masks(posed, parts.masks, folder);
   }
   write_points(folder / "points.npy", points);
   const SceneBounds bounds = scene_bounds(points, cameras);

@@ -227,7 +227,9 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
   scene.normalisation = capture.normalisation;
   scene.extent = capture.extent;
   scene.main = surfels_at_points(thinned(points, limit, random), options.initial, random);
-  const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks;
+  // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
+  // mirrors grew into one before the camera, which can show any scene.
+  const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks && !capture.masks_are_estimated;
   if (options.initial.colours_from_views || by_masks) {
     const Sightings sightings = look_at(scene.main, earliest_photographs(capture));
     if (options.initial.colours_from_views) set_colours(scene.main, sightings);

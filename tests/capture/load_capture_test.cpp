@@ -226,6 +226,28 @@ TEST(Images, grey_and_alpha_become_three_channels) {
   }
 }
 
+TEST(Masks, of_motion_serve_where_there_is_none_of_the_object) {
+  NerfDsCapture fake;
+  Tensor<uint8_t> white({8, 12});
+  white.fill(255);
+  for (const char* id : {"000000_left", "000001_left"})
+    fake.write_image("motion_mask/1x/" + std::string(id) + ".png.png", white);
+  fake.save();
+  const auto masks = [&](const Capture& capture) {
+    std::vector<bool> result;
+    for (int i : {0, 1})
+      result.push_back(!load_images(capture, capture.train[static_cast<size_t>(i)])->mask.empty());
+    return result;
+  };
+  const Capture estimated = load_capture(fake.path(), {});
+  EXPECT_TRUE(estimated.has_masks && estimated.masks_are_estimated);
+  EXPECT_EQ(masks(estimated), (std::vector<bool>{true, true}));
+  fake.write_image("mask/1x/000001_left.png.png", white);
+  const Capture given = load_capture(fake.path(), {});
+  EXPECT_TRUE(given.has_masks && !given.masks_are_estimated);
+  EXPECT_EQ(masks(given), (std::vector<bool>{false, true}));
+}
+
 TEST(Downscale, box_filters_the_largest_images_where_no_smaller_are_stored) {
   NerfDsCapture fake;
   Tensor<uint8_t> mask({8, 12});

@@ -76,7 +76,7 @@ TEST(WriteCapture, IsReadBackAsItWasPosed) {
   EXPECT_TRUE(capture.warnings.empty()) << capture.warnings.front().text;
   ASSERT_EQ(capture.train.size(), 8U);
   ASSERT_EQ(capture.test.size(), 3U);
-  EXPECT_TRUE(capture.has_masks);
+  EXPECT_TRUE(capture.has_masks && !capture.masks_are_estimated);
   EXPECT_EQ(capture.test[0].id, "000013");  // the third that has a pose
   const View& view = capture.train[1];
   EXPECT_EQ(view.id, "000012");
@@ -128,7 +128,7 @@ TEST(WriteCapture, EstimatesMasksByTheCameras) {
   PrepareOptions options = with_masks();
   options.masks = "estimate";
   write_capture(options, p.parts, p.folder / "out", stop);
-  EXPECT_TRUE(load_capture(p.folder / "out", {}).has_masks);
+  EXPECT_TRUE(load_capture(p.folder / "out", {}).masks_are_estimated);
   options.masks = "none";
   write_capture(options, p.parts, p.folder / "out", stop);
   EXPECT_FALSE(load_capture(p.folder / "out", {}).has_masks);

@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include <cmath>
+#include <limits>
+#include <set>
 
 #include "math/rotation.h"
 #include "scene/neighbours.h"
+#include "small_run.h"
+#include "support/temp_folder.h"
 
 namespace traceflow {
 namespace {
@@ -68,6 +70,26 @@ TEST(Initialise, CoincidentAndSinglePointsStayFinite) {
       for (const float v : t.values()) ASSERT_TRUE(std::isfinite(v)) << name;
     });
   }
+}
+
+TEST(Initialise, MasksOfTheObjectSayWhatMirrorsAndEstimatedOnesDoNot) {
+  const TempFolder folder;
+  fs::copy(capture_folder(), folder / "capture", fs::copy_options::recursive);
+  TrainOptions options = small_run(1);
+  options.initial.tint = 0.2F;
+  options.initial.tint_in_mask = 0.8F;
+  options.initial.tint_outside_mask = 0.01F;
+  const auto tints = [&] {
+    Random random(1);
+    const Scene scene = initial_scene(load_capture(folder / "capture", {}), options, random);
+    std::set<int> percent;
+    for (const float logit : scene.main.tint_logit.values())
+      percent.insert(static_cast<int>(std::lround(100 / (1 + std::exp(-logit)))));
+    return percent;
+  };
+  EXPECT_EQ(tints(), (std::set<int>{1, 80}));
+  fs::rename(folder / "capture/mask", folder / "capture/motion_mask");
+  EXPECT_EQ(tints(), std::set<int>{20});
 }
 
 TEST(Initialise, TheEnvironmentFillsItsBoxEvenly) {

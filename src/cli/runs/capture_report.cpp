@@ -76,7 +76,11 @@ void print_geometry(const Capture& capture, const Inspection& found) {
 }
 
 void print_extras(const Capture& capture, const Inspection& found) {
-  if (capture.has_masks) row("masks", fmt::format("cover {:.1f}% of the pixels", 100 * found.pixels.masked));
+  if (capture.has_masks) {
+    row("masks", fmt::format("{}cover {:.1f}% of the pixels",
+                             capture.masks_are_estimated ? "estimated, of what moves; " : "",
+                             100 * found.pixels.masked));
+  }
   if (!capture.has_normal_priors) return;
   row("normal priors",
       fmt::format("axes {}, on {:.1f}% of the pixels{}", prior_axes_name(capture.prior_axes),
@@ -204,6 +208,7 @@ nlohmann::json report_json(const Capture& capture, const Inspection& found, cons
           {"normalisation",
            {{"centre", to_json(capture.normalisation.centre)}, {"scale", capture.normalisation.scale}}},
           {"points", points_json(capture, found)},
+          {"masks_estimated", capture.masks_are_estimated},
           {"prior_axes",
            capture.has_normal_priors ? nlohmann::json(prior_axes_name(capture.prior_axes)) : nullptr},
           {"decoded", decoded_json(found.pixels)},
