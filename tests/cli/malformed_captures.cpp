@@ -87,7 +87,7 @@ MalformedKind malformed_camera_lists() {
            {"a width of half a pixel", render, set(camera_list, "/0/width", 0.5),
             "cameras.json: [0].width: found 0.5, expected a whole number, 1 to 32768"},
            {"a focal length in words", render, set(camera_list, "/0/fx", "long"),
-            "cameras.json: [0].fx: found \"long\", expected a finite number"},
+            "cameras.json: [0].fx: found \"long\", expected a number"},
            {"a time after the end", render, set(camera_list, "/0/time", 1.5),
             "cameras.json: [0].time: found 1.5, expected 0 to 1"},
            {"a name that leads out of the folder", render, set(camera_list, "/0/img_name", "../a"),

@@ -174,6 +174,7 @@ def captures():
     put("cameras", "twice", json.dumps([{**bare, "img_name": "a"}, {**bare, "img_name": "a"}]))
     put("cameras", "outside", json.dumps([{**bare, "img_name": "../a"}]))
     put("cameras", "large", json.dumps([{**bare, "width": 32768, "height": 1, "cx": -5, "cy": 1e4, "time": 0}]))
+    put("cameras", "narrow", json.dumps([{**bare, "fx": 1e40}]))
     put("cameras", "not_turned", json.dumps([{**bare, "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}]))
     along = {"format": "traceflow camera path", "version": 1, "width": 6, "height": 4, "fps": 12.5, "closed": True}
     stops = [{**key, "fov_y": 0.1, "time": 0, "seconds": 1e-3},

@@ -85,6 +85,10 @@ TEST_F(CameraFile, BadInputIsRefusedByName) {
       {"[" + with(turned_camera, "\"fx\": 50,", "") + "]", "fx"},
       {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": 0") + "]", "fx"},
       {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": \"50\"") + "]", "fx"},
+      // Single precision would make infinity and nothing of these.
+      {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": 1e40") + "]", "fx"},
+      {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": 1e-50") + "]", "fx"},
+      {"[" + with(turned_camera, "\"fx\"", "\"cx\": 1e40, \"cy\": 20, \"fx\"") + "]", "cx"},
       {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": 1e400") + "]", ""},
       {"[" + with(turned_camera, "64", "0") + "]", "width"},
       {"[" + with(turned_camera, "64", "64.5") + "]", "width"},

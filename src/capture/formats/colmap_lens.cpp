@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
-#include "capture/formats/lens_limits.h"
+#include "math/pixel_limits.h"
 
 namespace traceflow {
 

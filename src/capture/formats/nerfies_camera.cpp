@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "capture/formats/lens_limits.h"
 #include "files/json_document.h"
+#include "math/pixel_limits.h"
 
 namespace traceflow {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "capture/formats/lens_limits.h"
+#include "math/pixel_limits.h"
 
 namespace traceflow {
 

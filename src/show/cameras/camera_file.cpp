@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "files/json_document.h"
 #include "files/limits.h"
+#include "math/pixel_limits.h"
 
 namespace traceflow::show {
 
@@ -35,10 +36,12 @@ Shot read_shot(const JsonField& entry, const SceneNormalisation& normalisation) 
   Camera<double> camera;
   camera.width = static_cast<int>(entry["width"].whole(1, max_image_side));
   camera.height = static_cast<int>(entry["height"].whole(1, max_image_side));
-  camera.focal_x = entry["fx"].positive();
-  camera.focal_y = entry["fy"].positive();
-  camera.centre_x = entry.has("cx") ? entry["cx"].number() : camera.width / 2.0;
-  camera.centre_y = entry.has("cy") ? entry["cy"].number() : camera.height / 2.0;
+  camera.focal_x = entry["fx"].number(smallest_pixels, largest_pixels);
+  camera.focal_y = entry["fy"].number(smallest_pixels, largest_pixels);
+  camera.centre_x =
+      entry.has("cx") ? entry["cx"].number(-largest_pixels, largest_pixels) : camera.width / 2.0;
+  camera.centre_y =
+      entry.has("cy") ? entry["cy"].number(-largest_pixels, largest_pixels) : camera.height / 2.0;
   camera.camera_from_world = transpose(entry["rotation"].rotation());
   camera.position = normalisation.in_scene(entry["position"].vector());
   shot.camera = convert<float>(camera);
