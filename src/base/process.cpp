@@ -33,6 +33,14 @@ std::vector<char*> as_arguments(std::vector<std::string>& words) {
   return arguments;
 }
 
+// Where SIGCHLD is ignored, as a parent may have left it, the system keeps no exit status and every program
+// seems to fail. Seen to here, where it is needed: not all that starts programs sets up signals before.
+void keep_exit_statuses() {
+  struct sigaction action {};
+  if (::sigaction(SIGCHLD, nullptr, &action) == 0 && action.sa_handler == SIG_IGN)
+    std::signal(SIGCHLD, SIG_DFL);
+}
+
 // What posix_spawn is told, freed at the end.
 class SpawnPlan {
  public:
@@ -88,6 +96,7 @@ bool is_in_path(const std::string& program) {
 }
 
 Process::Process(const std::vector<std::string>& words, const ProcessStreams& streams) {
+  keep_exit_statuses();
   const int error = SpawnPlan(streams).spawn(words, streams.environment, id_);
   if (error == 0) return;
   id_ = -1;
@@ -99,7 +108,10 @@ Process::~Process() { end(); }
 bool Process::wait() {
   int status = 0;
   while (id_ >= 0 && ::waitpid(id_, &status, 0) < 0) {
-    if (errno != EINTR) return false;
+    if (errno == EINTR) continue;
+    // Somebody else has waited for it: its number may be another's by now, whom end() must not signal.
+    id_ = -1;
+    return false;
   }
   id_ = -1;
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;

@@ -24,7 +24,7 @@ struct ProcessStreams {
 };
 
 // A running program, in a process group of its own: Ctrl-C reaches this program alone, which then decides.
-// What is still running when this is destroyed is ended.
+// What is still running when this is destroyed is ended. Where SIGCHLD was ignored, it no longer is.
 class Process {
  public:
   // words: the program, found in PATH, and its arguments. Throws InputError where it cannot be started.

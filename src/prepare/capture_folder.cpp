@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <system_error>
 
 #include "base/error.h"
 #include "base/parallel.h"
@@ -74,11 +75,14 @@ std::vector<PosedFrame> posed_frames(const CaptureParts& parts) {
   return posed;
 }
 
+// Each size shows the whole picture, also of a side that does not divide: readers scale the camera to what is
+// stored.
 void write_halved(const Tensor<float>& image, const fs::path& folder, const std::string& name) {
   for (const int factor : {1, 2, 4}) {
-    const Grid grid{image.dim(1) / factor, image.dim(0) / factor, static_cast<double>(factor),
-                    static_cast<double>(factor)};
-    if (std::min(grid.width, grid.height) < 1) break;
+    const int64_t width = image.dim(1) / factor, height = image.dim(0) / factor;
+    if (std::min(width, height) < 1) break;
+    const Grid grid{width, height, static_cast<double>(image.dim(1)) / static_cast<double>(width),
+                    static_cast<double>(image.dim(0)) / static_cast<double>(height)};
     write_png(folder / fmt::format("{}x", factor) / name, to_8bit(resample(image, grid)));
   }
 }
@@ -254,6 +258,18 @@ void check_place(const fs::path& capture) {
     if (!own.contains(name)) refuse(name + ", which prepare did not write");
   }
   if (fs::exists(capture / attached_masks)) refuse("masks that attach-priors put there");
+}
+
+void check_movable(const fs::path& capture, const fs::path& trial) {
+  // A capture is not moved for it: whoever ends this program in between would find none.
+  if (!fs::is_directory(capture) || !fs::is_empty(capture)) return;
+  std::error_code error;
+  fs::rename(capture, trial, error);
+  if (!error) fs::rename(trial, capture, error);
+  if (!error) return;
+  throw InputError(capture.string(), "output folder", "one that cannot be moved (" + error.message() + ")",
+                   "a new folder, or one that can be replaced as a whole",
+                   "where it is a mount point, name a folder below it");
 }
 
 void move_into_place(const fs::path& folder, const fs::path& capture, const fs::path& aside) {

@@ -32,6 +32,9 @@ inline constexpr const char* attached_masks = "mask/attached.txt";
 // Throws InputError unless a finished capture may be put at this place: nothing is there, or a capture made
 // by prepare to which nothing was added.
 void check_place(const std::filesystem::path& capture);
+// Throws InputError where an empty folder at this place cannot be moved, as move_into_place will: a mount
+// point, say. Moves it to `trial`, where nothing is, and back.
+void check_movable(const std::filesystem::path& capture, const std::filesystem::path& trial);
 // Puts the finished folder there, in the place of an earlier one, which `aside` is used for.
 void move_into_place(const std::filesystem::path& folder, const std::filesystem::path& capture,
                      const std::filesystem::path& aside);

@@ -27,6 +27,21 @@ std::string filters(const Film& film) {
   return chain + "showinfo=checksum=0";
 }
 
+// What ffmpeg is called with.
+std::vector<std::string> words_for(const Film& film) {
+  const std::string path = std::filesystem::absolute(film.path).string();
+  std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "info"};
+  const auto add = [&](const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+  };
+  // The name of a picture, "a%d.png", would else stand for many others; that of a film does not.
+  if (film.is_still && path.find('%') != std::string::npos) add({"-f", "image2", "-pattern_type", "none"});
+  // "file:" keeps names from being taken for options and protocols; V is no attached picture, as a cover is.
+  add({"-i", "file:" + path, "-map", "0:V:0", "-vf", filters(film), "-fps_mode", "passthrough"});
+  add({"-f", "image2pipe", "-c:v", film.grey ? "pgm" : "ppm", "-pix_fmt", film.grey ? "gray" : "rgb24", "-"});
+  return words;
+}
+
 // The whole number after `key` in the line, which may have spaces before it.
 std::optional<int64_t> number_after(const std::string& line, const std::string& key) {
   const size_t at = line.find(key);
@@ -69,29 +84,7 @@ std::vector<double> decode_film(const Film& film, const std::filesystem::path& l
                                 const std::function<bool(int64_t index, Tensor<uint8_t>&& picture)>& take) {
   const Descriptor told = open_log(log);
   Pipe pipe = make_pipe();
-  // "file:" keeps names from being taken for options and protocols.
-  Process process({"ffmpeg",
-                   "-nostdin",
-                   "-hide_banner",
-                   "-nostats",
-                   "-loglevel",
-                   "info",
-                   "-i",
-                   "file:" + std::filesystem::absolute(film.path).string(),
-                   "-map",
-                   "0:v:0",
-                   "-vf",
-                   filters(film),
-                   "-fps_mode",
-                   "passthrough",
-                   "-f",
-                   "image2pipe",
-                   "-c:v",
-                   film.grey ? "pgm" : "ppm",
-                   "-pix_fmt",
-                   film.grey ? "gray" : "rgb24",
-                   "-"},
-                  {.output = pipe.writing.number(), .error = told.number()});
+  Process process(words_for(film), {.output = pipe.writing.number(), .error = told.number()});
   pipe.writing.close();
   NetpbmStream pictures(std::move(pipe.reading), film.path.string(), stop);
   int64_t count = 0;

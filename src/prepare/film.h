@@ -14,6 +14,7 @@ struct Film {
   std::filesystem::path path;
   int longest_side = 0;  // larger pictures are scaled down to this; 0: as they are
   bool grey = false;
+  bool is_still = false;  // one picture, whatever its name looks like
 };
 
 // Hands every picture, H×W×3 or (grey) H×W×1, to `take` in the order shown, until that is false. The

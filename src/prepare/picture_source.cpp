@@ -17,6 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_picture(const fs::path& path) {
+  // A Mac puts a file of notes beside each picture on a foreign disk: ._IMG_0001.jpg.
+  if (path.filename().string().starts_with('.')) return false;
   constexpr std::array endings{".png",  ".jpg", ".jpeg", ".tif", ".tiff",
                                ".webp", ".bmp", ".ppm",  ".exr", ".dng"};
   std::string ending = path.extension().string();
@@ -83,7 +85,7 @@ std::vector<double> PictureSource::decode(bool grey, int64_t end,
   for (int64_t i = 0; i < std::min(end, static_cast<int64_t>(files_.size())); ++i) {
     places.push_back(static_cast<double>(i));
     if (wanted(i))
-      take(i, decode_picture({files_[static_cast<size_t>(i)], longest_side_, grey}, log_, *stop_));
+      take(i, decode_picture({files_[static_cast<size_t>(i)], longest_side_, grey, true}, log_, *stop_));
   }
   return places;
 }

@@ -10,7 +10,7 @@
 
 namespace traceflow::prepare {
 
-// Files of a folder that look like pictures, ordered so that 9 comes before 10.
+// Files of a folder that look like pictures and are not hidden, ordered so that 9 comes before 10.
 std::vector<std::filesystem::path> pictures_in(const std::filesystem::path& folder);
 
 // The name without folder and endings: "a" of "b/a.png", "a.jpg", "a.png.png".

@@ -61,27 +61,38 @@ class Preparation {
   fs::path pictures() const { return folder_ / "frames"; }
   fs::path masks() const { return folder_ / "masks"; }
   fs::path made() const { return folder_ / "capture"; }
+  fs::path aside() const { return folder_ / "replaced"; }
   fs::path frame_list() const { return folder_ / "frames.list.json"; }
   PoseFolder poses() const { return {folder_ / "colmap"}; }
 
-  // A step empties its folder before it fills it.
+  // A step empties its folder before it fills it, and an earlier capture goes with all that is in it.
   void refuse_own_folders(const fs::path& given) const {
     if (given.empty() || !fs::exists(given)) return;
-    const fs::path place = fs::weakly_canonical(given);
-    for (const fs::path& own : {pictures(), masks(), poses().top, made()}) {
-      const auto [parted, rest] = std::mismatch(own.begin(), own.end(), place.begin(), place.end());
-      if (parted != own.end()) continue;
-      throw InputError(given.string(), "", "a folder that this preparation writes itself", "another place",
-                       "copy it out of " + folder_.string());
+    const auto lies_in = [place = fs::weakly_canonical(given)](const fs::path& folder) {
+      const fs::path own = fs::weakly_canonical(folder);
+      return std::mismatch(own.begin(), own.end(), place.begin(), place.end()).first == own.end();
+    };
+    const auto refuse = [&](const std::string& found, const fs::path& folder) {
+      throw InputError(given.string(), "", found, "another place", "copy it out of " + folder.string());
+    };
+    for (const fs::path& own : {pictures(), masks(), poses().top, made(), aside()}) {
+      if (lies_in(own)) refuse("a folder that this preparation writes itself", folder_);
     }
+    if (!lies_in(capture_)) return;
+    // A folder that is no capture is refused as what it is.
+    check_place(capture_);
+    refuse("a part of the capture that this preparation replaces", capture_);
   }
 
-  // Before hours go into steps whose capture would find its place taken, or into ones that another process
-  // does as well.
+  // Before hours go into steps whose capture would find its place taken, or one that cannot be freed, or into
+  // steps that another process does as well.
   void before_work() {
     if (options_.until == Step::capture) check_place(capture_);
     fs::create_directories(folder_);
-    if (!lock_) lock_.emplace(folder_ / "lock", folder_, "preparing");
+    if (!lock_) {
+      lock_.emplace(folder_ / "lock", folder_, "preparing");
+      if (options_.until == Step::capture) check_movable(capture_, folder_ / "trial");
+    }
     work_.tell(0, 0);
   }
 
@@ -170,7 +181,7 @@ class Preparation {
       told["steps"][step_name(step)] = {{"found", stamp.at("found")}, {"seconds", stamp.at("seconds")}};
     }
     write_atomically(made() / "prepare.json", told.dump(1) + "\n");
-    move_into_place(made(), capture_, folder_ / "replaced");
+    move_into_place(made(), capture_, aside());
     return found;
   }
 

@@ -12,6 +12,7 @@
 #include "base/error.h"
 #include "base/utf8.h"
 #include "files/json_document.h"
+#include "prepare/picture_source.h"
 
 namespace traceflow::prepare {
 
@@ -70,10 +71,7 @@ json identity_of(const fs::path& path) {
                 {"changed", fs::last_write_time(file).time_since_epoch().count()}};
   };
   if (!fs::is_directory(path)) return one(path);
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
+  std::vector<fs::path> files = pictures_in(path);
   std::sort(files.begin(), files.end());
   json all = json::array();
   for (const fs::path& file : files) all.push_back(one(file));

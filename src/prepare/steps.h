@@ -40,7 +40,8 @@ class Steps {
 
 std::string step_name(Step step);
 
-// A file as an input of a step: its path, size and time of change; of a folder, those of all files in it.
+// A file as an input of a step: its path, size and time of change; of a folder, those of its pictures, as
+// nothing else in it is looked at.
 nlohmann::json identity_of(const std::filesystem::path& path);
 
 }  // namespace traceflow::prepare

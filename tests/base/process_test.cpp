@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <csignal>
+#include <sys/wait.h>
 
+#include <chrono>
+#include <csignal>
 #include <thread>
 
 #include "base/error.h"
@@ -13,10 +15,43 @@
 namespace traceflow {
 namespace {
 
+// Init may take a moment to bury what has ended.
+bool is_alive(pid_t id) {
+  return ::kill(id, 0) == 0 &&
+         bytes_of("/proc/" + std::to_string(id) + "/stat").find(" Z ") == std::string::npos;
+}
+
 TEST(Process, TellsWhetherTheProgramEndedWell) {
   EXPECT_TRUE(Process({"sh", "-c", "exit 0"}, {}).wait());
   EXPECT_FALSE(Process({"sh", "-c", "exit 3"}, {}).wait());
   EXPECT_FALSE(Process({"sh", "-c", "kill -9 $$"}, {}).wait());
+}
+
+// As a parent may leave it to the programs that it starts.
+TEST(Process, TellsItWhereSignalsOfChildrenWereIgnored) {
+  const std::atomic<bool> never = false;
+  const auto before = std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_TRUE(Process({"sh", "-c", "exit 0"}, {}).wait());
+  std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_TRUE(Process({"sh", "-c", "exit 0"}, {}).wait(never));
+  EXPECT_FALSE(Process({"sh", "-c", "exit 3"}, {}).wait(never));
+  std::signal(SIGCHLD, before);
+}
+
+// By its number, which may be another's by now: here it is still that of the group that it leaves behind.
+TEST(Process, WhatSomebodyElseHasWaitedForIsNotSignalled) {
+  const TempFolder folder;
+  const Descriptor out = open_log(folder / "out");
+  {
+    Process process({"sh", "-c", "sleep 1000 & echo $!"}, {.output = out.number()});
+    ASSERT_GT(::waitpid(-1, nullptr, 0), 0);
+    EXPECT_FALSE(process.wait());
+  }
+  const pid_t left = std::stoi(bytes_of(folder / "out"));
+  // A signal would need a moment.
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_TRUE(is_alive(left));
+  ::kill(left, SIGKILL);
 }
 
 TEST(Process, ConnectsTheStreamsAndAddsToTheEnvironment) {
@@ -57,11 +92,7 @@ TEST(Process, AStopEndsTheProgramAndWhatItHasStarted) {
   const std::atomic<bool> stop = true;
   EXPECT_FALSE(process.wait(stop));
   const pid_t child = std::stoi(bytes_of(folder / "out"));
-  // Init may take a moment to bury it.
-  while (::kill(child, 0) == 0 &&
-         bytes_of("/proc/" + std::to_string(child) + "/stat").find(" Z ") == std::string::npos) {
-    std::this_thread::yield();
-  }
+  while (is_alive(child)) std::this_thread::yield();
 }
 
 TEST(Process, WhatIsLeftIsEnded) {

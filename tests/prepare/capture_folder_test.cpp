@@ -13,6 +13,7 @@
 #include "math/rotation.h"
 #include "prepare/masks.h"
 #include "prepare/scene_bounds.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::prepare {
@@ -122,6 +123,45 @@ TEST(WriteCapture, StraightensPicturesAndMasks) {
   }
 }
 
+// A ramp along either side, whose sides are no multiples of 2: what a pixel shows tells where it is.
+TEST(WriteCapture, SmallPicturesOfOddSidesAreWhatTheirCamerasSee) {
+  constexpr int64_t wide = 51, high = 35;
+  const Lens lens{wide, high, Vec2<double>(50, 51), Vec2<double>(25.7, 17.2)};
+  const Parts p(lens);
+  Tensor<uint8_t> ramps({high, wide, 3});
+  for (int64_t y = 0; y < high; ++y) {
+    for (int64_t x = 0; x < wide; ++x) {
+      ramps(y, x, 0) = static_cast<uint8_t>(5 * x);
+      ramps(y, x, 1) = static_cast<uint8_t>(7 * y);
+    }
+  }
+  for (const Frame& frame : p.parts.frames.frames) write_png(p.parts.pictures / (frame.id + ".png"), ramps);
+  const std::atomic<bool> stop = false;
+  PrepareOptions options = with_masks();
+  options.masks = "none";
+  write_capture(options, p.parts, p.folder / "out", stop);
+
+  const Camera<float> full = load_capture(p.folder / "out", {}).train[0].camera;
+  for (const int downscale : {2, 4}) {
+    CaptureOptions smaller;
+    smaller.downscale = downscale;
+    const Capture capture = load_capture(p.folder / "out", smaller);
+    const Camera<float>& small = capture.train[0].camera;
+    ASSERT_EQ(small.width, wide / downscale);
+    ASSERT_EQ(small.height, high / downscale);
+    const auto images = load_images(capture, capture.train[0]);
+    for (int64_t y = 0; y < small.height; ++y) {
+      for (int64_t x = 0; x < small.width; ++x) {
+        const float u = static_cast<float>(x) + 0.5F, v = static_cast<float>(y) + 0.5F;
+        const Vec2<float> at = full.project(small.ray_in_camera(u, v));
+        // Half a level for 8 bits, and less than that for pixels that are cut.
+        EXPECT_NEAR(255 * images->colour(y, x, 0), 5 * (at.x - 0.5F), 1) << downscale << " " << x;
+        EXPECT_NEAR(255 * images->colour(y, x, 1), 7 * (at.y - 0.5F), 1) << downscale << " " << y;
+      }
+    }
+  }
+}
+
 TEST(WriteCapture, EstimatesMasksByTheCameras) {
   const Parts p(plain_lens());
   const std::atomic<bool> stop = false;
@@ -194,6 +234,24 @@ TEST(MoveIntoPlace, ReplacesOnlyWhatPrepareMade) {
   fs::create_directory(folder / "empty");
   EXPECT_NO_THROW(check_place(folder / "empty"));
   EXPECT_NO_THROW(check_place(folder / "absent"));
+}
+
+TEST(CheckMovable, RefusesAnEmptyFolderThatCannotGo) {
+  const TempFolder folder;
+  fs::create_directories(folder / "capture/rgb");
+  fs::create_directory(folder / "empty");
+  for (const char* name : {"capture", "empty", "absent"})
+    EXPECT_NO_THROW(check_movable(folder / name, folder / "trial"));
+  EXPECT_FALSE(fs::exists(folder / "absent"));
+  EXPECT_FALSE(fs::exists(folder / "trial"));
+  // On another file system, to which nothing is moved: as from a mount point.
+  const fs::path elsewhere = "/proc/trial";
+  EXPECT_NO_THROW(check_movable(folder / "capture", elsewhere));
+  EXPECT_THAT(refusal_of([&] { check_movable(folder / "empty", elsewhere); }),
+              testing::AllOf(HasSubstr("empty: output folder: found one that cannot be moved ("),
+                             HasSubstr("name a folder below it")));
+  EXPECT_TRUE(fs::exists(folder / "capture/rgb"));
+  EXPECT_TRUE(fs::is_directory(folder / "empty") && fs::is_empty(folder / "empty"));
 }
 
 }  // namespace

@@ -171,6 +171,23 @@ TEST_F(FilmTest, AFoldersPicturesAreTakenInTheOrderOfTheirNames) {
               HasSubstr("p10.png: size: found 32×40, expected 32×32 as the first"));
 }
 
+// ffmpeg would take p%d.png for the first of p0.png, p1.png and so on.
+TEST_F(FilmTest, APictureWhoseNameIsAPatternIsTakenForItself) {
+  const fs::path stills = folder_ / "stills";
+  fs::create_directory(stills);
+  fs::rename(make("red.png", "color=red:s=32x32", {"-frames:v", "1"}), stills / "p%d.png");
+  fs::rename(make("blue.png", "color=blue:s=32x32", {"-frames:v", "1"}), stills / "p1.png");
+  const PictureSource source(stills, 0, folder_ / "ffmpeg.log", never_);
+  const std::vector<std::string> names = source.names();
+  ASSERT_THAT(names, testing::UnorderedElementsAre("p%d.png", "p1.png"));
+  std::vector<char> colours;
+  source.take_all(false, [&](int64_t place, Tensor<uint8_t>&& picture) {
+    EXPECT_EQ(colour_at(picture, 16, 16), names[static_cast<size_t>(place)] == "p%d.png" ? 'r' : 'b');
+    colours.push_back(colour_at(picture, 16, 16));
+  });
+  EXPECT_THAT(colours, testing::UnorderedElementsAre('r', 'b'));
+}
+
 TEST_F(FilmTest, OfASourceThePicturesThatAreAskedForAreTaken) {
   const fs::path film = make("film.mkv", red_and_blue, {"-c:v", "ffv1"});
   const PictureSource source(film, 0, folder_ / "ffmpeg.log", never_);

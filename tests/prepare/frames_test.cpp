@@ -97,6 +97,14 @@ TEST(PicturesIn, CountAsPeopleDo) {
   EXPECT_THAT(names, ElementsAre("f1.tiff", "f9.JPG", "f09b.png", "f10.png", "g.png"));
 }
 
+TEST(PicturesIn, LeaveOutWhatIsHidden) {
+  const TempFolder folder;
+  for (const char* name : {"._IMG_1.jpg", ".IMG_2.png", "IMG_1.jpg"}) std::ofstream(folder / name) << "x";
+  std::vector<std::string> names;
+  for (const auto& path : pictures_in(folder.path())) names.push_back(path.filename().string());
+  EXPECT_THAT(names, ElementsAre("IMG_1.jpg"));
+}
+
 const std::atomic<bool> never = false;
 
 NetpbmStream stream_of(const std::string& bytes) {

@@ -37,6 +37,7 @@ using testing::IsEmpty;
 // For a film F it writes F.ppm or F.pgm, a row of pictures, and says F.times.
 constexpr const char* fake_ffmpeg = R"sh(#!/bin/sh
 kind=ppm
+words=$*
 while [ $# -gt 0 ]; do
   case "$1" in
     -i) film=${2#file:} ;;
@@ -44,7 +45,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-echo "ffmpeg $kind" >> "$CALLS"
+echo "ffmpeg $kind $words" >> "$CALLS"
 [ "$FAIL" != silent ] || sleep 1000
 [ -e "$film.$kind" ] || { echo "$film: Invalid data found when processing input" >&2; exit 1; }
 cat "$film.times" >&2
@@ -185,10 +186,10 @@ class PrepareTest : public testing::Test {
     return refusal_of([&] { prepare(options); });
   }
   // A folder of a mask for each frame, white in its left half, for the ffmpeg of these tests to read.
-  fs::path write_masks(int width, int height) const {
-    fs::create_directory(folder_ / "mine");
+  fs::path write_masks(int width, int height, const std::string& name = "mine") const {
+    fs::create_directory(folder_ / name);
     for (int i = 0; i < frames; ++i) {
-      const std::string file = folder_ / fmt::format("mine/{:06}.png", i);
+      const std::string file = folder_ / name / fmt::format("{:06}.png", i);
       std::ofstream(file) << "a picture";
       std::ofstream(file + ".times") << "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/25\n"
                                      << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:   0\n";
@@ -196,7 +197,7 @@ class PrepareTest : public testing::Test {
       grey << "P5\n" << width << " " << height << "\n255\n";
       for (int k = 0; k < width * height; ++k) grey.put(k % width < width / 2 ? '\xff' : '\0');
     }
-    return folder_ / "mine";
+    return folder_ / name;
   }
   // Which programs were called: "ffmpeg pgm", "colmap mapper".
   std::vector<std::string> calls() const {
@@ -398,6 +399,52 @@ TEST_F(PrepareTest, WhatLiesInItsOwnFoldersIsNotTakenForInput) {
   EXPECT_TRUE(fs::exists(frames / "000000.png"));
 }
 
+TEST_F(PrepareTest, WhatLiesInTheCaptureThatItReplacesIsNotTakenForInput) {
+  PrepareOptions supplied = options();
+  supplied.masks = write_masks(64, 40);
+  ASSERT_TRUE(prepare(supplied));
+  fs::create_directory_symlink(capture(), folder_ / "link");
+  for (const fs::path& place : {capture(), folder_ / "link"}) {
+    supplied.masks = place / "mask/1x";
+    EXPECT_THAT(refusal(supplied),
+                HasSubstr("mask/1x: found a part of the capture that this preparation replaces"));
+    EXPECT_THAT(refusal_of([&] { prepare(place / "rgb/1x", capture(), options()); }),
+                HasSubstr("rgb/1x: found a part of the capture that this preparation replaces"));
+  }
+  EXPECT_TRUE(fs::exists(capture() / "mask/1x/000000.png.png"));
+  // Where the earlier capture goes while the new one takes its place.
+  PrepareOptions two = options();
+  two.test_video = work_folder(capture()) / "replaced/second.mp4";
+  fs::create_directory(work_folder(capture()) / "replaced");
+  write_bytes(two.test_video, "a film");
+  EXPECT_THAT(refusal(two), HasSubstr("found a folder that this preparation writes itself"));
+  EXPECT_TRUE(fs::exists(two.test_video));
+}
+
+// ffmpeg would look for pictures of other names.
+TEST_F(PrepareTest, APicturesPathIsNoPattern) {
+  const std::string odd = folder_ / "film%d.mp4";
+  for (const char* ending : {"", ".ppm", ".pgm", ".times"}) fs::copy(film() + ending, odd + ending);
+  PrepareOptions supplied = options();
+  supplied.masks = write_masks(64, 40, "50%d");
+  ASSERT_TRUE(prepare(odd, capture(), supplied));
+  std::string called = bytes_of(folder_ / "calls");
+  EXPECT_THAT(called, HasSubstr("-loglevel info -i file:" + odd + " "));
+  EXPECT_THAT(called, HasSubstr(" -f image2 -pattern_type none -i file:" + supplied.masks + "/000003.png "));
+  supplied.masks = write_masks(64, 40);
+  ASSERT_TRUE(prepare(odd, capture(), supplied));
+  called = bytes_of(folder_ / "calls");
+  EXPECT_THAT(called, HasSubstr("-loglevel info -i file:" + supplied.masks + "/000003.png "));
+}
+
+// Which may be the first video stream; V is none of these.
+TEST_F(PrepareTest, AFilmsCoverIsNotTakenForTheFilm) {
+  PrepareOptions some = options();
+  some.until = Step::frames;
+  ASSERT_TRUE(prepare(some));
+  EXPECT_THAT(bytes_of(folder_ / "calls"), HasSubstr(" -map 0:V:0 "));
+}
+
 TEST_F(PrepareTest, TheSecondCamerasPicturesTestAndNoneOfThemTrains) {
   PrepareOptions two = options();
   two.test_video = folder_ / "second.mp4";
@@ -519,8 +566,21 @@ TEST_F(PrepareTest, ACaptureThatSomethingWasAddedToIsNotReplaced) {
 TEST_F(PrepareTest, WhatIsInTheWayIsLeftAlone) {
   fs::create_directories(capture() / "holiday");
   EXPECT_THAT(refusal(options()), HasSubstr("output folder: found other files in it"));
+  EXPECT_THAT(refusal_of([&] { prepare(capture() / "holiday", capture(), options()); }),
+              HasSubstr("output folder: found other files in it"));
   EXPECT_FALSE(fs::exists(work_folder(capture())));
   EXPECT_TRUE(fs::exists(capture() / "holiday"));
+}
+
+TEST_F(PrepareTest, AnEmptyFolderStandsUntilTheCaptureTakesItsPlace) {
+  fs::create_directory(capture());
+  set_variable("FAIL", "mapper");
+  EXPECT_THAT(refusal(options()), HasSubstr("0 of 14 frames registered"));
+  EXPECT_TRUE(fs::is_directory(capture()) && fs::is_empty(capture()));
+  EXPECT_FALSE(fs::exists(work_folder(capture()) / "trial"));
+  set_variable("FAIL", "");
+  ASSERT_TRUE(prepare(options()));
+  EXPECT_TRUE(fs::exists(capture() / "dataset.json"));
 }
 
 }  // namespace

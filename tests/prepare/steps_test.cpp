@@ -89,5 +89,21 @@ TEST_F(StepsTest, AFileIsAnotherWhenItsBytesOrItsTimeChange) {
   EXPECT_NE(empty, identity_of(folder_ / "d"));
 }
 
+// Notes that a program leaves among the pictures do not make hours of work void.
+TEST_F(StepsTest, AFolderIsAnotherWhenItsPicturesChange) {
+  const std::filesystem::path pictures = folder_ / "d";
+  std::filesystem::create_directory(pictures);
+  for (const char* name : {"9.png", "10.jpg"}) std::ofstream(pictures / name) << name;
+  const auto before = identity_of(pictures);
+  // By letter, as stamps have it that stand.
+  ASSERT_EQ(before.size(), 2U);
+  EXPECT_EQ(before.at(0), identity_of(pictures / "10.jpg"));
+  EXPECT_EQ(before.at(1), identity_of(pictures / "9.png"));
+  for (const char* name : {"masks.log", ".DS_Store", "._9.png"}) std::ofstream(pictures / name) << name;
+  EXPECT_EQ(before, identity_of(pictures));
+  std::ofstream(pictures / "9.png") << "another";
+  EXPECT_NE(before, identity_of(pictures));
+}
+
 }  // namespace
 }  // namespace traceflow::prepare
