@@ -48,10 +48,7 @@ struct WholeScene {
     options.initial.environment_cells =
         static_cast<int>(std::ceil(std::cbrt(static_cast<double>(environment) / 5)));
     scene.main = surfels_at_points(points, options.initial, random);
-    scene.environment = surfels_around(points, shots, options.initial, random);
-    RowEdit first;
-    for (int64_t i = 0; i < std::min(environment, scene.environment.count()); ++i) first.keep(i);
-    edit_rows(scene.environment, first);
+    scene.environment = surfels_around(points, shots, environment, options.initial, random);
     scene.main_field = moving_field(residual::main_outputs, random);
     scene.environment_field = moving_field(residual::environment_outputs, random);
     target.colour = synth_images(synth, seen.front()).colour;

@@ -4,7 +4,6 @@
 
 #include "capture/synth/synth.h"
 #include "render/renderer.h"
-#include "scene/rows.h"
 #include "show/ellipses.h"
 #include "show/probe.h"
 #include "train/initialise.h"
@@ -46,10 +45,7 @@ struct SeenScene {
     options.initial.environment_cells =
         static_cast<int>(std::ceil(std::cbrt(static_cast<double>(environment) / 5)));
     scene.main = surfels_at_points(points, options.initial, random);
-    scene.environment = surfels_around(points, shots, options.initial, random);
-    RowEdit first;
-    for (int64_t i = 0; i < std::min(environment, scene.environment.count()); ++i) first.keep(i);
-    edit_rows(scene.environment, first);
+    scene.environment = surfels_around(points, shots, environment, options.initial, random);
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
     scene.environment_field =
         make_field(options.deform.environment_network, residual::environment_outputs, random);

@@ -11,6 +11,7 @@
 
 #include "base/option_fields.h"
 #include "base/parallel.h"
+#include "base/printable.h"
 #include "base/profile.h"
 #include "base/version.h"
 #include "cli/arguments/help_formatter.h"
@@ -70,7 +71,10 @@ int finish_parse(const CLI::App& program, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return program.exit(error);
   const auto verbs = program.get_subcommands();
   const std::string name = verbs.empty() ? "traceflow" : "traceflow " + verbs.front()->get_name();
-  std::cerr << "traceflow: " << error.what() << "; see `" << name << " --help`" << std::endl;
+  // It quotes what was given.
+  constexpr size_t longest = 1000;
+  std::cerr << "traceflow: " << printable(error.what(), longest) << "; see `" << name << " --help`"
+            << std::endl;
   return exit_input;
 }
 

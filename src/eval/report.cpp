@@ -6,6 +6,8 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "scene/viewpoint.h"
+
 namespace traceflow::eval {
 
 namespace {
@@ -45,7 +47,8 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
   double seconds = 0;
   for (const View& view : views) {
     FrameRequest request = subject.request;
-    request.camera = view.camera;
+    // The capture may have gained views since, and with them another normalisation than the run's.
+    request.camera = carried(view.camera, capture.normalisation, subject.scene.normalisation);
     request.time = view.time;
     const Clock::time_point start = Clock::now();
     const Frame& frame = renderer.forward(subject.scene, request);

@@ -78,6 +78,8 @@ std::optional<std::string> entry(const Safetensors& checkpoint, const std::strin
 
 TrainOptions options_in(const Safetensors& checkpoint) {
   TrainOptions options = preset("paper");
+  // Checkpoints from before this option pruned from the first density control on.
+  options.density.prune_above_from = options.environment_density.prune_above_from = 0;
   options_from_json(checkpoint.text("options"), option_fields(options), "checkpoint");
   return options;
 }

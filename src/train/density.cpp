@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "base/parallel.h"
@@ -30,8 +31,8 @@ void DensityControl::accumulate(const Tensor<float>& signal, const Tensor<uint8_
                AccumulateSignal{signal.data(), touched.data(), sum_.data(), seen_.data()});
 }
 
-std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, const SceneSize& size,
-                                                        int64_t cap, bool& at_cap) const {
+std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, const DensityLimits& limits,
+                                                        bool& at_cap) const {
   Tensor<float> fetched[4];
   const Tensor<float>&log_scale = on_host(surfels.log_scale, fetched[0]),
         &opacity_logit = on_host(surfels.opacity_logit, fetched[1]), &sum = on_host(sum_, fetched[2]),
@@ -39,7 +40,10 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
   const auto mean_signal = [&](int64_t i) { return seen[i] > 0 ? sum[i] / seen[i] : 0; };
   const int64_t count = surfels.count();
   const float faint = std::log(options_.prune_opacity / (1 - options_.prune_opacity));
-  const float widest = std::min(options_.prune_above * size.extent, options_.prune_above_cloud * size.cloud);
+  const SceneSize& size = limits.size;
+  const float widest = limits.prunes_large ? std::min(options_.prune_above * size.extent,
+                                                      options_.prune_above_cloud * size.cloud)
+                                           : std::numeric_limits<float>::max();
   std::vector<Fate> fate(static_cast<size_t>(count), Fate::keep);
   std::vector<int64_t> growing;
   int64_t left = 0;
@@ -57,7 +61,7 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
   }
   // Either way of multiplying adds one surfel; where there is no room for all, those with the largest signal
   // go first.
-  const int64_t room = std::max<int64_t>(0, cap - left);
+  const int64_t room = std::max<int64_t>(0, limits.cap - left);
   const auto share = static_cast<int64_t>(static_cast<double>(options_.growth) * static_cast<double>(count));
   const int64_t allowed = std::min(room, std::max<int64_t>(1, share));
   const auto wanted = static_cast<int64_t>(growing.size());
@@ -74,11 +78,11 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
   return fate;
 }
 
-events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& moments, const SceneSize& size,
-                                              int64_t cap, Random& random) {
+events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& moments,
+                                              const DensityLimits& limits, Random& random) {
   events::DensityChanged change;
   change.set = set_;
-  const std::vector<Fate> fate = fates(surfels, size, cap, change.at_cap);
+  const std::vector<Fate> fate = fates(surfels, limits, change.at_cap);
   const auto each = [&](Fate wanted, auto&& f) {
     int64_t found = 0;
     for (size_t i = 0; i < fate.size(); ++i) {

@@ -17,6 +17,13 @@ struct SceneSize {
   float cloud;   // radius of the capture's points
 };
 
+// What a set is held to at one density control.
+struct DensityLimits {
+  SceneSize size;
+  int64_t cap;               // the most surfels there may be
+  bool prunes_large = true;  // whether those that are too wide go
+};
+
 // Density control of one set of surfels (method §7.7): surfels whose centre gradient is large multiply, the
 // faint and the oversized go, and the count never passes the cap.
 class DensityControl {
@@ -28,9 +35,9 @@ class DensityControl {
   // Adds an iteration's signal (N) of the surfels that it touched (N flags). Asks for no memory.
   void accumulate(const Tensor<float>& signal, const Tensor<uint8_t>& touched);
 
-  // Clones, splits and prunes; forgets the statistics. `cap`: the most surfels there may be. What becomes of
-  // each surfel is decided on the host; rows move where they are.
-  events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, const SceneSize& size, int64_t cap,
+  // Clones, splits and prunes; forgets the statistics. What becomes of each surfel is decided on the host;
+  // rows move where they are.
+  events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, const DensityLimits& limits,
                                 Random& random);
 
   // Lowers every opacity to at most options.opacity_reset and clears that group's moments.
@@ -41,7 +48,7 @@ class DensityControl {
 
  private:
   enum class Fate : uint8_t { keep, clone, split, prune_transparent, prune_large };
-  std::vector<Fate> fates(const Surfels& surfels, const SceneSize& size, int64_t cap, bool& at_cap) const;
+  std::vector<Fate> fates(const Surfels& surfels, const DensityLimits& limits, bool& at_cap) const;
 
   std::string set_;
   DensityOptions options_;

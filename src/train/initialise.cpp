@@ -139,7 +139,7 @@ Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& opt
   return s;
 }
 
-Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views,
+Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views, int64_t limit,
                        const InitialOptions& options, Random& random) {
   Vec3<float> low(0);
   Vec3<float> high(0);
@@ -158,10 +158,19 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
   const Vec3<float> size = options.environment_box * (high - low);
 
   const int cells = options.environment_cells;
-  const int64_t count = static_cast<int64_t>(cells) * cells * cells * options.environment_per_cell;
+  const int64_t places = static_cast<int64_t>(cells) * cells * cells * options.environment_per_cell;
+  const int64_t count = std::min(places, limit);
+  // Where there are more places than surfels, each surfel takes one of its share, at random: an even step
+  // could fall in with the grid.
+  const auto place_of = [&](int64_t i) {
+    if (count == places) return i;
+    const double share = static_cast<double>(places) / static_cast<double>(count);
+    const double place = (static_cast<double>(i) + random.uniform()) * share;
+    return std::min(places - 1, static_cast<int64_t>(place));
+  };
   Surfels s = empty_surfels(count, options.environment_sh_degree, false);
   for (int64_t i = 0; i < count; ++i) {
-    const int64_t cell = i / options.environment_per_cell;
+    const int64_t cell = place_of(i) / options.environment_per_cell;
     const glm::vec<3, int64_t> corner(cell % cells, cell / cells % cells, cell / cells / cells);
     // Braces, because they alone fix the order of the draws.
     const Vec3<float> offset{random.uniform(), random.uniform(), random.uniform()};
@@ -239,8 +248,9 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
 
   if (options.specular == Specular::environment_gaussians) {
-    scene.environment = surfels_around(points, capture.train, options.initial, random);
-    const int64_t room = options.environment_density.max_surfels - scene.environment.count();
+    const int64_t cap = options.environment_density.max_surfels;
+    scene.environment = surfels_around(points, capture.train, cap, options.initial, random);
+    const int64_t room = cap - scene.environment.count();
     const int64_t copies = std::min<int64_t>(options.initial.environment_points, room);
     if (copies > 0 && capture.has_masks) {
       append_rows(scene.environment,

@@ -9,14 +9,14 @@ namespace traceflow {
 
 // The scene that training starts from (method §7.8): main surfels at the capture's points, or, where it has
 // none, at random ones in the views' common sight; environment surfels (or a map) around them, fields at
-// zero. Throws InputError when there is no such place either.
+// zero. No set starts larger than its max_surfels. Throws InputError when there is no such place either.
 Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
 // Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);
 // Surfels drawn uniformly in cells of the box around the points and the cameras, `environment_box` times as
-// large.
-Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views,
+// large. At most `limit` of them, spread over all cells.
+Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& views, int64_t limit,
                        const InitialOptions& options, Random& random);
 
 // Environment surfels at those of the capture's points that lie outside its masks, coloured as the

@@ -67,12 +67,13 @@ TrainOptions cpu_preset() {
   o.density.growth = 0.2F;
   o.density.prune_above = 10;
   o.density.prune_above_cloud = 0.5F;
+  o.density.prune_above_from = 0;
   o.density.opacity_reset_every = 0;
   o.density.max_surfels = 20000;
   o.environment_density.from = 3000;
   o.environment_density.every = 3000;
   o.environment_density.until = 45000;
-  o.environment_density.prune_above = 2;
+  o.environment_density.prune_above_from = 0;
   o.environment_density.prune_opacity = 0.005F;
   o.environment_density.growth = 0.1F;
   o.environment_density.opacity_reset_every = 0;
@@ -132,7 +133,8 @@ void LossOptions::validate() const {
   check_not_negative(normal_prior, "loss.normal_prior");
   check_not_negative(distortion, "loss.distortion");
   check_not_negative(rigidity, "loss.rigidity");
-  check_option(rigidity_strain > 0, "loss.rigidity_strain", rigidity_strain, "a positive number");
+  // Its square is divided by, in single precision.
+  check_option(rigidity_strain >= 1e-6F, "loss.rigidity_strain", rigidity_strain, "1e-6 or more");
   check_not_negative(lpips, "loss.lpips");
   check_not_negative(lpips_from, "loss.lpips_from");
   if (lpips > 0 && lpips_weights.empty()) {
@@ -148,6 +150,10 @@ void DensityOptions::validate(const std::string& group) const {
   check_option(max_surfels > 0, group + ".max_surfels", max_surfels, "a positive number");
   check_option(opacity_reset > 0 && opacity_reset < 1, group + ".opacity_reset", opacity_reset,
                "between 0 and 1");
+  check_option(prune_opacity >= 0 && prune_opacity < 1, group + ".prune_opacity", prune_opacity,
+               "0 to under 1");
+  check_option(prune_above > 0, group + ".prune_above", prune_above, "a positive number");
+  check_option(prune_above_cloud > 0, group + ".prune_above_cloud", prune_above_cloud, "a positive number");
   check_option(growth > 0 && growth <= 1, group + ".growth", growth, "above 0, up to 1");
   check_option(gradient_threshold > 0, group + ".gradient_threshold", gradient_threshold,
                "a positive number");
@@ -182,7 +188,9 @@ void InitialOptions::validate() const {
 void TrainOptions::validate() const {
   check_option(iterations >= 1, "iterations", iterations, "1 or more");
   check_option(save_every >= 1, "save_every", save_every, "1 or more");
-  check_option(memory_budget >= 0, "memory_budget", memory_budget, "0 (automatic) or more MiB");
+  constexpr int64_t pebibyte = int64_t{1} << 30;  // in MiB
+  check_option(memory_budget >= 0 && memory_budget <= pebibyte, "memory_budget", memory_budget,
+               "0 (automatic) to 2^30 MiB");
   capture.validate();
   initial.validate();
   deform.validate();

@@ -131,6 +131,7 @@ struct DensityOptions {
   float prune_opacity = 0.05F;
   float prune_above = 0.1F;
   float prune_above_cloud = 1000;
+  int prune_above_from = 3000;
   int opacity_reset_every = 3000;
   float opacity_reset = 0.01F;
   int max_surfels = 300000;
@@ -139,7 +140,7 @@ struct DensityOptions {
   void visit(Visitor& v) {
     v.field("from", from, "iteration", "First density control.");
     v.field("every", every, "iterations", "Interval of density control.");
-    v.field("until", until, "iteration", "Last density control.");
+    v.field("until", until, "iteration", "Where density control ends.");
     v.field("gradient_threshold", gradient_threshold, "",
             "Mean centre gradient above which a surfel multiplies.");
     v.field("clone_below", clone_below, "extents",
@@ -150,6 +151,7 @@ struct DensityOptions {
     v.field("prune_above", prune_above, "extents", "Surfels wider than this go.");
     v.field("prune_above_cloud", prune_above_cloud, "clouds",
             "Likewise, in radii of the cloud of the capture's points.");
+    v.field("prune_above_from", prune_above_from, "iteration", "From where on the wide ones go.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
             "Interval of opacity resets; 0 for none.");
     v.field("opacity_reset", opacity_reset, "", "Opacity that a reset leaves at most.");
@@ -242,8 +244,10 @@ struct TrainOptions {
   RateOptions rates;
   ScheduleOptions schedule;
   DensityOptions density;
+  // Surroundings are far away and start coarse (method §7.8): a tenth of the cameras' extent would take
+  // nearly all of them before they have trained.
   DensityOptions environment_density{
-      .from = 9000, .every = 500, .gradient_threshold = 1e-4F, .max_surfels = 200000};
+      .from = 9000, .every = 500, .gradient_threshold = 1e-4F, .prune_above = 2, .max_surfels = 200000};
 
   template <class Visitor>
   void visit(Visitor& v) {

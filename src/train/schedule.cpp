@@ -76,12 +76,12 @@ double Schedule::time_jitter(int iteration) const {
   return options_.schedule.time_jitter * (1.0 - static_cast<double>(iteration) / until);
 }
 
-double Schedule::seen_times(int iteration) const {
+double Schedule::latest_time(int iteration, double first, double last) const {
   const int from = mark(options_.schedule.deform_from);
   const int until = mark(options_.schedule.all_times_from);
-  if (iteration >= until) return 1;
+  if (iteration >= until) return last;
   const double grown = static_cast<double>(std::max(0, iteration - from)) / std::max(1, until - from);
-  return std::lerp(static_cast<double>(options_.schedule.first_times), 1.0, grown);
+  return std::lerp(first, last, std::lerp(static_cast<double>(options_.schedule.first_times), 1.0, grown));
 }
 
 bool Schedule::densifies(int iteration, const DensityOptions& density) const {
@@ -99,7 +99,15 @@ bool Schedule::densifies_main(int iteration) const {
 }
 
 bool Schedule::densifies_environment(int iteration) const {
-  return phase(iteration) != Phase::diffuse && densifies(iteration, options_.environment_density);
+  return densifies(iteration, options_.environment_density) && phase(iteration - 1) != Phase::diffuse;
+}
+
+bool Schedule::prunes_large_main(int iteration) const {
+  return iteration > mark(options_.density.prune_above_from);
+}
+
+bool Schedule::prunes_large_environment(int iteration) const {
+  return iteration > mark(options_.environment_density.prune_above_from);
 }
 
 bool Schedule::resets_main_opacity(int iteration) const {

@@ -25,13 +25,16 @@ class Schedule {
   int sh_degree_environment(int iteration) const;
   // Standard deviation of the noise on the time (method §7.6), in frame intervals.
   double time_jitter(int iteration) const;
-  // Share of the capture's duration, from its start, whose views are trained on: motion is followed from
-  // where the surfels start, a little further at a time, instead of being found across the whole capture at
-  // once.
-  double seen_times(int iteration) const;
+  // The latest time, of a capture's from `first` to `last`, whose views are trained on: motion is followed
+  // from where the surfels start, a little further at a time, instead of being found across the whole capture
+  // at once.
+  double latest_time(int iteration, double first, double last) const;
 
+  // What is done to a set after so many iterations. The environment is left alone until it has trained.
   bool densifies_main(int iteration) const;
   bool densifies_environment(int iteration) const;
+  bool prunes_large_main(int iteration) const;
+  bool prunes_large_environment(int iteration) const;
   bool resets_main_opacity(int iteration) const;
   bool resets_environment_opacity(int iteration) const;
 

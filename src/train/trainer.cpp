@@ -76,6 +76,14 @@ TrainOptions with_whole_paths(TrainOptions options) {
   return options;
 }
 
+// The sets start within what they may grow to.
+TrainOptions within(TrainOptions options, const SurfelCaps& caps) {
+  const auto lowered = [](int& cap, int64_t to) { cap = static_cast<int>(std::clamp<int64_t>(to, 1, cap)); };
+  lowered(options.density.max_surfels, caps.main);
+  lowered(options.environment_density.max_surfels, caps.environment);
+  return options;
+}
+
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
 
 std::optional<lpips::Network> network_on(Device device, std::optional<lpips::Network> network) {
@@ -120,7 +128,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       random_(seeded(options.seed)),
       memory_(plan_memory({options_, device, largest_view(capture_)})),
       targets_(device, memory_.image_bytes),
-      scene_(scene_on(device, initial_scene(capture_, options, random_))),
+      scene_(scene_on(device, initial_scene(capture_, within(options, memory_.caps), random_))),
       optimiser_(scene_),
       main_density_("main", options.density, scene_.main.count(), device),
       environment_density_("environment", options.environment_density, scene_.environment.count(), device),
@@ -156,7 +164,7 @@ const View& Trainer::draw_view() {
   const auto [first, last] =
       std::minmax_element(capture_.train.begin(), capture_.train.end(),
                           [](const View& a, const View& b) { return a.time < b.time; });
-  const double latest = first->time + schedule_.seen_times(iteration_) * (last->time - first->time);
+  const double latest = schedule_.latest_time(iteration_, first->time, last->time);
   for (;;) {
     const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
     if (view.time <= latest || view.time == first->time) return view;
@@ -222,15 +230,15 @@ void Trainer::control_density(int done) {
   };
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
-    tell(main_density_.update(scene_.main, optimiser_.main(), size_of_scene(), memory_.caps.main, random_),
-         reset);
+    const DensityLimits limits{size_of_scene(), memory_.caps.main, schedule_.prunes_large_main(done)};
+    tell(main_density_.update(scene_.main, optimiser_.main(), limits, random_), reset);
     bonds_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
     const bool reset = schedule_.resets_environment_opacity(done);
-    tell(environment_density_.update(scene_.environment, optimiser_.environment(), size_of_scene(),
-                                     memory_.caps.environment, random_),
-         reset);
+    const DensityLimits limits{size_of_scene(), memory_.caps.environment,
+                               schedule_.prunes_large_environment(done)};
+    tell(environment_density_.update(scene_.environment, optimiser_.environment(), limits, random_), reset);
   }
   if (schedule_.resets_main_opacity(done)) {
     main_density_.reset_opacity(scene_.main, optimiser_.main());

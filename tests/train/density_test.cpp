@@ -58,7 +58,7 @@ TEST(Density, ClonesSmallSurfelsWithAStrongSignal) {
   DensityControl control("main", options(), 10);
   signal(control, 10, {3, 7});
   Random random(1);
-  const events::DensityChanged change = control.update(set.surfels, set.moments, size, 1000, random);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, {size, 1000}, random);
   EXPECT_EQ(change.cloned, 2);
   EXPECT_EQ(change.split, 0);
   EXPECT_EQ(set.surfels.count(), 12);
@@ -77,8 +77,17 @@ TEST(Density, PrunesWhatIsWideForTheCamerasOrForTheCloud) {
     set.surfels.log_scale(3, 1) = set.surfels.log_scale(1, 0) = std::log(0.02F);
     set.surfels.log_scale(1, 1) = std::log(0.02F);
     Random random(1);
-    EXPECT_EQ(control.update(set.surfels, set.moments, small, 1000, random).pruned_large, 4);
+    EXPECT_EQ(control.update(set.surfels, set.moments, {small, 1000}, random).pruned_large, 4);
   }
+}
+
+TEST(Density, PrunesTheWideOnlyWhenItIsTold) {
+  Set set(5, 0.5F, 0.5F);
+  DensityControl control("main", options(), 5);
+  set.surfels.log_scale(3, 0) = set.surfels.log_scale(3, 1) = std::log(0.02F);
+  Random random(1);
+  EXPECT_EQ(control.update(set.surfels, set.moments, {size, 1000, false}, random).pruned_large, 0);
+  EXPECT_EQ(control.update(set.surfels, set.moments, {size, 1000, true}, random).pruned_large, 4);
 }
 
 TEST(Density, SplitsLargeSurfelsIntoTwoSmallerOnesInTheirPlane) {
@@ -86,7 +95,7 @@ TEST(Density, SplitsLargeSurfelsIntoTwoSmallerOnesInTheirPlane) {
   DensityControl control("main", options(), 5);
   signal(control, 5, {2});
   Random random(1);
-  const events::DensityChanged change = control.update(set.surfels, set.moments, size, 1000, random);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, {size, 1000}, random);
   EXPECT_EQ(change.split, 1);
   ASSERT_EQ(set.surfels.count(), 6);
   for (const int64_t child : {4, 5}) {
@@ -102,7 +111,7 @@ TEST(Density, NewSurfelsHaveZeroMomentsAndOldOnesKeepTheirs) {
   DensityControl control("main", options(), 4);
   signal(control, 4, {0});
   Random random(1);
-  control.update(set.surfels, set.moments, size, 1000, random);
+  control.update(set.surfels, set.moments, {size, 1000}, random);
   set.moments.for_each([](const char* name, optimize::AdamState& state) {
     const int64_t row = state.first.row_size();
     for (int64_t k = 0; k < row; ++k) {
@@ -120,7 +129,7 @@ TEST(Density, PrunesTheFaintTheOversizedAndTheBroken) {
   set.surfels.opacity_logit[3] = std::nanf("");
   DensityControl control("main", options(), 6);
   Random random(1);
-  const events::DensityChanged change = control.update(set.surfels, set.moments, size, 1000, random);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, {size, 1000}, random);
   EXPECT_EQ(change.pruned_transparent, 2);
   EXPECT_EQ(change.pruned_large, 1);
   ASSERT_EQ(set.surfels.count(), 3);
@@ -134,7 +143,7 @@ TEST(Density, TheCapHoldsAndTheStrongestSignalsGoFirst) {
   DensityControl control("main", options(), 10);
   signal(control, 10, {1, 2, 3, 4, 5});
   Random random(1);
-  const events::DensityChanged change = control.update(set.surfels, set.moments, size, 12, random);
+  const events::DensityChanged change = control.update(set.surfels, set.moments, {size, 12}, random);
   EXPECT_TRUE(change.at_cap);
   EXPECT_EQ(change.cloned, 2);
   ASSERT_EQ(set.surfels.count(), 12);
@@ -145,7 +154,7 @@ TEST(Density, NeverEmptiesASet) {
   Set set(3, 0.02F, 0.001F);
   DensityControl control("main", options(), 3);
   Random random(1);
-  control.update(set.surfels, set.moments, size, 100, random);
+  control.update(set.surfels, set.moments, {size, 100}, random);
   EXPECT_EQ(set.surfels.count(), 3);
 }
 
@@ -159,7 +168,7 @@ TEST(Density, SignalsThatWereNotTouchedOrNotFiniteDoNotCount) {
   touched[1] = 1;
   control.accumulate(value, touched);
   Random random(1);
-  EXPECT_EQ(control.update(set.surfels, set.moments, size, 100, random).cloned, 0);
+  EXPECT_EQ(control.update(set.surfels, set.moments, {size, 100}, random).cloned, 0);
 }
 
 TEST(Density, OpacityResetLowersTheLogitAndForgetsItsMoments) {

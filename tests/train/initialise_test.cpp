@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -101,7 +102,7 @@ TEST(Initialise, TheEnvironmentFillsItsBoxEvenly) {
   options.environment_per_cell = 3;
   options.environment_box = 2;
   Random random(1);
-  const Surfels s = surfels_around(plane.points, {view}, options, random);
+  const Surfels s = surfels_around(plane.points, {view}, 1000, options, random);
   ASSERT_EQ(s.count(), 4 * 4 * 4 * 3);
   EXPECT_FALSE(s.has_tint());
   float low = 1e9F;
@@ -112,6 +113,31 @@ TEST(Initialise, TheEnvironmentFillsItsBoxEvenly) {
   }
   EXPECT_LT(low, -2);
   EXPECT_GT(high, 0.2F);
+}
+
+TEST(Initialise, AnEnvironmentWithALimitIsSpreadOverItsBox) {
+  const Plane plane(9);
+  View view;
+  view.camera.position = {0, 0, -2};
+  InitialOptions options;
+  options.environment_cells = 4;
+  options.environment_per_cell = 1000000000;
+  Random random(1);
+  const Surfels s = surfels_around(plane.points, {view}, 64, options, random);
+  ASSERT_EQ(s.count(), 64);
+  // As many cells as surfels: one in each.
+  Vec3<float> low(1e9F), high(-1e9F);
+  for (int64_t i = 0; i < s.count(); ++i) {
+    low = glm::min(low, load3<float>(s.position.row(i)));
+    high = glm::max(high, load3<float>(s.position.row(i)));
+  }
+  std::set<std::array<int, 3>> cells;
+  for (int64_t i = 0; i < s.count(); ++i) {
+    // The outermost surfels are within a cell of the box's sides.
+    const Vec3<float> place = (load3<float>(s.position.row(i)) - low) / (high - low) * 3.999F;
+    cells.insert({static_cast<int>(place.x), static_cast<int>(place.y), static_cast<int>(place.z)});
+  }
+  EXPECT_GT(cells.size(), 40U);
 }
 
 TEST(Neighbours, AgreeWithABruteForceSearch) {

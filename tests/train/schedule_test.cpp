@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 namespace traceflow {
 namespace {
 
@@ -40,11 +42,23 @@ TEST(Schedule, TimesAreReachedInProportion) {
   o.schedule.first_times = 0.1F;
   o.schedule.all_times_from = 33000;
   const Schedule schedule(o);
-  EXPECT_FLOAT_EQ(static_cast<float>(schedule.seen_times(0)), 0.1F);
-  EXPECT_FLOAT_EQ(static_cast<float>(schedule.seen_times(3000)), 0.1F);
-  EXPECT_FLOAT_EQ(static_cast<float>(schedule.seen_times(18000)), 0.55F);
-  EXPECT_EQ(schedule.seen_times(33000), 1);
-  EXPECT_EQ(Schedule(TrainOptions{}).seen_times(0), 1) << "the paper trains on all times from the start";
+  EXPECT_NEAR(schedule.latest_time(0, 0, 1), 0.1, 1e-6);
+  EXPECT_NEAR(schedule.latest_time(3000, 0, 1), 0.1, 1e-6);
+  EXPECT_NEAR(schedule.latest_time(18000, 0, 1), 0.55, 1e-6);
+  EXPECT_NEAR(schedule.latest_time(18000, 0.2, 0.8), 0.53, 1e-6);
+  EXPECT_EQ(schedule.latest_time(33000, 0, 1), 1);
+  EXPECT_EQ(Schedule(TrainOptions{}).latest_time(0, 0, 1), 1)
+      << "the paper trains on all times from the start";
+}
+
+TEST(Schedule, TheLastTimeIsReachedWhateverTheFirstIs) {
+  const Schedule paper_schedule(paper()), short_schedule(preset("cpu"));
+  for (int photographs = 2; photographs < 400; ++photographs) {
+    const float first = 1.0F / static_cast<float>(photographs);
+    const int last_iteration = preset("cpu").iterations - 1;
+    EXPECT_GE(paper_schedule.latest_time(0, first, 1.0F), 1.0F) << first;
+    EXPECT_GE(short_schedule.latest_time(last_iteration, first, 1.0F), 1.0F) << first;
+  }
 }
 
 TEST(Schedule, ThePerceptualTermIsLateAndOffWithoutAWeight) {
@@ -97,7 +111,10 @@ TEST(Schedule, DensityControlRunsAsTheMethodSays) {
   EXPECT_TRUE(s.densifies_main(600));
   EXPECT_FALSE(s.densifies_main(10000)) << "frozen in phase 2";
   EXPECT_FALSE(s.densifies_environment(8500));
+  EXPECT_FALSE(s.densifies_environment(9000)) << "it has not trained yet";
   EXPECT_TRUE(s.densifies_environment(9500));
+  EXPECT_FALSE(s.prunes_large_main(3000)) << "as 2DGS: after the first reset of opacities";
+  EXPECT_TRUE(s.prunes_large_main(3100));
   EXPECT_TRUE(s.resets_main_opacity(3000));
   EXPECT_FALSE(s.resets_main_opacity(3100));
 }
@@ -108,14 +125,23 @@ TEST(Options, EveryPresetIsValid) {
 }
 
 TEST(Options, NonsenseIsRefusedByName) {
-  TrainOptions options = paper();
-  options.schedule.length = 0;
-  try {
-    options.validate();
-    FAIL() << "accepted";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("schedule.length"), std::string::npos) << error.what();
-  }
+  const auto expect_refused = [](const std::string& name, const std::function<void(TrainOptions&)>& spoil) {
+    TrainOptions options = paper();
+    spoil(options);
+    try {
+      options.validate();
+      FAIL() << name << " accepted";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
+    }
+  };
+  expect_refused("schedule.length", [](TrainOptions& o) { o.schedule.length = 0; });
+  expect_refused("density.prune_opacity", [](TrainOptions& o) { o.density.prune_opacity = 1; });
+  expect_refused("density.prune_above", [](TrainOptions& o) { o.density.prune_above = 0; });
+  expect_refused("environment_density.prune_above_cloud",
+                 [](TrainOptions& o) { o.environment_density.prune_above_cloud = -1; });
+  expect_refused("loss.rigidity_strain", [](TrainOptions& o) { o.loss.rigidity_strain = 1e-12F; });
+  expect_refused("memory_budget", [](TrainOptions& o) { o.memory_budget = int64_t{1} << 43; });
 }
 
 }  // namespace

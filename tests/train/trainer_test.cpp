@@ -355,6 +355,61 @@ TEST(Trainer, ACheckpointNamesTheWeightsByTheirWholePath) {
   EXPECT_TRUE(fs::path(trainer.options().loss.lpips_weights).is_absolute());
 }
 
+// What starts uniformly in its box is coarse: a bound that is meant for what photographs show would take
+// nearly all of it before it has trained.
+TEST(Trainer, TheSurroundingsOfThePaperOutliveTheirFirstDensityControl) {
+  const TrainOptions options = preset("paper");
+  Random random(1);
+  const Capture capture = load_capture(capture_folder(), options.capture);
+  Scene scene = initial_scene(capture, options, random);
+  ASSERT_EQ(scene.environment.count(), 163840);
+  SurfelMoments moments;
+  moments.reset_like(scene.environment);
+  DensityControl control("environment", options.environment_density, scene.environment.count());
+  // Of a camera that moves by a fraction of what it sees, as one in a hand does.
+  const float cloud = cloud_radius(capture.points);
+  control.update(scene.environment, moments, {{cloud / 6, cloud}, options.environment_density.max_surfels},
+                 random);
+  EXPECT_GT(scene.environment.count(), 0.99 * 163840);
+}
+
+TEST(Trainer, NoSetStartsLargerThanItMayGrow) {
+  TrainOptions options = preset("paper");
+  options.density.max_surfels = 100;
+  options.environment_density.max_surfels = 50;
+  options.initial.environment_points = 20;
+  const Trainer asked = make_trainer(options, "caps_asked");
+  EXPECT_EQ(asked.scene().main.count(), 100);
+  EXPECT_EQ(asked.scene().environment.count(), 50);
+
+  options = preset("paper");
+  options.capture.cache_mebibytes = 1;
+  options.memory_budget = 400;
+  Trainer dealt = make_trainer(options, "caps_dealt");
+  EXPECT_LT(dealt.scene().environment.count(), 163840);
+  int64_t told = 0;
+  dealt.stream().listen([&](const events::Event& event) {
+    if (const auto* start = std::get_if<events::Started>(&event)) told = start->forecast_bytes;
+  });
+  const std::atomic<bool> at_once{true};
+  dealt.run(at_once);
+  EXPECT_GT(told, 0);
+  EXPECT_LE(told, int64_t{400} << 20);
+}
+
+TEST(Memory, AnEnvironmentMapCounts) {
+  TrainOptions options = preset("paper");
+  options.specular = Specular::none;
+  const int64_t none = unlimited_forecast({options, Device::cpu, 3000});
+  options.specular = Specular::environment_map;
+  const int64_t map = unlimited_forecast({options, Device::cpu, 3000});
+  options.initial.map_size = 1024;
+  const int64_t large = unlimited_forecast({options, Device::cpu, 3000});
+  const NetworkOptions& network = options.deform.environment_network;
+  EXPECT_GT(map - none, int64_t{3000} * 4 * network.width * network.depth) << "the field at every pixel";
+  EXPECT_GT(large - map, int64_t{6} * 1024 * 1024 * 3 * 4 * 4) << "parameter, gradient and moments";
+}
+
 TEST(Memory, TheLargestViewOfEitherSplitCounts) {
   Capture capture;
   const auto add = [](std::vector<View>& split, int width, int height) {

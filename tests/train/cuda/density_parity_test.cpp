@@ -58,7 +58,7 @@ Edited edited(Device device) {
   Tensor<uint8_t> touched({count});
   touched.fill(1);
   density.accumulate(signal.on(device), touched.on(device));
-  e.change = density.update(e.surfels, e.moments, {.extent = 10, .cloud = 1}, 400, random);
+  e.change = density.update(e.surfels, e.moments, {{.extent = 10, .cloud = 1}, 400}, random);
   density.reset_opacity(e.surfels, e.moments);
   return e;
 }
