@@ -49,6 +49,12 @@ show::Layer layer_named(const std::string& name) {
   return layers[0];
 }
 
+// The system may promise memory that is not there, and then end the program: a training, perhaps.
+void check_memory_for(const FrameRequest& request, const Stage& stage) {
+  const int64_t wanted = bytes_per_pixel * request.camera.width * request.camera.height;
+  if (stage.scene.device() == Device::cpu && wanted > memory_available() / 2) throw std::bad_alloc();
+}
+
 Json vector_json(const Vec3<float>& v) { return to_json(Vec3<double>(v)); }
 
 Json to_json(int64_t id, const std::optional<show::ProbeResult>& found) {
@@ -147,6 +153,7 @@ Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request
 void Projector::answer(const Job& job, const FrameJob& frame, const Stage& stage) {
   const Clock::time_point start = Clock::now();
   const FrameRequest request = request_for(frame.look, stage, frame.coarseness.divisor);
+  check_memory_for(request, stage);
   const std::string bytes =
       jpeg_bytes(picture(frame.look, request, stage, painters_[job.guest]), frame.coarseness.quality);
   const double seconds = seconds_since(start);
@@ -164,13 +171,11 @@ void Projector::answer(const Job& job, const FrameJob& frame, const Stage& stage
 }
 
 void Projector::answer(const Job& job, const StillJob& still, const Stage& stage) {
-  // The system may promise memory that is not there, and then end the program: a training, perhaps.
-  const int64_t wanted = bytes_per_pixel * still.still.width * still.still.height;
-  if (stage.scene.device() == Device::cpu && wanted > memory_available() / 2) throw std::bad_alloc();
   Look look = still.look;
   look.width = still.still.width;
   look.height = still.still.height;
   const FrameRequest request = request_for(look, stage, 1);
+  check_memory_for(request, stage);
   // A copy: the page's ranges stay as they are.
   show::Painter painter = painters_[job.guest];
   const std::string bytes = png_bytes(picture(look, request, stage, painter));

@@ -10,6 +10,7 @@
 
 #include "capture/synth/synth.h"
 #include "cli/program_call.h"
+#include "cli/runs/loaded_scene.h"
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/png.h"
@@ -199,6 +200,22 @@ TEST_F(See, PathsOfEveryKind) {
   EXPECT_EQ(shape(), (Shape{24, 40, 3}));
   EXPECT_EQ(frames({"--orbit", "--frames", "2", "--size", "30x20"}), 2U);
   EXPECT_EQ(shape(), (Shape{20, 30, 3}));
+}
+
+TEST_F(See, ARunThatWasExportedIntoItsFolderIsStillARun) {
+  fs::copy(folder() / "run", folder() / "exported", fs::copy_options::recursive);
+  ASSERT_EQ(run_with({"export", path("exported"), "-o", path("exported")}).code, exit_done);
+  ASSERT_TRUE(fs::exists(folder() / "exported/main.ply"));
+  EXPECT_TRUE(load_scene(folder() / "exported", "").run);
+  EXPECT_FALSE(load_scene(folder() / "exported/main.ply", "").run);
+  EXPECT_FALSE(load_scene(folder() / "exported", path("exported/main.ply")).run) << "a .ply reflects another";
+  // A .ply alone would not know of the capture.
+  const Outcome made = run_with({"render", path("exported"), "-o", path("of_exported")});
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  EXPECT_EQ(names_in(folder() / "of_exported/rgb").size(), 2U);
+  fs::remove(folder() / "exported/checkpoint.safetensors");
+  fs::remove(folder() / "exported/checkpoint.previous.safetensors");
+  EXPECT_FALSE(load_scene(folder() / "exported", "").run);
 }
 
 TEST_F(See, FlagsThatContradictEachOtherAreRefusedInWords) {

@@ -224,6 +224,31 @@ TEST(Projector, SaysInWordsWhatItCannotShow) {
   EXPECT_TRUE(s.page.of("frame").empty());
 }
 
+// Were one begun, it would be refused for its layer, and not for its size.
+TEST(Projector, DoesNotBeginAPictureForWhichThereIsNoMemory) {
+  Screening s("memory");
+  const int side = 100'000'000;
+  Look huge;
+  huge.id = 1;
+  huge.camera = Viewpoint{};
+  huge.width = huge.height = side;
+  huge.layer = "smell";
+  s.projector.answer(Job{1, StillJob{huge, Still{2, side, side}}}, s.stage());
+  ASSERT_EQ(s.page.of("refused").size(), 1U);
+  EXPECT_THAT(s.page.of("refused").at(0).json["text"].get<std::string>(), ::testing::StartsWith("No memory"));
+  EXPECT_FALSE(s.audience.anybody_lacks_memory());
+
+  s.projector.answer(Job{1, FrameJob{huge, Coarseness{}}}, s.stage());
+  EXPECT_EQ(s.page.of("refused").size(), 1U) << "coarser frames come in its place";
+  EXPECT_THAT(s.page.of("trouble").at(0).json["text"].get<std::string>(), ::testing::StartsWith("No memory"));
+  EXPECT_TRUE(s.audience.anybody_lacks_memory());
+
+  // It is the frame's size that counts, not the Look's.
+  huge.layer = "rgb";
+  s.projector.answer(Job{1, FrameJob{huge, Coarseness{side / 20.0, 75, false}}}, s.stage());
+  EXPECT_EQ(s.page.of("frame").at(0).json["width"], 20);
+}
+
 // Another page's frames do not change what this one sees, nor does having looked before.
 TEST(Projector, RemembersNothingThatChangesAPicture) {
   Screening s("remembers");

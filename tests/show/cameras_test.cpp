@@ -74,14 +74,32 @@ TEST_F(CameraFile, NamesFallBackToIdAndPlace) {
   EXPECT_EQ(shots[1].name, "00001");
 }
 
+// 3DGS and 2DGS list test and training views of NeRF-synthetic scenes together, by the stems of their files.
+TEST_F(CameraFile, NamesThatComeAgainGetTheirIdsOrPlaces) {
+  const auto camera = [](const std::string& head) {
+    return with(turned_camera, "\"id\": 4, \"img_name\": \"b/view\",", head);
+  };
+  write("[" + camera("\"id\": 0, \"img_name\": \"r_0\",") + "," +
+        camera("\"id\": 1, \"img_name\": \"r_1\",") + "," + camera("\"id\": 200, \"img_name\": \"r_0\",") +
+        "," + camera("\"img_name\": \"r_0\",") + "," + camera("\"id\": \"left\", \"img_name\": \"r_0\",") +
+        "," + camera("\"id\": 5, \"img_name\": \"r_0_200\",") + "]");
+  std::vector<std::string> names;
+  for (const Shot& shot : read_cameras(file_, {})) names.push_back(shot.name);
+  EXPECT_THAT(names, testing::ElementsAre("r_0", "r_1", "r_0_200", "r_0_00003", "r_0_left", "r_0_200_5"));
+}
+
 TEST_F(CameraFile, BadInputIsRefusedByName) {
+  const std::string nameless = with(turned_camera, "\"img_name\": \"b/view\",", "");
   const std::vector<std::pair<std::string, std::string>> cases = {
       {"", "not JSON"},
       {"{}", "list of cameras"},
       {"[]", "at least one"},
       {"[3]", "[0]: found 3, expected an object"},
       {std::string(100000, '['), "64 deep"},
-      {"[" + turned_camera + "," + turned_camera + "]", "second time"},
+      {"[" + nameless + "," + nameless + "]", "[1]: found 4 a second time, expected names that differ"},
+      {"[" + turned_camera + "," + turned_camera + "," + turned_camera + "]", "[2]: found b/view_4 a second"},
+      {"[" + turned_camera + "," + with(turned_camera, "4", "\"../../view\"") + "]", "[1].img_name"},
+      {"[" + turned_camera + "," + with(turned_camera, "4", "4.5") + "]", "[1].id"},
       {"[" + with(turned_camera, "\"fx\": 50,", "") + "]", "fx"},
       {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": 0") + "]", "fx"},
       {"[" + with(turned_camera, "\"fx\": 50", "\"fx\": \"50\"") + "]", "fx"},

@@ -7,6 +7,7 @@
 
 #include "base/robust.h"
 #include "capture/diagnosis/checks.h"
+#include "capture/formats/image_names.h"
 #include "capture/image_cache.h"
 
 namespace traceflow {
@@ -21,7 +22,8 @@ constexpr double jump_stops = 0.75;    // from one picture to the next,
 constexpr double jump_steps = 6;       // and in median steps
 constexpr double frozen_share = 0.05;  // of the median difference between one picture and the next
 
-// One camera's views of both splits in the order of time, those that could not be read left out.
+// One camera's views of both splits in the order of time, and at one time in that of a film's numbers; those
+// that could not be read left out.
 using Sequence = std::vector<const ViewFacts*>;
 
 std::vector<Sequence> sequences(const Capture& capture, const std::vector<ViewFacts>& facts) {
@@ -34,7 +36,8 @@ std::vector<Sequence> sequences(const Capture& capture, const std::vector<ViewFa
   std::vector<Sequence> result;
   for (auto& [camera, sequence] : by_camera) {
     std::stable_sort(sequence.begin(), sequence.end(), [](const ViewFacts* a, const ViewFacts* b) {
-      return std::pair(a->view->time, a->view->id) < std::pair(b->view->time, b->view->id);
+      if (a->view->time != b->view->time) return a->view->time < b->view->time;
+      return natural_less(a->view->id, b->view->id);
     });
     if (sequence.size() >= fewest_views) result.push_back(std::move(sequence));
   }

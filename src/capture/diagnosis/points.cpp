@@ -66,7 +66,9 @@ void tell_unseen(const Sighting& sighting, Findings& findings) {
     finding.value = sighting.behind;
     finding.threshold = behind_share;
   }
-  if (sighting.unseen - sighting.behind > unseen_share && !is_told("points-unseen")) {
+  // Where those behind are so many by themselves, they have been told.
+  const bool are_behind = sighting.behind > unseen_share;
+  if (sighting.unseen > unseen_share && !are_behind && !is_told("points-unseen")) {
     Finding& finding = findings.emplace_back(
         fmt::format("{:.0f}% of the points fall into no training image", 100 * sighting.unseen),
         "points-unseen", Severity::notice);

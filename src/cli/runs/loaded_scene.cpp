@@ -1,11 +1,15 @@
 #include "cli/runs/loaded_scene.h"
 
+#include "scene/run_folder.h"
+
 namespace traceflow::cli {
 
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
   if (std::filesystem::is_regular_file(path))
     return {show::read_ply_subject(path, environment), std::nullopt};
-  if (std::filesystem::is_regular_file(path / "main.ply")) {
+  // A run that was exported into its own folder is more than that one moment of it.
+  const bool is_taken_for_run = environment.empty() && RunFolder{path}.holds_a_run();
+  if (!is_taken_for_run && std::filesystem::is_regular_file(path / "main.ply")) {
     return {show::read_ply_subject(path / "main.ply", environment), std::nullopt};
   }
   if (!std::filesystem::exists(path)) {

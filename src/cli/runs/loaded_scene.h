@@ -13,7 +13,8 @@ struct LoadedScene {
   std::optional<TrainedRun> run;
 };
 
-// A run's folder, a .ply or a folder that export wrote. environment: a .ply's own, or empty.
+// A run's folder, a .ply or a folder that export wrote; a folder that is both is the run's. environment: a
+// .ply's own, with which such a folder is the export's, or empty.
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment);
 
 // The capture in `folder`; of a run the one that it was trained on, where that is empty. downscale 0: the

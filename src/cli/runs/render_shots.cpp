@@ -20,6 +20,10 @@ namespace {
 constexpr int usual_frames = 120;
 constexpr std::pair<int, int> usual_size = {640, 360};
 
+[[noreturn]] void refuse(const char* option, const std::string& found, const std::string& expected) {
+  throw InputError("option", option, found, expected);
+}
+
 // "640x360".
 std::pair<int, int> parse_size(const std::string& text) {
   int width = 0, height = 0;
@@ -123,12 +127,14 @@ class Chooser {
   // By its id, of either split, or by its place in the split's list.
   const View& view_to_freeze() {
     const std::string split = a_.split.empty() ? "test" : a_.split;
-    const std::vector<View>& views = views_of(capture(), split);
-    for (const std::vector<View>* list : {&views, &capture().test, &capture().train}) {
+    const std::vector<View>& first = split == "train" ? capture().train : capture().test;
+    for (const std::vector<View>* list : {&first, &capture().test, &capture().train}) {
       const auto found =
           std::find_if(list->begin(), list->end(), [&](const View& v) { return v.id == a_.freeze_camera; });
       if (found != list->end()) return *found;
     }
+    // Only now: a capture without test views has training views to freeze.
+    const std::vector<View>& views = views_of(capture(), split);
     const std::string& text = a_.freeze_camera;
     size_t index = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), index);
@@ -140,12 +146,17 @@ class Chooser {
     return views[index];
   }
 
-  // Of all times of the capture, the view that was taken from nearest to the camera.
+  static bool has_size_of(const Camera<float>& a, const Camera<float>& b) {
+    return a.width == b.width && a.height == b.height;
+  }
+
+  // Of all times of the capture, the view that was taken from nearest to the camera: of its size, where there
+  // is one, as no other can stand beside its picture.
   std::map<float, const View*> moments(const Camera<float>& camera) {
     std::map<float, const View*> nearest;
     const auto away = [&](const View* view) {
       const Vec3<float> d = view->camera.position - camera.position;
-      return dot(d, d);
+      return std::pair(!has_size_of(view->camera, camera), dot(d, d));
     };
     for (const std::vector<View>* views : {&capture().test, &capture().train}) {
       for (const View& view : *views) {
@@ -154,6 +165,16 @@ class Chooser {
       }
     }
     return nearest;
+  }
+
+  // Said before anything is rendered.
+  static void check_beside(const View& view, const Camera<float>& camera) {
+    if (has_size_of(view.camera, camera)) return;
+    const Camera<float>& other = view.camera;
+    refuse(
+        "compare", fmt::format("{} of {}×{} at time {:.3f}", view.id, other.width, other.height, view.time),
+        fmt::format("a photograph of {}×{}, the frozen camera's size: leave --compare out, or freeze another",
+                    camera.width, camera.height));
   }
 
   void frozen(ChosenShots& chosen) {
@@ -171,7 +192,9 @@ class Chooser {
     }
     for (const auto& [time, view] : times) {
       add(time);
-      if (a_.compare) chosen.photographs.push_back(*view);
+      if (!a_.compare) continue;
+      check_beside(*view, camera);
+      chosen.photographs.push_back(*view);
     }
   }
 
@@ -179,10 +202,6 @@ class Chooser {
   const LoadedScene& scene_;
   std::optional<Capture> capture_;
 };
-
-[[noreturn]] void refuse(const char* option, const std::string& found, const std::string& expected) {
-  throw InputError("option", option, found, expected);
-}
 
 }  // namespace
 

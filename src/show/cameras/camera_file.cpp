@@ -21,13 +21,22 @@ std::vector<JsonField> cameras_in(const JsonFile& file) {
   return cameras;
 }
 
-std::string name_of(const JsonField& entry, size_t index) {
-  if (entry.has("img_name")) return entry["img_name"].text();
-  if (!entry.has("id")) return fmt::format("{:05}", index);
+// Of an entry that has none, its place.
+std::string id_of(const JsonField& entry, size_t place) {
+  if (!entry.has("id")) return fmt::format("{:05}", place);
   const JsonField id = entry["id"];
   if (id.json().is_string()) return id.text();
   if (!id.json().is_number_integer()) id.expect("a whole number or a string");
   return id.json().dump();
+}
+
+// 3DGS and 2DGS put test and training views into one list, under the bare names of their images: of a
+// NeRF-synthetic scene both splits have an r_0.
+std::string name_of(const JsonField& entry, size_t place, const std::set<std::string>& taken) {
+  if (!entry.has("img_name")) return id_of(entry, place);
+  std::string name = entry["img_name"].text();
+  if (taken.contains(name)) name += "_" + id_of(entry, place);
+  return name;
 }
 
 Shot read_shot(const JsonField& entry, const SceneNormalisation& normalisation) {
@@ -68,7 +77,7 @@ std::vector<Shot> read_cameras(const std::filesystem::path& path, const SceneNor
   std::set<std::string> names;
   for (const JsonField& entry : cameras_in(file)) {
     Shot shot = read_shot(entry, normalisation);
-    shot.name = name_of(entry, shots.size());
+    shot.name = name_of(entry, shots.size(), names);
     check_name(path.string(), fmt::format("[{}].img_name", shots.size()), shot.name);
     if (!names.insert(shot.name).second) entry.fail(shot.name + " a second time", "names that differ");
     shots.push_back(std::move(shot));

@@ -54,9 +54,17 @@ Aim aim_of(const std::vector<Camera<float>>& cameras) {
     b += project * (V(c.position) - aim.middle);
   }
   aim.target = aim.middle + inverse(a) * b;
-  double ahead = 0;
-  for (const Camera<float>& c : cameras) ahead += dot(aim.target - V(c.position), axis_of(c, 2));
-  if (!(ahead > 0) || !std::isfinite(ahead)) aim.target = aim.middle + aim.spread * aim.forward;
+  // Of cameras at one place, or with parallel axes, it is their own place, which rounding puts a little
+  // before or behind them: by less than this share of their distance from the origin, which bounds both the
+  // size of their numbers and how far they stand from each other.
+  constexpr double rounding = 1e-6;
+  double ahead = 0, farthest = 0;
+  for (const Camera<float>& c : cameras) {
+    ahead += dot(aim.target - V(c.position), axis_of(c, 2));
+    farthest = std::max(farthest, length(V(c.position)));
+  }
+  const double least = rounding * farthest * static_cast<double>(cameras.size());
+  if (!(ahead > least) || !std::isfinite(ahead)) aim.target = aim.middle + aim.spread * aim.forward;
   return aim;
 }
 

@@ -28,7 +28,7 @@ struct Aim {
   Vec3<double> up{0, -1, 0};      // unit; likewise
   double spread = 1;              // largest distance of a camera from the middle, at least 1
   // The point nearest to all optical axes in the least-squares sense; `spread` ahead of the middle where
-  // there is none before them.
+  // there is none before them, as of cameras at one place or with parallel axes.
   Vec3<double> target{0};
 };
 // There must be a camera.

@@ -101,7 +101,8 @@ class Map {
     }
     for (const auto* split : {&capture_.train, &capture_.test}) {
       for (const View& view : *split) {
-        if (marks_.contains(view.id)) continue;
+        const auto mark = marks_.find(view.id);
+        if (mark != marks_.end() && mark->second == apart_kind) continue;
         const Vec2<double> at = flat(Vec3<double>(view.camera.position));
         low_ = min(low_, at);
         high_ = max(high_, at);

@@ -16,8 +16,9 @@ struct MapViews {
 MapViews map_views(const Capture& capture);
 
 // Cameras as dots with the direction that they look in, and points, without perspective, size pixels. Marked
-// cameras have a red ring, test ones a white square. The picture holds the cameras that are not marked and
-// nine tenths of the points that a quarter of the training views see; cameras outside stand at its border.
+// cameras have a red ring, test ones a white square. The picture holds the cameras that are not marked as
+// standing apart and nine tenths of the points that a quarter of the training views see; cameras outside
+// stand at its border.
 Tensor<uint8_t> camera_map(const Capture& capture, const Marks& marks, const MapAxes& axes,
                            const std::string& title, const Pixel& size);
 

@@ -10,13 +10,17 @@ namespace {
 constexpr Pixel map_size{(picture_width - picture_gap) / 2, 460};
 constexpr int64_t legend_height = 26;
 
-// A finding about many views says nothing of any one of them.
+// A finding about many views says nothing of any one of them. Of several about one view the first is told,
+// but that it stands apart before all others, as the maps go by it.
 Marks marks_of(const Capture& capture, const std::vector<Finding>& findings) {
   const size_t few = 1 + (capture.train.size() + capture.test.size()) / 4;
   Marks marks;
   for (const Finding& finding : findings) {
     if (finding.views.size() > few) continue;
-    for (const std::string& id : finding.views) marks.emplace(id, finding.kind);
+    for (const std::string& id : finding.views) {
+      const auto [mark, is_new] = marks.emplace(id, finding.kind);
+      if (!is_new && finding.kind == apart_kind) mark->second = finding.kind;
+    }
   }
   return marks;
 }

@@ -22,5 +22,7 @@ inline Ink time_ink(float time) {
 
 // View id → the kind of what was found about it.
 using Marks = std::map<std::string, std::string>;
+// Of cameras that stand apart from the others.
+inline constexpr const char* apart_kind = "camera-apart";
 
 }  // namespace traceflow::show

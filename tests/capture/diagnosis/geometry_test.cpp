@@ -133,6 +133,36 @@ TEST(Points, many_that_nobody_sees) {
   EXPECT_EQ(sight.behind, 0);
 }
 
+// Parallel cameras in a line and a hundred points: so many behind them all, so many above their pictures, and
+// in each picture what is left.
+Capture line(int64_t behind, int64_t above) {
+  Capture capture;
+  for (int i = 0; i < 40; ++i) add(capture, {0.1 * i, 0, 0}, {0.1 * i, 5, 0});
+  capture.points = Tensor<float>({100, 3});
+  for (int64_t i = 0; i < 100; ++i) {
+    capture.points(i, 0) = 2;
+    capture.points(i, 1) = i < behind ? -3.0F : 5.0F;
+    capture.points(i, 2) = i >= behind && i < behind + above ? 40.0F : 0.0F;
+  }
+  return capture;
+}
+
+TEST(Points, that_nobody_sees_are_told_whether_they_lie_behind_or_not) {
+  Findings findings;
+  check_points(line(30, 60), findings);
+  ASSERT_EQ(findings.size(), 1U);
+  EXPECT_EQ(findings[0].kind, "points-unseen");
+  EXPECT_THAT(findings[0].text, testing::StartsWith("90% of the points"));
+  EXPECT_NEAR(*findings[0].value, 0.9, 1e-9);
+  EXPECT_EQ(*findings[0].threshold, 0.8);
+  EXPECT_THAT(kinds(line(45, 45)), ElementsAre("points-behind", "points-unseen"));
+  EXPECT_THAT(kinds(line(30, 45)), ElementsAre()) << "75%";
+}
+
+TEST(Points, that_lie_behind_are_not_told_twice) {
+  EXPECT_THAT(kinds(line(90, 5)), ElementsAre("points-behind"));
+}
+
 TEST(Extent, is_the_largest_distance_from_the_mean) {
   EXPECT_DOUBLE_EQ(camera_extent({{0, 0, 0}, {2, 0, 0}, {1, 3, 0}}), 1.1 * 2);
   EXPECT_EQ(camera_extent({{4, 5, 6}}), 0);

@@ -51,11 +51,21 @@ TEST(CameraMap, shows_cameras_in_their_times_colours_and_marked_ones_ringed_at_t
   EXPECT_FALSE(has(map, alarm_ink, 0, 270));
 }
 
-TEST(CameraMap, of_one_camera_and_of_none_that_is_not_marked) {
+TEST(CameraMap, holds_cameras_that_are_marked_for_something_else) {
+  Capture capture;
+  capture.train = {view("a", 0, {-1, 0, 0}), view("b", 1, {1, 0, 0}), view("c", 0.5F, {3, 0, 0})};
+  const Tensor<uint8_t> map = camera_map(capture, {{"c", "blur"}}, map_views(capture).top, "", {300, 200});
+  EXPECT_TRUE(has(map, time_ink(0), 0, 60));
+  EXPECT_TRUE(has(map, time_ink(1), 130, 170)) << "in the middle between a and c";
+  EXPECT_TRUE(has(map, alarm_ink, 260, 300));
+  EXPECT_FALSE(has(map, alarm_ink, 0, 260));
+}
+
+TEST(CameraMap, of_one_camera_and_of_none_that_does_not_stand_apart) {
   Capture capture;
   capture.train = {view("a", 0, {5, 5, 5})};
   EXPECT_EQ(camera_map(capture, {}, map_views(capture).top, "", {50, 40}).shape(), (Shape{40, 50, 3}));
-  EXPECT_EQ(camera_map(capture, {{"a", "x"}}, map_views(capture).side, "", {50, 40}).shape(),
+  EXPECT_EQ(camera_map(capture, {{"a", "camera-apart"}}, map_views(capture).side, "", {50, 40}).shape(),
             (Shape{40, 50, 3}));
 }
 
