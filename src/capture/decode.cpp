@@ -6,6 +6,8 @@
 #include "base/error.h"
 #include "capture/lens/resample.h"
 #include "files/image.h"
+#include "files/limits.h"
+#include "files/npy.h"
 #include "files/png.h"
 
 namespace traceflow {
@@ -50,11 +52,13 @@ Tensor<float> read_normal_image(const TreeFile& file) {
 }
 
 Tensor<float> read_depth(const TreeFile& file) {
-  Tensor<float> depth = read_npy(file.open());
-  const int rank = depth.shape().rank();
-  if (depth.empty() || !(rank == 2 || (rank == 3 && depth.dim(2) == 1))) {
-    throw InputError(file.name(), "shape", depth.shape().to_string(), "H×W");
-  }
+  const NpyFile array(file.open());
+  const Shape& shape = array.shape();
+  if (shape.elements() == 0 || !(shape.rank() == 2 || (shape.rank() == 3 && shape[2] == 1)))
+    throw InputError(file.name(), "shape", shape.to_string(), "H×W");
+  if (!is_image_size(shape[1], shape[0]))
+    throw InputError(file.name(), "shape", shape.to_string(), image_size_limits, "scale the depths down");
+  const Tensor<float> depth = array.read();
   constexpr float farthest = 1e6F;
   Tensor<float> result({depth.dim(0), depth.dim(1), 1});
   for (int64_t i = 0; i < depth.size(); ++i) {
@@ -78,21 +82,39 @@ Tensor<float> depth_on_view_grid(const ViewSource& view, Tensor<float> depth, fl
   return result;
 }
 
+bool has_alpha(const Tensor<uint8_t>& pixels) { return pixels.dim(2) == 2 || pixels.dim(2) == 4; }
+
 // RGB of an image of one to four channels, before a background of one grey level where it is transparent.
 Tensor<uint8_t> over(uint8_t background, const Tensor<uint8_t>& pixels) {
   const int64_t stored = pixels.dim(2), step = stored >= 3 ? 1 : 0;
-  const bool has_alpha = stored == 2 || stored == 4;
   Tensor<uint8_t> rgb;
   rgb.resize({pixels.dim(0), pixels.dim(1), 3});
   for (int64_t i = 0; i < rgb.size() / 3; ++i) {
     const uint8_t* pixel = &pixels[stored * i];
-    const int alpha = has_alpha ? pixel[stored - 1] : 255;
+    const int alpha = has_alpha(pixels) ? pixel[stored - 1] : 255;
     for (int64_t c = 0; c < 3; ++c) {
       rgb[3 * i + c] =
           static_cast<uint8_t>((pixel[c * step] * alpha + background * (255 - alpha) + 127) / 255);
     }
   }
   return rgb;
+}
+
+// Where all that a pixel of the view is made of is opaque; empty where that is everywhere.
+Tensor<uint8_t> opaque(const ViewSource& view, const Tensor<uint8_t>& pixels) {
+  if (!has_alpha(pixels)) return {};
+  const int64_t stored = pixels.dim(2);
+  Tensor<float> alpha({pixels.dim(0), pixels.dim(1), 1});
+  for (int64_t i = 0; i < alpha.size(); ++i) alpha[i] = pixels[stored * i + stored - 1] == 255 ? 1.0F : 0.0F;
+  alpha = to_view_grid(view, std::move(alpha));
+  constexpr float whole = 0.999F;
+  Tensor<uint8_t> known({view.height(), view.width()});
+  bool all = true;
+  for (int64_t i = 0; i < known.size(); ++i) {
+    known[i] = alpha[i] > whole ? 1 : 0;
+    all = all && known[i] == 1;
+  }
+  return all ? Tensor<uint8_t>() : known;
 }
 
 }  // namespace
@@ -110,16 +132,18 @@ Tensor<float> normals_of_picture(const Tensor<uint16_t>& picture, const std::str
   return normals;
 }
 
-Tensor<uint8_t> decode_colour(const ViewSource& view) {
+DecodedColour decode_colour(const ViewSource& view) {
   const Tensor<uint8_t> pixels = read_image(view.image.open());
   if (pixels.dim(1) != static_cast<int64_t>(view.lens.width) ||
       pixels.dim(0) != static_cast<int64_t>(view.lens.height)) {
     throw InputError(view.image.name(), "size", pixels.shape().to_string(),
                      "the size it had when the capture was opened");
   }
-  Tensor<uint8_t> rgb = over(view.background, pixels);
-  if (view.lens.is_pinhole() && view.factor == 1) return rgb;
-  return to_8bit(to_view_grid(view, from_8bit(rgb)));
+  DecodedColour result{over(view.background, pixels), {}};
+  if (view.transparent_is_unknown) result.known = opaque(view, pixels);
+  if (!view.lens.is_pinhole() || view.factor != 1)
+    result.colour = to_8bit(to_view_grid(view, from_8bit(result.colour)));
+  return result;
 }
 
 Tensor<uint8_t> decode_mask(const ViewSource& view) {

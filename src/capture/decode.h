@@ -8,8 +8,12 @@
 // its size.
 namespace traceflow {
 
-Tensor<uint8_t> decode_colour(const ViewSource& view);  // H×W×3
-Tensor<uint8_t> decode_mask(const ViewSource& view);    // H×W of 0 and 1
+struct DecodedColour {
+  Tensor<uint8_t> colour;  // H×W×3
+  Tensor<uint8_t> known;   // H×W of 0 and 1; empty where all is known
+};
+DecodedColour decode_colour(const ViewSource& view);
+Tensor<uint8_t> decode_mask(const ViewSource& view);  // H×W of 0 and 1
 // H×W×3 in the prior's own axes, unit, zero where there is none.
 Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture);
 ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture);

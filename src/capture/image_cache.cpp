@@ -37,7 +37,8 @@ int64_t ImageCache::bytes() const {
 
 int64_t ImageCache::bytes_of(const std::string& id) const {
   const ViewSource& view = source(id);
-  return view.width() * view.height() * (3 + (view.mask ? 1 : 0) + (view.has_prior() ? 6 : 0));
+  return view.width() * view.height() *
+         (3 + (view.transparent_is_unknown ? 1 : 0) + (view.mask ? 1 : 0) + (view.has_prior() ? 6 : 0));
 }
 
 std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
@@ -58,7 +59,9 @@ std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
 ViewPixels ImageCache::decode(const std::string& id) const {
   const ViewSource& view = source(id);
   ViewPixels pixels;
-  pixels.colour = decode_colour(view);
+  DecodedColour decoded = decode_colour(view);
+  pixels.colour = std::move(decoded.colour);
+  pixels.known = std::move(decoded.known);
   if (view.mask) pixels.mask = decode_mask(view);
   if (view.has_prior()) {
     Tensor<float> normals = decode_prior(view, capture_);

@@ -16,6 +16,7 @@
 #include "capture/image_cache.h"
 #include "capture/prior_axes.h"
 #include "files/image.h"
+#include "files/limits.h"
 
 namespace traceflow {
 
@@ -51,6 +52,7 @@ class Assembly {
     shared_.scale = found_.normalisation.scale;
     background_ =
         grey_level(options.background == Background::automatic ? found_.background : options.background);
+    transparent_is_unknown_ = found_.transparent_is_unknown && options.background == Background::automatic;
   }
 
   Capture finish() {
@@ -166,6 +168,7 @@ class Assembly {
     if (!source.lens.is_pinhole()) source.zoom = pinhole_zoom(source.lens, found.camera_name);
     source.camera_from_world = found.camera_from_world;
     source.background = background_;
+    source.transparent_is_unknown = transparent_is_unknown_;
     source.rig_camera = found.rig_camera;
     return source;
   }
@@ -354,6 +357,8 @@ class Assembly {
                            ") or all (" + std::to_string(found_.all_ids.size()) + ")",
                        "make the priors again or take the file away");
     }
+    if (!is_image_size(shape[2], shape[1]))
+      throw InputError(file.name(), "shape", shape.to_string(), image_size_limits, "scale the priors down");
     const std::vector<std::string>& ids = fits_train ? found_.train_ids : found_.all_ids;
     for (size_t i = 0; i < ids.size(); ++i) {
       const auto found = sources_.find(ids[i]);
@@ -423,6 +428,7 @@ class Assembly {
   CaptureSource shared_;
   std::unordered_map<std::string, ViewSource> sources_;
   uint8_t background_ = 0;
+  bool transparent_is_unknown_ = false;
 };
 
 }  // namespace

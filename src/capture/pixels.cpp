@@ -9,6 +9,7 @@ namespace traceflow {
 void widen(const ViewPixels& pixels, ViewImages& images) {
   const Device device = pixels.colour.device();
   images.colour.place(device).resize(pixels.colour.shape());
+  images.known = pixels.known;
   images.mask = pixels.mask;
   images.normal_prior.place(device).resize(pixels.normal_prior.shape());
   constexpr int64_t grain = 16384;
@@ -16,6 +17,20 @@ void widen(const ViewPixels& pixels, ViewImages& images) {
                WidenColour{pixels.colour.data(), images.colour.data()}, grain);
   parallel_for(device, "capture: widen normals", images.normal_prior.size() / 3,
                WidenNormal{pixels.normal_prior.data(), images.normal_prior.data()}, grain);
+}
+
+void take_unknown(const Tensor<float>& rendered, ViewImages& images) {
+  require(images.known.empty() || rendered.shape() == images.colour.shape(),
+          "a render has its photograph's size", rendered.shape().to_string());
+  parallel_for(images.colour.device(), "capture: take unknown", images.known.size(),
+               TakeUnknown{images.known.data(), rendered.data(), images.colour.data()});
+}
+
+void leave_unknown(const ViewImages& images, Tensor<float>& grad_colour) {
+  require(images.known.empty() || grad_colour.shape() == images.colour.shape(),
+          "a gradient has its photograph's size", grad_colour.shape().to_string());
+  parallel_for(grad_colour.device(), "capture: leave unknown", images.known.size(),
+               LeaveUnknown{images.known.data(), grad_colour.data()});
 }
 
 std::shared_ptr<const ViewPixels> load_pixels(const Capture& capture, const View& view) {

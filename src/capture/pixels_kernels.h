@@ -13,6 +13,23 @@ struct WidenColour {
   TRACEFLOW_HD void operator()(int64_t i) const { to[i] = static_cast<float>(from[i]) / 255.0F; }
 };
 
+struct TakeUnknown {
+  const uint8_t* known;
+  const float* rendered;
+  float* colour;
+  TRACEFLOW_HD void operator()(int64_t pixel) const {
+    if (known[pixel] == 0) store3(colour + 3 * pixel, load3<float>(rendered + 3 * pixel));
+  }
+};
+
+struct LeaveUnknown {
+  const uint8_t* known;
+  float* gradient;
+  TRACEFLOW_HD void operator()(int64_t pixel) const {
+    if (known[pixel] == 0) store3(gradient + 3 * pixel, Vec3<float>(0));
+  }
+};
+
 struct WidenNormal {
   const int16_t* from;
   float* to;

@@ -19,8 +19,9 @@ struct ViewSource {
   double zoom = 1;                // of the straightened image (capture/lens/lens.h)
   int factor = 1;                 // pixels of the stored image a side that make one of the view's
   Mat3<double> camera_from_world{1};
-  uint8_t background = 0;  // grey level behind transparent pixels
-  std::string rig_camera;  // which of a rig's cameras took it; empty: not known
+  uint8_t background = 0;               // grey level behind transparent pixels
+  bool transparent_is_unknown = false;  // they are no part of the photograph
+  std::string rig_camera;               // which of a rig's cameras took it; empty: not known
 
   int64_t width() const { return static_cast<int64_t>(lens.width) / factor; }
   int64_t height() const { return static_cast<int64_t>(lens.height) / factor; }

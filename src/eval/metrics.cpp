@@ -65,6 +65,17 @@ Tensor<float> rounded(const Tensor<float>& image) {
   return result;
 }
 
+// The pixels of both masks; where one is empty, the other.
+const Tensor<uint8_t>& both(const Tensor<uint8_t>& mask, const Tensor<uint8_t>& known,
+                            Tensor<uint8_t>& room) {
+  if (mask.empty() || known.empty()) return mask;
+  require(mask.shape() == known.shape(), "masks of one picture have one shape");
+  room.place(mask.device()).resize(mask.shape());
+  parallel_for(mask.device(), "metrics: masked and known", mask.size(),
+               BothMasks{mask.data(), known.data(), room.data()});
+  return room;
+}
+
 }  // namespace
 
 std::optional<double> psnr(const Tensor<float>& image, const Tensor<float>& target,
@@ -86,25 +97,29 @@ std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<f
 Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
                 const lpips::Network* network) {
   const Device device = colour.device();
+  const Tensor<uint8_t> all;
   Tensor<float> colour_room, normal_room, true_normal_room;
-  Tensor<uint8_t> mask_room;
+  Tensor<uint8_t> mask_room, known_room, both_room;
   const Tensor<float> image = rounded(colour);
   const Tensor<float> target = rounded(brought(truth.colour, device, colour_room));
   const Tensor<float>& normals = brought(normal, device, normal_room);
   const Tensor<float>& true_normals = brought(truth.normal, device, true_normal_room);
+  const bool is_all_known = truth.known == nullptr || truth.known->empty();
+  const Tensor<uint8_t>& known = brought(is_all_known ? all : *truth.known, device, known_room);
   const Tensor<uint8_t>& mask = brought(truth.mask, device, mask_room);
   Metrics m;
-  m.psnr = psnr(image, target, {});
-  m.ssim = loss::ssim(image, target, {});
+  m.psnr = psnr(image, target, known);
+  m.ssim = loss::ssim(image, target, known);
   if (network != nullptr && std::min(image.dim(0), image.dim(1)) >= lpips::min_side) {
     m.lpips = lpips::distance(*network, image, target, lpips::Input::defined);
     m.lpips_published = lpips::distance(*network, image, target, lpips::Input::published);
   }
   m.normal_mae_deg = normal_mae_deg(normals, true_normals, {});
-  const CountedSum masked = mask.empty() ? CountedSum{} : squared_error(image, target, mask);
+  const Tensor<uint8_t>& masked_known = both(mask, known, both_room);
+  const CountedSum masked = mask.empty() ? CountedSum{} : squared_error(image, target, masked_known);
   if (masked.count > 0) {
     m.masked_psnr = psnr_of(masked);
-    m.masked_ssim = loss::ssim(image, target, mask);
+    m.masked_ssim = loss::ssim(image, target, masked_known);
     m.masked_normal_mae_deg = normal_mae_deg(normals, true_normals, mask);
   }
   return m;

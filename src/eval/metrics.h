@@ -50,10 +50,11 @@ struct Truth {
   const Tensor<float>& colour;
   const Tensor<uint8_t>& mask;
   const Tensor<float>& normal;
+  const Tensor<uint8_t>* known = nullptr;  // H×W, where colours count; null or empty: everywhere
 };
 
 // All figures of one view, computed where its colours are. Colours are rounded to 8 bit first. network may be
-// null: no LPIPS.
+// null: no LPIPS. The mean errors of colours are over known pixels; LPIPS takes the picture as a whole.
 Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
                 const lpips::Network* network);
 

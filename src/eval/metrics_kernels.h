@@ -23,6 +23,13 @@ TRACEFLOW_HD inline bool counts(const uint8_t* mask, int64_t pixel) {
   return mask == nullptr || mask[pixel] != 0;
 }
 
+struct BothMasks {
+  const uint8_t *a, *b;
+  uint8_t* both;
+
+  TRACEFLOW_HD void operator()(int64_t i) const { both[i] = a[i] != 0 && b[i] != 0 ? 1 : 0; }
+};
+
 struct RoundTo8Bit {
   const float* from;
   float* to;

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 
+#include "capture/pixels.h"
 #include "scene/viewpoint.h"
 
 namespace traceflow::eval {
@@ -57,10 +58,12 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
 
     const std::shared_ptr<const ViewImages> images = load_images(capture, view);
     const ViewTruth truth = capture.has_truth ? load_truth(capture, view) : ViewTruth{};
-    report.views.push_back(
-        {view.id,
-         measure(frame.colour, frame.raster.normal, {images->colour, images->mask, truth.normal}, network),
-         view.time});
+    ViewImages compared = *images;
+    if (!compared.known.empty()) take_unknown(frame.colour.on(Device::cpu), compared);
+    report.views.push_back({view.id,
+                            measure(frame.colour, frame.raster.normal,
+                                    {compared.colour, compared.mask, truth.normal, &compared.known}, network),
+                            view.time});
     if (listener) listener(view, *images, frame);
   }
   if (seconds > 0) report.render_fps = static_cast<double>(views.size()) / seconds;

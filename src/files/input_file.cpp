@@ -39,7 +39,7 @@ InputFile::InputFile(std::filesystem::path path, int descriptor, int64_t size)
 
 InputFile InputFile::scratch(const std::filesystem::path& origin) {
   std::string name = (std::filesystem::temp_directory_path() / "traceflow-XXXXXX").string();
-  const int descriptor = ::mkstemp(name.data());
+  const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
   if (descriptor < 0) {
     throw InputError(origin.string(), "temporary file " + name, reason(), "room to unpack",
                      "set TMPDIR to a folder with space");

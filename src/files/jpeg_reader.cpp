@@ -23,6 +23,8 @@ struct Source {
   const InputFile* file;
   int64_t offset;
   std::array<JOCTET, 1 << 16> buffer;
+  int orientation = 1;                 // that EXIF has told so far
+  std::array<JOCTET, 0xffff> segment;  // the last that was read for it
 };
 
 Source* source_of(j_decompress_ptr info) { return reinterpret_cast<Source*>(info->src); }
@@ -71,6 +73,28 @@ void on_skip(j_decompress_ptr info, long count) {
   source->offset += static_cast<int64_t>(skipped - here);
 }
 
+JOCTET take_byte(j_decompress_ptr info) {
+  jpeg_source_mgr& manager = source_of(info)->manager;
+  if (manager.bytes_in_buffer == 0) on_empty(info);
+  --manager.bytes_in_buffer;
+  return *manager.next_input_byte++;
+}
+
+// The library's own way keeps every segment, and a file may hold gigabytes of them.
+boolean on_exif(j_decompress_ptr info) {
+  Source* source = source_of(info);
+  const size_t high = take_byte(info), length = high << 8 | take_byte(info);
+  // The length counts its own two bytes.
+  const size_t count = length < 2 ? 0 : length - 2;
+  if (source->orientation != 1) {
+    on_skip(info, static_cast<long>(count));
+    return TRUE;
+  }
+  for (size_t i = 0; i < count; ++i) source->segment[i] = take_byte(info);
+  source->orientation = exif_orientation(std::as_bytes(std::span(source->segment).first(count)));
+  return TRUE;
+}
+
 void on_progress(j_common_ptr info) {
   const auto* jpeg = reinterpret_cast<j_decompress_ptr>(info);
   if (jpeg->input_scan_number > max_scans) JpegExit::leave(info, "more than 500 scans");
@@ -90,11 +114,7 @@ class JpegReader {
   JpegSize read_header() {
     if (!try_header()) fail();
     JpegSize size{static_cast<int>(jpeg_.image_width), static_cast<int>(jpeg_.image_height),
-                  jpeg_.num_components == 1 ? 1 : 3, 1};
-    for (auto* marker = jpeg_.marker_list; marker != nullptr && size.orientation == 1;
-         marker = marker->next) {
-      size.orientation = exif_orientation(std::as_bytes(std::span(marker->data, marker->data_length)));
-    }
+                  jpeg_.num_components == 1 ? 1 : 3, source_.orientation};
     check(size);
     return size;
   }
@@ -123,7 +143,7 @@ class JpegReader {
     source_.manager.term_source = end;
     progress_.progress_monitor = on_progress;
     jpeg_.progress = &progress_;
-    jpeg_save_markers(&jpeg_, JPEG_APP0 + 1, 0xffff);
+    jpeg_set_marker_processor(&jpeg_, JPEG_APP0 + 1, on_exif);
     jpeg_read_header(&jpeg_, TRUE);
     return true;
   }

@@ -194,7 +194,7 @@ InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
     if (stream.avail_in == 0) {
       const auto count =
           static_cast<size_t>(std::min<int64_t>(static_cast<int64_t>(piece), member.stored_size - consumed));
-      if (count == 0) fail(file, "compressed data that is cut short");
+      // Perhaps none is left, while zlib holds back what did not fit into the last piece.
       file.read_at(member.offset + consumed, std::span(input).first(count));
       consumed += static_cast<int64_t>(count);
       stream.next_in = reinterpret_cast<Bytef*>(input.data());
@@ -207,6 +207,7 @@ InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
     if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR)
       fail(file, "broken compressed data");
     const size_t made = piece - stream.avail_out;
+    if (status == Z_BUF_ERROR && made == 0) fail(file, "compressed data that is cut short");
     if (scratch.size() + static_cast<int64_t>(made) > member.size)
       fail(file, "more data than the zip directory says");
     scratch.append(std::span(output).first(made));

@@ -124,6 +124,7 @@ Sightings look_at(const Surfels& surfels, std::span<const Photograph> photograph
       const Place at = place_of(surfels, i, photographs[v].camera);
       if (!at.in_frame || at.z > hidden_from[v](at.row, at.column)) continue;
       const ViewImages& images = *photographs[v].images;
+      if (!images.known.empty() && images.known(at.row, at.column) == 0) continue;
       sightings.any[k] = 1;
       sightings.outside[k] += !images.mask.empty() && images.mask(at.row, at.column) ? -1 : 1;
       for (size_t c = 0; c < 3; ++c) {

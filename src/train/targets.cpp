@@ -2,7 +2,7 @@
 
 namespace traceflow {
 
-const ViewImages& Targets::of(const Capture& capture, const View& view) {
+ViewImages& Targets::of(const Capture& capture, const View& view) {
   if (device_ == Device::cpu) {
     widen(*load_pixels(capture, view), images_);
   } else {

@@ -16,7 +16,7 @@ class Targets {
   Targets(Device device, int64_t limit_bytes) : device_(device), limit_bytes_(limit_bytes) {}
 
   // Stands until the next call.
-  const ViewImages& of(const Capture& capture, const View& view);
+  ViewImages& of(const Capture& capture, const View& view);
 
  private:
   const ViewPixels& on_device(const Capture& capture, const View& view);

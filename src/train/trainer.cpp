@@ -174,15 +174,17 @@ const View& Trainer::draw_view() {
 LossTerms Trainer::step() {
   density_changes_.clear();
   const View& view = draw_view();
-  const ViewImages& target = targets_.of(capture_, view);
+  ViewImages& target = targets_.of(capture_, view);
   const FrameRequest request = request_for(view);
   const Trainable trainable = schedule_.trainable(iteration_);
 
   const Frame& frame = renderer_.forward(scene_, request, true);
+  take_unknown(frame.colour, target);
   grad_frame_.main_position.place(device_).resize({0});
   grad_rest_.place(device_).resize({0});
   evaluate_objective(frame, target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main,
                      grad_frame_, means_, schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
+  leave_unknown(target, grad_frame_.colour);
   if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
   const bool learns = std::isfinite(terms.total);

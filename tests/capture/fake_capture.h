@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -50,6 +51,16 @@ struct FakeCapture {
   void write_image(const std::filesystem::path& name, const Tensor<uint8_t>& pixels) const {
     std::filesystem::create_directories((folder / name).parent_path());
     write_png(folder / name, pixels);
+  }
+  // An array of zeros, of one byte each, which takes no room on the disk.
+  void write_zeros(const std::filesystem::path& name, const Shape& shape) const {
+    std::string sides;
+    for (int r = 0; r < shape.rank(); ++r) sides += std::to_string(shape[r]) + ",";
+    const std::string header = "{'descr': '|u1', 'fortran_order': False, 'shape': (" + sides + ")}";
+    const std::string start =
+        "\x93NUMPY" + std::string{'\1', '\0', static_cast<char>(header.size()), '\0'} + header;
+    write_text(name, start);
+    std::filesystem::resize_file(folder / name, start.size() + static_cast<std::uintmax_t>(shape.elements()));
   }
   Tensor<uint8_t> image(int view) const {
     Tensor<uint8_t> pixels({height, width, 3});

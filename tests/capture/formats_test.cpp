@@ -1,6 +1,7 @@
 #include <fstream>
 #include <functional>
 
+#include "capture/pixels.h"
 #include "fake_formats.h"
 #include "loaded_capture.h"
 
@@ -11,6 +12,55 @@ using Json = nlohmann::json;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
+
+// As the depth camera leaves them where it saw nothing.
+TEST(DyCheckCapture, transparent_pixels_are_not_known) {
+  FakeCapture fake;
+  fake.scene = {{"scale", 1.0}, {"center", {0.0, 0.0, 0.0}}, {"near", 0.1}, {"far", 2.0}};
+  fake.add_view("0_00000", 0, 0, false);
+  fake.add_view("0_00001", 1, 1, false);
+  fake.write_text("splits/train.json", R"({"frame_names": ["0_00000", "0_00001"], "time_ids": [0, 1]})");
+  fake.save();
+  Tensor<uint8_t> rgba({fake.height, fake.width, 4});
+  rgba.fill(255);
+  for (const int channel : {0, 1, 2, 3}) rgba(2, 5, channel) = 0;
+  fake.write_image("rgb/1x/0_00001.png", rgba);
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_TRUE(load_images(capture, capture.train[0])->known.empty());
+  ViewImages images = *load_images(capture, capture.train[1]);
+  ASSERT_EQ(images.known.shape(), (Shape{fake.height, fake.width}));
+  Tensor<float> rendered(images.colour.shape());
+  rendered.fill(0.25F);
+  take_unknown(rendered, images);
+  Tensor<float> gradient(images.colour.shape());
+  gradient.fill(3);
+  leave_unknown(images, gradient);
+  for (int64_t y = 0; y < fake.height; ++y) {
+    for (int64_t x = 0; x < fake.width; ++x) {
+      const bool unknown = y == 2 && x == 5;
+      EXPECT_EQ(images.known(y, x), unknown ? 0 : 1);
+      for (int64_t c = 0; c < 3; ++c) {
+        EXPECT_EQ(images.colour(y, x, c), unknown ? 0.25F : 1.0F);
+        EXPECT_EQ(gradient(y, x, c), unknown ? 0 : 3);
+      }
+    }
+  }
+
+  CaptureOptions half;
+  half.downscale = 2;
+  const Capture smaller = load_capture(fake.path(), half);
+  const Tensor<uint8_t> known = load_images(smaller, smaller.train[1])->known;
+  for (int64_t y = 0; y < known.dim(0); ++y) {
+    for (int64_t x = 0; x < known.dim(1); ++x) EXPECT_EQ(known(y, x), y == 1 && x == 2 ? 0 : 1);
+  }
+
+  CaptureOptions white;
+  white.background = Background::white;
+  const Capture before_white = load_capture(fake.path(), white);
+  const auto all = load_images(before_white, before_white.train[1]);
+  EXPECT_TRUE(all->known.empty());
+  EXPECT_EQ(all->colour(2, 5, 0), 1);
+}
 
 TEST(DyCheckCapture, splits_give_views_and_times) {
   FakeCapture fake;

@@ -1,11 +1,14 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <functional>
 
 #include "base/error.h"
 #include "capture/capture.h"
+#include "capture/image_cache.h"
 #include "fake_capture.h"
 #include "files/npy.h"
+#include "support/refusal.h"
 
 namespace traceflow {
 namespace {
@@ -123,8 +126,16 @@ TEST(HostileCapture, dataset_and_metadata_fields) {
     expect_refused(fake.path(), "dataset.json", field);
   }
   for (const Json& time : {Json("zero"), Json(-1), Json(nullptr), Json::array({0})}) {
+    for (const char* key : {"time_id", "warp_id"}) {
+      NerfDsCapture fake(1);
+      fake.metadata["000000_left"] = {{key, time}};
+      fake.save();
+      expect_refused(fake.path(), "metadata.json", "000000_left");
+    }
+  }
+  for (const Json& entry : {Json(3), Json("zero"), Json::array({{"time_id", 0}})}) {
     NerfDsCapture fake(1);
-    fake.metadata["000000_left"] = {{"time_id", time}};
+    fake.metadata["000000_left"] = entry;
     fake.save();
     expect_refused(fake.path(), "metadata.json", "000000_left");
   }
@@ -169,6 +180,44 @@ TEST(HostileCapture, points_of_other_shapes) {
   fake.save();
   write_npy(fake.path() / "points.npy", Tensor<float>({0, 3}));
   EXPECT_TRUE(load_capture(fake.path(), {}).points.empty());
+}
+
+// Small on the disk, they would take gigabytes as numbers.
+TEST(HostileCapture, priors_of_more_pixels_than_a_picture_may_have) {
+  for (const Shape& shape : {Shape{1, 1, 32769, 3}, Shape{1, 32769, 1, 3}, Shape{1, 32768, 8193, 3}}) {
+    NerfDsCapture fake(1);
+    fake.save();
+    fake.write_zeros("normal.npy", shape);
+    expect_refused(fake.path(), "normal.npy: shape: found " + shape.to_string(),
+                   "expected at most 32,768 pixels a side and 2²⁸ in all");
+  }
+  NerfDsCapture fake(1);
+  fake.save();
+  fake.write_zeros("normal.npy", {1, 1, 32768, 3});
+  EXPECT_TRUE(load_capture(fake.path(), {}).has_normal_priors);
+}
+
+TEST(HostileCapture, true_depths_of_more_pixels_than_a_picture_may_have) {
+  for (const Shape& shape : {Shape{1, 32769}, Shape{32769, 1, 1}, Shape{32768, 8193}, Shape{1, 32768}}) {
+    NerfDsCapture fake(1);
+    fake.save();
+    fake.write_zeros("truth/depth/000000_right.npy", shape);
+    const Capture capture = load_capture(fake.path(), {});
+    const std::string said = refusal_of([&] { load_truth(capture, capture.test[0]); });
+    if (shape == Shape{1, 32768}) {
+      EXPECT_EQ(said, "accepted");
+    } else {
+      EXPECT_THAT(said, testing::HasSubstr("000000_right.npy: shape: found " + shape.to_string() +
+                                           ", expected at most 32,768 pixels a side and 2²⁸ in all"));
+    }
+  }
+}
+
+TEST(HostileCapture, more_points_than_are_read) {
+  NerfDsCapture fake(1);
+  fake.save();
+  fake.write_zeros("points.npy", {10'000'001, 3});
+  expect_refused(fake.path(), "points.npy: shape: found 10000001x3", "expected at most 10000000 points");
 }
 
 TEST(HostileCapture, a_photograph_cut_short_fails_when_it_is_decoded) {

@@ -366,7 +366,22 @@ TEST(Incomplete, views_without_image_camera_or_time_are_left_out_with_a_warning)
   EXPECT_EQ(ids_of(capture.test), (Ids{"000001_right", "000002_right", "000003_right"}));
   EXPECT_TRUE(has_warning(capture, "no image (000001_left)"));
   EXPECT_TRUE(has_warning(capture, "no camera (000002_left)"));
-  EXPECT_TRUE(has_warning(capture, "no entry in metadata.json (000000_right)"));
+  EXPECT_TRUE(has_warning(capture, "no time in metadata.json (000000_right)"));
+}
+
+TEST(Incomplete, a_view_whose_entry_says_no_time_is_left_out_like_one_without_an_entry) {
+  NerfDsCapture fake;
+  fake.metadata["000001_left"] = {{"camera_id", 0}, {"appearance_id", 1}};
+  fake.metadata["000003_left"] = FakeCapture::Json::object();
+  fake.metadata["000002_right"] = nullptr;
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(ids_of(capture.train), (Ids{"000000_left", "000002_left"}));
+  EXPECT_EQ(ids_of(capture.test), (Ids{"000000_right", "000001_right", "000003_right"}));
+  EXPECT_TRUE(has_warning(
+      capture, "2 of 4 training views have no time in metadata.json (000001_left, 000003_left): left out"));
+  EXPECT_TRUE(has_warning(capture, "1 of 4 test views have no time in metadata.json (000002_right)"));
+  EXPECT_FALSE(has_warning(capture, "no time_id"));
 }
 
 TEST(Incomplete, odd_data_is_told) {

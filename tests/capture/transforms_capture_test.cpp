@@ -119,6 +119,32 @@ TEST(SyntheticCapture, images_of_files_that_are_not_used_are_not_left_over) {
   EXPECT_THAT(load_capture(fake.path(), {}).warnings, Contains(says("3 images have no camera")));
 }
 
+// A file that is not used may name any number of images that are nowhere, of another machine too.
+TEST(SyntheticCapture, paths_are_found_by_their_ends_among_many_that_are_nowhere) {
+  SyntheticCapture fake;
+  fake.save();
+  const std::string alone = summary(load_capture(fake.path(), {}));
+  Json& frames = fake.files["transforms_val.json"]["frames"];
+  for (int i = 0; i < 3; ++i) {
+    const std::string name = "r_1" + std::to_string(i) + ".png";
+    fake.write_image("test/" + name, fake.image(i));
+    frames.push_back(TransformsCapture::frame("/home/someone/lego/test/" + name, i));
+  }
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Not(Contains(says("no camera"))));
+  fake.write_image("test/r_20.png", fake.image(0));
+  for (int i = 0; i < 2000; ++i) {
+    Json frame;
+    frame["file_path"] =
+        (i % 2 == 0 ? "/home/" : "C:\\") + std::to_string(i) + "/test/a/b/c/train/" + std::to_string(i);
+    frames.push_back(frame);
+  }
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(summary(capture), alone);
+  EXPECT_THAT(capture.warnings, Contains(says("1 image has no camera (test/r_20.png)")));
+}
+
 TEST(SyntheticCapture, what_is_wrong_in_the_test_file_is_told_of_it) {
   SyntheticCapture fake;
   fake.files["transforms_test.json"]["k1"] = -60;
@@ -276,6 +302,27 @@ TEST(NgpCapture, images_at_the_top_are_box_filtered) {
   EXPECT_EQ(load_capture(fake.path(), options).train[0].camera.width, width / 2);
 }
 
+// Folders of another purpose may be called by a size: they hold no smaller images of those at the top.
+TEST(NgpCapture, images_at_the_top_are_not_taken_for_smaller_ones) {
+  NgpCapture fake(3);
+  for (Json& frame : fake.json()["frames"])
+    frame["file_path"] = std::filesystem::path(frame["file_path"].get<std::string>()).filename().string();
+  fake.json().erase("w");
+  fake.json().erase("h");
+  fake.save();
+  for (const auto& entry : std::filesystem::directory_iterator(fake.path() / "images"))
+    std::filesystem::rename(entry.path(), fake.path() / entry.path().filename());
+  fake.write_text("renders_2/notes.txt", "");
+  CaptureOptions options;
+  const Camera<float> full = load_capture(fake.path(), options).train[0].camera;
+  options.downscale = 2;
+  const Camera<float> half = load_capture(fake.path(), options).train[0].camera;
+  EXPECT_EQ(full.width, fake.width);
+  EXPECT_FLOAT_EQ(full.focal_x, 10);
+  EXPECT_EQ(half.width, fake.width / 2);
+  EXPECT_FLOAT_EQ(half.focal_x, 5);
+}
+
 TEST(NgpCaptureHostile, each_is_refused_by_name) {
   const std::pair<std::function<void(Json&)>, const char*> cases[] = {
       {[](Json& j) { j.erase("frames"); }, "transforms.json: frames: found nothing"},
@@ -289,6 +336,7 @@ TEST(NgpCaptureHostile, each_is_refused_by_name) {
        "frames[1].transform_matrix[2][2]"},
       {[](Json& j) { j["frames"][1]["time"] = "noon"; }, "frames[1].time: found \"noon\""},
       {[](Json& j) { j["frames"][1]["camera_model"] = "VR180_L"; }, "frames[1].camera_model: found VR180_L"},
+      {[](Json& j) { j["frames"][1]["latlong"] = true; }, "frames[1].latlong: found a panorama"},
       {[](Json& j) { j.erase("fl_x"), j.erase("fl_y"); }, "no focal length"},
       {[](Json& j) { j["k1"] = -60; }, "transforms.json: images/"},
       {[](Json& j) { j["train_filenames"] = {3.5}; }, "train_filenames"},

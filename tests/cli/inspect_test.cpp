@@ -87,6 +87,17 @@ TEST_F(InspectVerb, shows_names_without_what_commands_the_terminal) {
   EXPECT_THAT(told.out, HasSubstr("\n                rgb/1x/holi?]0;day?.png\n"));
 }
 
+TEST_F(InspectVerb, says_names_for_programs_in_ascii) {
+  const std::string name =
+      "holi\xc2\x9b\x7f\xe2\x80\xae"
+      "day.png";  // C1, DEL, right-to-left
+  std::filesystem::copy(folder_ / "capture/rgb/1x/000000_left.png", folder_ / "capture/rgb/1x" / name);
+  const Outcome told = run_with({"inspect", "-d", capture(), "--json", "--quick"});
+  ASSERT_EQ(told.code, exit_done) << told.err;
+  for (const char c : told.out) EXPECT_TRUE(c == '\n' || (c >= 32 && c < 127));
+  EXPECT_EQ(finding(Json::parse(told.out), "unregistered-image")["files"], Json({"rgb/1x/" + name}));
+}
+
 TEST_F(InspectVerb, draws_a_picture) {
   const std::string picture = (folder_ / "picture.png").string();
   ASSERT_EQ(run_with({"inspect", "-d", capture(), "--picture", picture}).code, exit_done);

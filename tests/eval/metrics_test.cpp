@@ -95,6 +95,24 @@ TEST(Measure, AFullMaskChangesNothing) {
   EXPECT_NEAR(*m.masked_ssim, *m.ssim, 1e-6);
 }
 
+// Ten by ten pixels, of which a column is unknown and wrong: it counts in no mean.
+TEST(Measure, CountsColoursThatAreKnown) {
+  Tensor<float> image = constant(10, 10, 102.0F / 255), target = constant(10, 10, 51.0F / 255);
+  Tensor<uint8_t> known(Shape{10, 10}), mask(Shape{10, 10});
+  known.fill(1);
+  for (int64_t y = 0; y < 10; ++y) {
+    known(y, 3) = 0;
+    mask(y, 3) = mask(y, 4) = 1;
+    for (int64_t c = 0; c < 3; ++c) target(y, 3, c) = image(y, 3, c);
+  }
+  const Metrics m = measure(image, {}, {target, mask, {}, &known}, nullptr);
+  EXPECT_NEAR(*m.psnr, 20 * std::log10(5.0), 1e-5);
+  EXPECT_NEAR(*m.masked_psnr, 20 * std::log10(5.0), 1e-5);
+  const Metrics unknown_counts = measure(image, {}, {target, mask, {}}, nullptr);
+  EXPECT_GT(*unknown_counts.psnr, *m.psnr + 0.4);
+  EXPECT_GT(*unknown_counts.masked_ssim, *m.masked_ssim);
+}
+
 TEST(Mean, IsOverTheViewsThatHaveTheFigure) {
   Metrics a, b;
   a.psnr = 20;

@@ -111,6 +111,29 @@ TEST(JpegReader, orientation_is_told_and_pixels_stay_as_stored) {
   }
 }
 
+// Two bytes say its length, their own counted.
+std::string app1(const std::string& content) {
+  const size_t length = content.size() + 2;
+  return std::string("\xff\xe1") + static_cast<char>(length >> 8) + static_cast<char>(length & 255) + content;
+}
+
+TEST(JpegReader, the_first_segment_that_turns_the_picture_counts) {
+  const TempFolder folder;
+  const std::string bytes = jpeg_of_kind({}, 40, 20, 3, waves(40, 20, 3));
+  const auto orientation = [&](const std::string& segments) {
+    const InputFile file = file_of(folder, std::string(bytes).insert(2, segments));
+    EXPECT_EQ(read_jpeg(file).shape(), (Shape{20, 40, 3}));
+    return read_jpeg_size(file).orientation;
+  };
+  // Longer than what is read of a file at a time, together.
+  const std::string other = app1("http://ns.adobe.com/xap/1.0/" + std::string(60000, 'x'));
+  EXPECT_EQ(orientation(other + other), 1);
+  EXPECT_EQ(orientation(other + other + app1(exif(6, true)) + other), 6);
+  EXPECT_EQ(orientation(app1(exif(1, true)) + app1(exif(8, false))), 8);
+  EXPECT_EQ(orientation(app1(exif(3, true)) + other + app1(exif(8, true))), 3);
+  EXPECT_EQ(orientation(app1("") + app1("E") + app1(exif(2, true))), 2);
+}
+
 TEST(JpegReader, broken_exif_says_nothing) {
   const std::string whole = exif(6, true);
   EXPECT_EQ(exif_orientation(std::as_bytes(std::span(whole))), 6);
@@ -220,14 +243,21 @@ TEST(JpegReaderHostile, several_scans_may_have_half_as_many_pixels) {
   std::_Exit(0);
 }
 
-TEST(JpegReaderHostile, memory_refused_is_no_fault_of_the_file) {
+// A sanitizer's shadow memory takes all room.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "a sanitizer's shadow memory takes all room";
+constexpr bool can_limit_room = false;
 #elif defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-  GTEST_SKIP() << "a sanitizer's shadow memory takes all room";
+constexpr bool can_limit_room = false;
+#else
+constexpr bool can_limit_room = true;
 #endif
+#else
+constexpr bool can_limit_room = true;
 #endif
+
+TEST(JpegReaderHostile, memory_refused_is_no_fault_of_the_file) {
+  if (!can_limit_room) GTEST_SKIP() << "a sanitizer's shadow memory takes all room";
   // In a program that has run no other test: what those have given back is room.
   testing::GTEST_FLAG(death_test_style) = "threadsafe";
   const TempFolder folder;
@@ -237,6 +267,23 @@ TEST(JpegReaderHostile, memory_refused_is_no_fault_of_the_file) {
   const InputFile file = file_of(folder, bytes);
   EXPECT_EXIT(read_with_room_for(file, int64_t{32} << 20), testing::ExitedWithCode(4), "");
   EXPECT_EXIT(read_with_room_for(file, int64_t{256} << 20), testing::ExitedWithCode(0), "");
+}
+
+TEST(JpegReaderHostile, segments_without_end_take_no_memory) {
+  if (!can_limit_room) GTEST_SKIP() << "a sanitizer's shadow memory takes all room";
+  testing::GTEST_FLAG(death_test_style) = "threadsafe";
+  const TempFolder folder;
+  const std::string bytes = jpeg_of_kind({}, 8, 8, 3, waves(8, 8, 3));
+  const std::string segment = app1(std::string(65000, 'x'));
+  {
+    std::ofstream out(folder / "image.jpg", std::ios::binary);
+    out << bytes.substr(0, 2);
+    for (int i = 0; i < 512; ++i) out << segment;
+    out << bytes.substr(2);
+  }
+  const InputFile file(folder / "image.jpg");
+  EXPECT_EQ(file.size(), static_cast<int64_t>(bytes.size() + 512 * segment.size()));
+  EXPECT_EXIT(read_with_room_for(file, int64_t{16} << 20), testing::ExitedWithCode(0), "");
 }
 
 // A flat picture takes the least room that there is: it must not be taken for a bomb.

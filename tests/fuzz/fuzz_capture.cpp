@@ -192,6 +192,8 @@ void check_pixels(const Capture& capture, const View& view) {
   const std::shared_ptr<const ViewImages> images = load_images(capture, view);
   promise(images->colour.shape() == Shape{height, width, 3}, "a photograph has its camera's size");
   for (const float v : images->colour.values()) promise(v >= 0 && v <= 1, "a colour is in its range");
+  promise(images->known.empty() || images->known.shape() == Shape{height, width},
+          "what is known has its camera's size");
   promise(images->mask.empty() || images->mask.shape() == Shape{height, width},
           "a mask has its camera's size");
   promise(images->normal_prior.empty() || images->normal_prior.shape() == Shape{height, width, 3},

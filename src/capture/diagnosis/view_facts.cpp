@@ -42,7 +42,7 @@ Tensor<uint8_t> thumbnail_of(const Tensor<uint8_t>& grey) {
 
 void measure_colour(const ViewSource& source, ViewFacts& facts) {
   constexpr double least_contrast = 1;  // squares of 8-bit levels
-  const Tensor<uint8_t> colour = decode_colour(source);
+  const Tensor<uint8_t> colour = decode_colour(source).colour;
   int64_t sum = 0;
   for (const uint8_t v : colour.values()) sum += v;
   facts.mean_colour = static_cast<double>(sum) / 255 / static_cast<double>(colour.size());

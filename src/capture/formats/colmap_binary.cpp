@@ -136,10 +136,13 @@ std::vector<ColmapImageRow> read_colmap_images_binary(const InputFile& file) {
   return rows;
 }
 
-std::vector<ColmapPointRow> read_colmap_points_binary(const InputFile& file) {
+std::vector<ColmapPointRow> read_colmap_points_binary(const InputFile& file, int64_t most) {
   constexpr int64_t fewest_bytes = 51, track_bytes = 8;
   Cursor cursor(file);
-  std::vector<ColmapPointRow> rows(static_cast<size_t>(cursor.count(fewest_bytes, "the number of points")));
+  const int64_t count = cursor.count(fewest_bytes, "the number of points");
+  if (count > most)
+    cursor.fail("the number of points", std::to_string(count), "at most " + std::to_string(most));
+  std::vector<ColmapPointRow> rows(static_cast<size_t>(count));
   for (size_t i = 0; i < rows.size(); ++i) {
     ColmapPointRow& row = rows[i];
     const std::string field = field_of("points3D", static_cast<int64_t>(i));

@@ -132,7 +132,8 @@ class Builder {
 
   void take_points() {
     const std::string& path = model_.points_file;
-    auto rows = rows_of(path, read_colmap_points_binary, read_colmap_points_text);
+    const InputFile file = tree_.open_file(path);
+    auto rows = path.ends_with(".bin") ? read_colmap_points_binary(file) : read_colmap_points_text(file);
     for (size_t i = 0; i < rows.size(); ++i) {
       const Vec3<double>& x = rows[i].position;
       if (!is_near(x)) {

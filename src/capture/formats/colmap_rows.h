@@ -6,11 +6,12 @@
 #include <vector>
 
 #include "files/input_file.h"
+#include "files/limits.h"
 #include "math/types.h"
 
 // The rows of a COLMAP model's files as they stand there, in the files' order: nothing but their form is
 // checked. Every reader throws InputError for files that are cut short or hold something else, before taking
-// memory for more rows than the file can hold.
+// memory for more rows than the file can hold, and for more than `most` points.
 namespace traceflow {
 
 struct ColmapCameraRow {
@@ -39,10 +40,11 @@ struct ColmapPointRow {
 
 std::vector<ColmapCameraRow> read_colmap_cameras_binary(const InputFile& file);
 std::vector<ColmapImageRow> read_colmap_images_binary(const InputFile& file);
-std::vector<ColmapPointRow> read_colmap_points_binary(const InputFile& file);
+std::vector<ColmapPointRow> read_colmap_points_binary(const InputFile& file,
+                                                      int64_t most = max_capture_points);
 
 std::vector<ColmapCameraRow> read_colmap_cameras_text(const InputFile& file);
 std::vector<ColmapImageRow> read_colmap_images_text(const InputFile& file);
-std::vector<ColmapPointRow> read_colmap_points_text(const InputFile& file);
+std::vector<ColmapPointRow> read_colmap_points_text(const InputFile& file, int64_t most = max_capture_points);
 
 }  // namespace traceflow

@@ -148,10 +148,12 @@ std::vector<ColmapImageRow> read_colmap_images_text(const InputFile& file) {
   return rows;
 }
 
-std::vector<ColmapPointRow> read_colmap_points_text(const InputFile& file) {
+std::vector<ColmapPointRow> read_colmap_points_text(const InputFile& file, int64_t most) {
   Lines lines(file);
   std::vector<ColmapPointRow> rows;
   while (lines.next_row()) {
+    if (static_cast<int64_t>(rows.size()) == most)
+      lines.fail("", "one point more", "at most " + std::to_string(most));
     const std::string field = field_of("points3D", rows.size());
     ColmapPointRow& row = rows.emplace_back();
     row.id = static_cast<int64_t>(lines.number<uint64_t>(field + ".id"));

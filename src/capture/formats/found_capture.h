@@ -48,6 +48,7 @@ struct FoundCapture {
   std::vector<Vec3<double>> points;
   std::string points_file;                    // where they come from; empty: there are none
   Background background = Background::black;  // the format's custom, never `automatic`
+  bool transparent_is_unknown = false;        // likewise: transparent pixels are no part of a photograph
   std::vector<Finding> warnings;
 };
 

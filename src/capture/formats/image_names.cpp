@@ -86,14 +86,18 @@ std::string without_extension(const std::string& path) {
   return std::filesystem::path(whole).replace_extension().generic_string();
 }
 
-std::string find_image(const FileTree& tree, const std::string& path) {
-  if (tree.has(path)) return path;
+std::string find_image(const std::function<bool(const std::string& file)>& has, const std::string& path) {
+  if (has(path)) return path;
   for (const std::string& stem : {path, without_extension(path)}) {
     for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"}) {
-      if (tree.has(stem + extension)) return stem + extension;
+      if (has(stem + extension)) return stem + extension;
     }
   }
   return "";
+}
+
+std::string find_image(const FileTree& tree, const std::string& path) {
+  return find_image([&](const std::string& file) { return tree.has(file); }, path);
 }
 
 std::vector<std::string> image_ids(const std::vector<std::string>& paths,

@@ -22,7 +22,8 @@ std::string in_folder(const std::string& folder, const std::string& name);
 std::string without_extension(const std::string& path);
 
 // The image of this path, or of this path and an extension, or of the same path but its extension; empty
-// where there is none.
+// where there is none. has: whether there is such a file.
+std::string find_image(const std::function<bool(const std::string& file)>& has, const std::string& path);
 std::string find_image(const FileTree& tree, const std::string& path);
 
 // For each path, in any order, an id: without the folder that all share and the extension, "/" as "_". Throws

@@ -6,6 +6,7 @@
 #include "capture/formats/image_names.h"
 #include "capture/formats/nerfies_camera.h"
 #include "capture/formats/nerfies_layout.h"
+#include "files/limits.h"
 #include "files/npy.h"
 
 namespace traceflow {
@@ -22,6 +23,7 @@ class NerfiesReader {
   NerfiesReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options, ReadLayout read_layout)
       : tree_(std::move(tree)), layout_(read_layout(*tree_, found_.warnings)) {
     found_.format = layout_.format;
+    found_.transparent_is_unknown = layout_.transparent_is_unknown;
     found_.normalisation = layout_.normalisation;
     found_.near_plane = layout_.near_plane;
     found_.far_plane = layout_.far_plane;
@@ -65,7 +67,7 @@ class NerfiesReader {
         "camera", "missing-camera", [&](const std::string& id) { return tree_->has(camera_path(id)); },
         camera_path);
     keep(
-        "entry in metadata.json", "missing-time",
+        "time in metadata.json", "missing-time",
         [&](const std::string& id) { return layout_.time_id.contains(id); }, nullptr);
     std::vector<FoundView> views(ids.size());
     parallel_for(
@@ -90,10 +92,15 @@ class NerfiesReader {
   void read_points() {
     const std::string path = "points.npy";
     if (!tree_->has(path)) return;
-    const Tensor<float> raw = read_npy(tree_->open_file(path));
-    if (raw.shape().rank() != 2 || raw.dim(1) != 3) {
-      throw InputError(tree_->name_of(path), "shape", raw.shape().to_string(), "P×3");
+    const NpyFile array(tree_->open_file(path));
+    const Shape& shape = array.shape();
+    if (shape.rank() != 2 || shape[1] != 3)
+      throw InputError(tree_->name_of(path), "shape", shape.to_string(), "P×3");
+    if (shape[0] > max_capture_points) {
+      throw InputError(tree_->name_of(path), "shape", shape.to_string(),
+                       "at most " + std::to_string(max_capture_points) + " points", "keep fewer of them");
     }
+    const Tensor<float> raw = array.read();
     found_.points_file = path;
     for (int64_t i = 0; i < raw.dim(0); ++i) found_.points.push_back(load3<double>(raw.row(i)));
   }

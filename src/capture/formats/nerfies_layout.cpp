@@ -101,6 +101,9 @@ void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
   for (const std::string& id : ids) {
     if (!metadata.has(id)) continue;
     const JsonField entry = metadata[id];
+    // A view without a time is left out; one whose time is null, or whose entry is no object, is a mistake.
+    const nlohmann::json& said = entry.json();
+    if (said.is_object() && !said.contains("time_id") && !said.contains("warp_id")) continue;
     const bool has_time = entry.has("time_id");
     const JsonField field = has_time ? entry["time_id"] : entry["warp_id"];
     if (field.number() < 0) field.expect("a number of at least zero");

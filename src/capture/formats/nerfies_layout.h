@@ -15,8 +15,9 @@ namespace traceflow {
 // (docs/captures.md).
 struct NerfiesLayout {
   std::string format;
+  bool transparent_is_unknown = false;                    // as of FoundCapture
   std::vector<std::string> all_ids, train_ids, test_ids;  // in the file's order, each id once
-  std::map<std::string, double> time_id;                  // of the ids that metadata.json knows
+  std::map<std::string, double> time_id;                  // of the ids that metadata.json says it of
   std::map<std::string, std::string> rig_camera;          // camera_id, where it says one
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;

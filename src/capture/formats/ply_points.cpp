@@ -8,6 +8,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "files/limits.h"
 #include "scene/ply_header.h"
 
 namespace traceflow {
@@ -15,6 +16,12 @@ namespace traceflow {
 namespace {
 
 constexpr int64_t largest_text = int64_t{1} << 28;
+
+void check_point_count(const InputFile& file, int64_t count) {
+  if (count <= max_capture_points) return;
+  throw InputError(file.path().string(), "element vertex", std::to_string(count),
+                   "at most " + std::to_string(max_capture_points), "keep fewer of them");
+}
 
 double load(const PlyProperty& property, const std::byte* row) {
   if (property.type == PlyScalar::f64) {
@@ -29,6 +36,7 @@ double load(const PlyProperty& property, const std::byte* row) {
 
 std::vector<Vec3<double>> read_binary(const InputFile& file) {
   const PlyHeader header = read_ply_header(file);
+  check_point_count(file, header.rows);
   std::array<const PlyProperty*, 3> axes{};
   for (size_t i = 0; i < 3; ++i) {
     const std::string name(1, static_cast<char>('x' + i));
@@ -84,6 +92,7 @@ class TextReader {
            std::to_string(rows_) + " vertices in a file of " + std::to_string(bytes) + " bytes",
            "as many as the file holds");
     }
+    check_point_count(file_, rows_);
     std::vector<Vec3<double>> points;
     points.reserve(static_cast<size_t>(rows_));
     for (int64_t i = 0; i < rows_; ++i) points.push_back(read_row(i));

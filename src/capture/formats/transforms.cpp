@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "capture/formats/image_finder.h"
 #include "capture/formats/image_names.h"
 #include "capture/formats/normalise.h"
 #include "capture/formats/ply_points.h"
@@ -52,7 +53,7 @@ std::set<int> scales_of(const FileTree& tree) {
 class TransformsReader {
  public:
   TransformsReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options)
-      : tree_(std::move(tree)), options_(options), scales_(scales_of(*tree_)) {}
+      : tree_(std::move(tree)), options_(options), scales_(scales_of(*tree_)), finder_(*tree_) {}
 
   FoundCapture read() {
     tree_->has(train_file) ? read_split_files() : read_whole_file();
@@ -155,22 +156,30 @@ class TransformsReader {
     }
   }
 
+  // The image of this path at 1/stored of the full size; empty where there is none. What lies at the top has
+  // no folder beside which another could hold it smaller.
+  std::string image_at(const std::string& path, int stored) {
+    if (stored > 1 && top_folder(path).empty()) return "";
+    return finder_.find(at_scale(path, stored));
+  }
+
   // Whether there is an image of this path at full size or another that is stored.
-  bool is_there(const std::string& path) const {
+  bool is_there(const std::string& path) {
     return std::any_of(scales_.begin(), scales_.end(),
-                       [&](int stored) { return !find_image(*tree_, at_scale(path, stored)).empty(); });
+                       [&](int stored) { return !image_at(path, stored).empty(); });
   }
 
   // The longest end of the path that is an image here. Where there is none, the path itself, or its last part
   // if it leads out of the capture.
-  std::string end_of_path(const std::string& path) const {
+  std::string end_of_path(const std::string& path) {
     constexpr size_t most_parts = 8;
     std::vector<std::string> ends;
     for (size_t slash = path.rfind('/'); slash != std::string::npos && ends.size() < most_parts;
          slash = slash == 0 ? std::string::npos : path.rfind('/', slash - 1))
       ends.push_back(path.substr(slash + 1));
+    // In this order, since most ends are not there, which takes less to tell than where a path leads.
     const auto found = std::find_if(ends.rbegin(), ends.rend(), [&](const std::string& end) {
-      return path_in_tree(end) && is_there(end);
+      return is_there(end) && path_in_tree(end);
     });
     if (found != ends.rend()) return *found;
     return path_in_tree(path) || ends.empty() ? path : ends.front();
@@ -199,9 +208,8 @@ class TransformsReader {
   void choose_sizes() {
     const auto has_some = [&](int stored) {
       return scales_.contains(stored) &&
-             std::any_of(frames_.begin(), frames_.end(), [&](const TransformsFrame& frame) {
-               return !find_image(*tree_, at_scale(frame.path, stored)).empty();
-             });
+             std::any_of(frames_.begin(), frames_.end(),
+                         [&](const TransformsFrame& frame) { return !image_at(frame.path, stored).empty(); });
     };
     const auto first = std::find_if(frames_.begin(), frames_.end(),
                                     [&](const TransformsFrame& frame) { return is_there(frame.path); });
@@ -215,9 +223,6 @@ class TransformsReader {
     found_.images = choose_images(tree_->name_of(folder_at(1)), options_.downscale, has_some, folder_at);
   }
   std::string stored_path(const std::string& path) const { return at_scale(path, found_.images.stored); }
-  std::string image_of(const TransformsFrame& frame) const {
-    return find_image(*tree_, stored_path(frame.path));
-  }
 
   void list_images() {
     const auto list = [&](const std::string& path) {
@@ -252,7 +257,8 @@ class TransformsReader {
     found_.all_ids = image_ids(paths, [&](size_t i) { return frames_[i].file; });
     std::map<std::string, size_t> place;
     for (size_t i = 0; i < paths.size(); ++i) place.emplace(found_.all_ids[i], i);
-    const auto exists = [&](const std::string& id) { return !image_of(frames_[place.at(id)]).empty(); };
+    for (const std::string& path : paths) images_.push_back(image_at(path, found_.images.stored));
+    const auto exists = [&](const std::string& id) { return !images_[place.at(id)].empty(); };
     const auto usual_path = [&](const std::string& id) { return stored_path(frames_[place.at(id)].path); };
     const auto whole =
         keep_whole(found_.all_ids, "listed", "image", exists, found_.warnings, "missing-image", usual_path);
@@ -274,7 +280,7 @@ class TransformsReader {
   FoundView view_of(const std::string& id, size_t i) const {
     const TransformsFrame& frame = frames_[i];
     FoundView view{id,
-                   {tree_, image_of(frame)},
+                   {tree_, images_[i]},
                    {},
                    frame.file + ": " + frame.path,
                    frame.pose.camera_from_world,
@@ -305,10 +311,12 @@ class TransformsReader {
   const std::shared_ptr<const FileTree> tree_;
   const CaptureOptions options_;
   const std::set<int> scales_;  // that folders are called by
-  std::string origin_;          // the file to name in errors
+  ImageFinder finder_;
+  std::string origin_;  // the file to name in errors
   std::vector<std::shared_ptr<const JsonFile>> documents_;
   std::vector<TransformsFrame> frames_;
   std::vector<bool> is_test_;        // of frames_; empty where nobody says
+  std::vector<std::string> images_;  // of frames_, at the size that is used; empty where there is none
   std::vector<std::string> unused_;  // paths of frames that make no view
   std::set<std::string> files_;      // that were read
   std::set<std::string> seen_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "math/pixel_limits.h"
 
@@ -22,6 +23,18 @@ void take_positive(const JsonField& field, const char* key, std::optional<double
   value = field[key].number(smallest_pixels, largest_pixels);
 }
 
+// An angle of which half a turn is `half_turn`, in radians.
+void take_angle(const JsonField& field, const char* key, double half_turn, std::optional<double>& radians) {
+  if (!field.has(key)) return;
+  std::optional<double> angle;
+  take_positive(field, key, angle);
+  if (!(*angle < half_turn)) field[key].expect(half_turn == pi ? "an angle below π" : "an angle below 180°");
+  radians = *angle * (pi / half_turn);
+}
+
+constexpr const char* known_models = "OPENCV, OPENCV_FISHEYE, PINHOLE or their simpler kin";
+constexpr const char* undistort_remedy = "undistort the images with the program that made them";
+
 // The names of nerfstudio, and those of COLMAP that mean the same with its k1 to k4, p1 and p2.
 bool is_fisheye_model(const JsonField& field) {
   constexpr std::array<std::string_view, 5> perspective = {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE",
@@ -31,8 +44,31 @@ bool is_fisheye_model(const JsonField& field) {
   const std::string model = field.text();
   if (std::find(fisheye.begin(), fisheye.end(), model) != fisheye.end()) return true;
   if (std::find(perspective.begin(), perspective.end(), model) != perspective.end()) return false;
-  field.fail(model, "OPENCV, OPENCV_FISHEYE, PINHOLE or their simpler kin",
-             "undistort the images with the program that made them");
+  field.fail(model, known_models, undistort_remedy);
+}
+
+// Whether a value takes back what its key says: false, zero, or a list of such.
+bool is_off(const nlohmann::json& value) {
+  if (value.is_array()) return std::all_of(value.begin(), value.end(), is_off);
+  if (value.is_boolean()) return !value.get<bool>();
+  return value.is_null() || (value.is_number() && value.get<double>() == 0);
+}
+
+// Lenses that instant-ngp and nerfstudio name by keys of their own: without them a pinhole would be left.
+void refuse_other_lenses(const JsonField& field) {
+  const auto is_on = [&](const char* key) { return field.has(key) && !is_off(field[key].json()); };
+  for (const auto& [key, lens] : {std::pair{"ftheta_p0", "an f-theta lens"},
+                                  {"ftheta_p1", "an f-theta lens"},
+                                  {"ftheta_p2", "an f-theta lens"},
+                                  {"ftheta_p3", "an f-theta lens"},
+                                  {"ftheta_p4", "an f-theta lens"},
+                                  {"latlong", "a panorama"},
+                                  {"equirectangular", "a panorama"},
+                                  {"orthographic", "an orthographic camera"}}) {
+    if (is_on(key)) field[key].fail(lens, known_models, undistort_remedy);
+  }
+  if (is_on("distortion_params"))
+    field["distortion_params"].fail("a list of distortion", "k1 to k4, p1 and p2", undistort_remedy);
 }
 
 }  // namespace
@@ -41,16 +77,18 @@ void TransformsLens::take(const JsonField& field) {
   take_positive(field, "w", width);
   take_positive(field, "h", height);
   // An angle counts more than what the file says for all frames.
-  if (field.has("camera_angle_x") || field.has("camera_angle_y")) {
+  constexpr std::array angles = {"camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
+  if (std::any_of(angles.begin(), angles.end(), [&](const char* key) { return field.has(key); })) {
     for (auto* inherited : {&focal_x, &focal_y, &angle_x, &angle_y}) inherited->reset();
   }
   for (const auto& [key, focal] :
        {std::pair{"fl_x", &focal_x}, {"fl_y", &focal_y}, {"fx", &focal_x}, {"fy", &focal_y}})
     take_positive(field, key, *focal);
-  for (const auto& [key, angle] : {std::pair{"camera_angle_x", &angle_x}, {"camera_angle_y", &angle_y}}) {
-    take_positive(field, key, *angle);
-    if (field.has(key) && !(**angle < pi)) field[key].expect("an angle below π");
-  }
+  take_angle(field, "camera_angle_x", pi, angle_x);
+  take_angle(field, "camera_angle_y", pi, angle_y);
+  // In degrees. Beside the same in radians these count, as instant-ngp and nerfstudio have it.
+  take_angle(field, "x_fov", 180, angle_x);
+  take_angle(field, "y_fov", 180, angle_y);
   for (const auto& [key, centre] : {std::pair{"cx", &centre_x}, {"cy", &centre_y}}) {
     if (field.has(key)) *centre = field[key].number(-largest_pixels, largest_pixels);
   }
@@ -77,6 +115,7 @@ void TransformsLens::take(const JsonField& field) {
   }
   if (field.has("is_fisheye")) is_fisheye = field["is_fisheye"].yes();
   if (field.has("camera_model")) is_fisheye = is_fisheye_model(field["camera_model"]);
+  refuse_other_lenses(field);
 }
 
 Lens TransformsLens::lens(double image_width, double image_height, const JsonField& field) const {

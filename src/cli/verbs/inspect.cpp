@@ -33,7 +33,8 @@ void inspect_capture(const InspectArguments& arguments, const OptionArguments& g
     write_png(arguments.picture, show::capture_picture(capture, found.findings));
   if (arguments.as_json) {
     const nlohmann::json report = report_json(capture, found, memory);
-    fmt::print("{}\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    // In ASCII: beyond it too stands what commands a terminal, and names come from outside.
+    fmt::print("{}\n", report.dump(2, ' ', true, nlohmann::json::error_handler_t::replace));
   } else {
     print_report(capture, found, memory);
   }

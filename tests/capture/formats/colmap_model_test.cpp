@@ -7,9 +7,11 @@
 #include <cmath>
 #include <functional>
 
+#include "capture/formats/colmap_rows.h"
 #include "support/colmap_writer.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"
+#include "support/zip_writer.h"
 
 namespace traceflow {
 namespace {
@@ -208,6 +210,25 @@ TEST(ColmapModelHostile, counts_are_capped_by_the_file) {
     ColmapFiles::write(folder / "sparse/0" / name, std::string(7, '\xff') + '\x7f' + std::string(100, 'x'));
     EXPECT_THAT(refusal(folder), HasSubstr("9223372036854775807 in the 100 bytes that follow"));
   }
+}
+
+TEST(ColmapModelHostile, more_points_than_are_read_are_refused) {
+  const TempFolder folder;
+  example().save_binary(folder / "sparse/0");
+  example().save_text(folder / "sparse/0");
+  {
+    const InputFile binary(folder / "sparse/0/points3D.bin"), text(folder / "sparse/0/points3D.txt");
+    EXPECT_EQ(read_colmap_points_binary(binary, 4).size(), 4U);
+    EXPECT_EQ(read_colmap_points_text(text, 4).size(), 4U);
+    EXPECT_THAT(refusal_of([&] { read_colmap_points_binary(binary, 3); }),
+                HasSubstr("points3D.bin: the number of points: found 4, expected at most 3"));
+    EXPECT_THAT(refusal_of([&] { read_colmap_points_text(text, 3); }),
+                HasSubstr("found one point more, expected at most 3"));
+  }
+  // Of zeros that take no room on the disk.
+  ColmapFiles::write(folder / "sparse/0/points3D.bin", little_endian(max_capture_points + 1, 8));
+  std::filesystem::resize_file(folder / "sparse/0/points3D.bin", 8 + 51 * (max_capture_points + 1));
+  EXPECT_THAT(refusal(folder), HasSubstr("the number of points: found 10000001, expected at most 10000000"));
 }
 
 TEST(ColmapModelHostile, each_is_refused_by_name) {

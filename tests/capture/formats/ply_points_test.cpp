@@ -96,5 +96,25 @@ TEST(PlyPointsHostile, each_is_refused_by_name) {
   }
 }
 
+// The rows are zeros that take no room on the disk.
+TEST(PlyPointsHostile, more_points_than_are_read_are_refused) {
+  for (const auto& [format, bytes_of_a_row] : {std::pair{"binary_little_endian", 12}, {"ascii", 6}}) {
+    const TempFolder folder;
+    const std::string header = std::string("ply\nformat ") + format +
+                               " 1.0\nelement vertex 10000001\nproperty float x\nproperty float y\n"
+                               "property float z\nend_header\n";
+    std::ofstream(folder / "points.ply", std::ios::binary) << header;
+    std::filesystem::resize_file(folder / "points.ply",
+                                 header.size() + size_t{10000001} * static_cast<size_t>(bytes_of_a_row));
+    const InputFile file(folder / "points.ply");
+    try {
+      read_ply_points(file);
+      ADD_FAILURE() << format;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("element vertex: found 10000001, expected at most 10000000"));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace traceflow

@@ -66,6 +66,35 @@ TEST(TransformsLens, a_frames_angle_counts_more_than_its_files_lengths) {
   EXPECT_EQ(lens_of(file, R"({"camera_angle_x": 0.8, "fl_x": 90})").focal, Vec2<double>(90));
 }
 
+TEST(TransformsLens, instant_ngps_angles_are_degrees) {
+  // 0.8 and 0.4 radians.
+  const std::string x_fov = R"("x_fov": 45.83662361046586)", y_fov = R"("y_fov": 22.91831180523293)";
+  const double x = 40 / std::tan(0.4), y = 30 / std::tan(0.2);
+  const auto expect = [](const Lens& lens, double focal_x, double focal_y) {
+    EXPECT_NEAR(lens.focal.x, focal_x, 1e-9);
+    EXPECT_NEAR(lens.focal.y, focal_y, 1e-9);
+  };
+  expect(lens_of("{" + x_fov + "}"), x, x);
+  expect(lens_of("{" + y_fov + "}"), y, y);
+  expect(lens_of("{" + x_fov + ", " + y_fov + "}"), x, y);
+  // Degrees count more than radians, lengths more than angles, and a frame's angle more than its file says.
+  expect(lens_of("{" + x_fov + R"(, "camera_angle_x": 2, "camera_angle_y": 0.4})"), x, y);
+  expect(lens_of("{" + x_fov + R"(, "fl_x": 50})"), 50, 50);
+  expect(lens_of(R"({"fl_x": 50, "fl_y": 60})", "{" + x_fov + "}"), x, x);
+  expect(lens_of("{" + y_fov + "}", R"({"camera_angle_x": 0.8})"), x, x);
+}
+
+TEST(TransformsLens, other_lenses_that_are_switched_off_leave_a_pinhole) {
+  for (const char* off :
+       {R"("latlong": false)", R"("equirectangular": false, "orthographic": false)", R"("latlong": null)",
+        R"("equirectangular": 0)", R"("distortion_params": [0, 0.0, 0, 0, 0, 0])",
+        R"("distortion_params": [])", R"("ftheta_p0": 0, "ftheta_p1": 0.0)"}) {
+    const Lens lens = lens_of(R"({"fl_x": 50, )" + std::string(off) + "}");
+    EXPECT_TRUE(lens.is_pinhole()) << off;
+    EXPECT_EQ(lens.focal, Vec2<double>(50)) << off;
+  }
+}
+
 TEST(TransformsLens, fisheyes_and_matrices) {
   const Lens fisheye = lens_of(R"({"fl_x": 50, "k1": 0.1, "p1": 1, "camera_model": "OPENCV_FISHEYE"})");
   EXPECT_EQ(fisheye.projection, Projection::equidistant);
@@ -90,6 +119,19 @@ TEST(TransformsLensHostile, each_is_refused_by_name) {
       {R"({"fl_x": 5, "k1": null, "k2": [1]})", "k2: found [1]"},
       {R"({"fl_x": 5, "camera_model": "EQUIRECTANGULAR"})", "camera_model: found EQUIRECTANGULAR"},
       {R"({"fl_x": 5, "camera_model": 3})", "camera_model: found 3"},
+      {R"({"x_fov": 0})", "x_fov: found 0"},
+      {R"({"y_fov": 180})", "y_fov: found 180, expected an angle below 180°"},
+      {R"({"fl_x": 5, "x_fov": "wide"})", "x_fov: found \"wide\""},
+      {R"({"fl_x": 5, "ftheta_p0": 0, "ftheta_p1": 0.001})",
+       "ftheta_p1: found an f-theta lens, expected OPENCV, OPENCV_FISHEYE, PINHOLE or their simpler kin; "
+       "undistort the images"},
+      {R"({"fl_x": 5, "ftheta_p4": 1e-9})", "ftheta_p4: found an f-theta lens"},
+      {R"({"fl_x": 5, "latlong": true})", "latlong: found a panorama"},
+      {R"({"fl_x": 5, "equirectangular": 1})", "equirectangular: found a panorama"},
+      {R"({"fl_x": 5, "equirectangular": "yes"})", "equirectangular: found a panorama"},
+      {R"({"fl_x": 5, "orthographic": true})", "orthographic: found an orthographic camera"},
+      {R"({"fl_x": 5, "distortion_params": [0, 0, 0.1, 0]})",
+       "distortion_params: found a list of distortion, expected k1 to k4, p1 and p2"},
       {R"({"K": [[0, 0, 1], [0, 1, 1], [0, 0, 1]]})", "K: found"},
       {R"({"K": [1, 2, 3]})", "K[0]"}};
   for (const auto& [json, expected] : cases) {

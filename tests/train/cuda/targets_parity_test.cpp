@@ -27,5 +27,25 @@ TEST_F(TargetsOnDevice, AreThePhotographsThatTheCpuSees) {
   }
 }
 
+TEST_F(TargetsOnDevice, ShowWhatIsRenderedWhereNothingIsKnown) {
+  ViewImages on_cpu;
+  on_cpu.colour.reset({3, 5, 3});
+  on_cpu.known.reset({3, 5});
+  Tensor<float> rendered({3, 5, 3});
+  for (int64_t i = 0; i < rendered.size(); ++i) {
+    on_cpu.colour[i] = static_cast<float>(i);
+    rendered[i] = static_cast<float>(-i);
+  }
+  for (int64_t i = 0; i < on_cpu.known.size(); ++i) on_cpu.known[i] = i % 3 == 0 ? 0 : 1;
+  ViewImages on_device;
+  on_device.colour = on_cpu.colour.on(Device::cuda);
+  on_device.known = on_cpu.known.on(Device::cuda);
+  take_unknown(rendered, on_cpu);
+  take_unknown(rendered.on(Device::cuda), on_device);
+  EXPECT_EQ(list_of(on_device.colour.on(Device::cpu)), list_of(on_cpu.colour));
+  EXPECT_EQ(on_cpu.colour[9], -9);
+  EXPECT_EQ(on_cpu.colour[12], 12);
+}
+
 }  // namespace
 }  // namespace traceflow
