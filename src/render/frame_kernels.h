@@ -96,8 +96,9 @@ struct ViewPyramid {
 // Whether a stored surfel can show (render/visibility.h).
 struct CanShow {
   // A disk of full opacity ends at √(2 ln 255) = 3.33 standard deviations; the field may also widen it, by
-  // half as much again.
+  // half as much again. One smaller than a pixel shows as far as √(ln 255) pixels (method §3.2).
   static constexpr float disk_radius = 5.0F;
+  static constexpr float low_pass_pixels = 2.36F;
 
   Camera<float> camera;
   ViewPyramid pyramid;
@@ -108,7 +109,11 @@ struct CanShow {
   TRACEFLOW_HD bool operator()(int64_t i) const {
     const Vec3<float> centre = camera.point_in_camera(load3<float>(position + 3 * i));
     const float a = log_scale[2 * i], b = log_scale[2 * i + 1];
-    const float radius = (reach != nullptr ? *reach : 0.0F) + disk_radius * std::exp(a < b ? b : a);
+    const float moved = reach != nullptr ? *reach : 0.0F;
+    const float disk = disk_radius * std::exp(a < b ? b : a);
+    const float focal = camera.focal_x < camera.focal_y ? camera.focal_x : camera.focal_y;
+    const float low_pass = low_pass_pixels * (centre.z + moved) / focal;
+    const float radius = moved + (disk > low_pass ? disk : low_pass);
     return std::isfinite(radius) && pyramid.meets(centre, radius, near_plane);
   }
 };

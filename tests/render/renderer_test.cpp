@@ -31,6 +31,22 @@ TEST(Renderer, CullingChangesNoPixel) {
   expect_equal(depth, culled.raster.depth, "depth");
 }
 
+// Below a pixel a surfel shows as far as its low pass does.
+TEST(Renderer, CullingKeepsWhatIsSmallerThanAPixel) {
+  Fixture f;
+  Random random(5);
+  f.scene.main = scattered(20000, 1.2F, true, random);
+  f.scene.main.log_scale.fill(std::log(1e-4F));
+  f.scene.main.opacity_logit.fill(3);
+  f.scene.main_field.reset();
+  Renderer renderer(RenderOptions{});
+  const Tensor<float> colour = renderer.forward(f.scene, f.request).colour;
+  f.request.cull = true;
+  const Frame& culled = renderer.forward(f.scene, f.request);
+  ASSERT_LT(culled.main.count(), f.scene.main.count() * 9 / 10);
+  expect_equal(colour, culled.colour, "colour");
+}
+
 void expect_same_frame(const Frame& found, const Frame& expected) {
   expect_equal(found.colour, expected.colour, "colour");
   expect_equal(found.raster.colour, expected.raster.colour, "diffuse");

@@ -136,8 +136,9 @@ void pseudo_normals_backward(const Camera<T>& camera, const Tensor<T>& depth, co
         if (row < height - 1) g -= grad_down(row + 1, column);
         if (g == Vec3<T>(T(0))) continue;
         const T grad_z = dot(g, pixel_ray(camera, row, column));
-        grad_depth(row, column) += (T(1) - depth_ratio) * grad_z;
-        grad_median_depth(row, column) += depth_ratio * grad_z;
+        const T share = median_share(median_depth(row, column), depth_ratio);
+        grad_depth(row, column) += (T(1) - share) * grad_z;
+        grad_median_depth(row, column) += share * grad_z;
         add_point_gradient(camera, row, column, image.z(row, column), g, sum);
       }
     }

@@ -12,10 +12,18 @@
 // What the surface ops share, and their steps for one pixel or ray. Cameras travel by value.
 namespace traceflow::surface {
 
+// The median's share of the depth. There is none (0) where the transmittance never falls to a half: what was
+// drawn there has the expected depth alone.
+template <class T>
+TRACEFLOW_HD T median_share(T median, T depth_ratio) {
+  return median > T(0) ? depth_ratio : T(0);
+}
+
 // Method §4.1.
 template <class T>
 TRACEFLOW_HD T surface_depth(T expected, T median, T depth_ratio) {
-  return (T(1) - depth_ratio) * expected + depth_ratio * median;
+  const T share = median_share(median, depth_ratio);
+  return (T(1) - share) * expected + share * median;
 }
 
 template <class T>
@@ -127,8 +135,9 @@ struct PseudoNormalsBackward {
     g -= of_normal(row + 1, column).down;
     if (g == Vec3<T>(T(0))) return camera;
     const T grad_z = dot(g, pixel_ray(image.camera, row, column));
-    grad_depth[pixel] += (T(1) - image.depth_ratio) * grad_z;
-    grad_median_depth[pixel] += image.depth_ratio * grad_z;
+    const T share = median_share(image.median_depth[pixel], image.depth_ratio);
+    grad_depth[pixel] += (T(1) - share) * grad_z;
+    grad_median_depth[pixel] += share * grad_z;
     add_point_gradient(image.camera, row, column, image.z(row, column), g, camera);
     return camera;
   }
@@ -198,8 +207,9 @@ struct ReflectionRaysBackward {
     const auto mirrored = reflect_backward(ray, n, load3<T>(grad_directions + 3 * i));
     if (!is_finite(grad_point) || !is_finite(mirrored.ray) || !is_finite(mirrored.normal)) return;
     const T grad_z = dot(grad_point, ray);
-    grad_depth[pixel] += (T(1) - mirror.depth_ratio) * grad_z;
-    grad_median_depth[pixel] += mirror.depth_ratio * grad_z;
+    const T share = median_share(mirror.median_depth[pixel], mirror.depth_ratio);
+    grad_depth[pixel] += (T(1) - share) * grad_z;
+    grad_median_depth[pixel] += share * grad_z;
     add3(grad_normal + 3 * pixel, mirrored.normal);
     add_point_gradient(mirror.camera, mirror.row(i), mirror.column(i), z, grad_point, camera);
     add_ray_gradient(mirror.camera, mirror.row(i), mirror.column(i), mirrored.ray, camera);

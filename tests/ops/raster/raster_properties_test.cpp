@@ -378,6 +378,7 @@ TEST(RasterOptions, say_what_is_wrong) {
   rejects([](Options& o) { o.alpha_min = 0; });
   rejects([](Options& o) { o.alpha_max = 1; });
   rejects([](Options& o) { o.transmittance_min = std::nanf(""); });
+  rejects([](Options& o) { o.transmittance_min = 0; });
   rejects([](Options& o) { o.background.y = std::nanf(""); });
 }
 

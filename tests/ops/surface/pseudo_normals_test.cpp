@@ -51,6 +51,16 @@ TEST(PseudoNormals, OfAPlaneAreThePlanesNormal) {
   }
 }
 
+TEST(PseudoNormals, TakeTheExpectedDepthWhereThereIsNoMedian) {
+  const auto [with, without] = with_and_without_medians(SurfaceScene(9, 8));
+  expect_close(normals_of(without), normals_of(with), 1e-12, "normals");
+  Random random(4);
+  const Tensor<double> a = random_tensor<double>(with.normal.shape(), random, -1, 1);
+  const auto found = gradients_of<double>(without, a), expected = gradients_of<double>(with, a);
+  expect_gradients_without_medians(without, found.depth, found.median_depth, expected.depth,
+                                   expected.median_depth);
+}
+
 TEST(PseudoNormals, VanishAroundAHole) {
   const SurfaceScene s(9, 9);
   const Tensor<double> normal = normals_of(s);

@@ -90,6 +90,20 @@ TEST(ReflectionRays, FloatAgreesWithDouble) {
   for (size_t i = 0; i < fast.size(); ++i) expect_close(fast[i], truth[i], 1e-4, "gradient");
 }
 
+TEST(ReflectionRays, StartAtTheExpectedDepthWhereThereIsNoMedian) {
+  const auto [with, without] = with_and_without_medians(SurfaceScene(9, 8));
+  const auto pixels = some_pixels(with);
+  expect_close(rays_of(without, pixels).origins, rays_of(with, pixels).origins, 1e-12, "origins");
+  Random random(4);
+  const Shape shape{static_cast<int64_t>(pixels.size()), 3};
+  const Tensor<double> a = random_tensor<double>(shape, random, -1, 1);
+  const Tensor<double> b = random_tensor<double>(shape, random, -1, 1);
+  const auto found = ray_gradients_of<double>(without, pixels, a, b),
+             expected = ray_gradients_of<double>(with, pixels, a, b);
+  expect_gradients_without_medians(without, found.depth, found.median_depth, expected.depth,
+                                   expected.median_depth);
+}
+
 TEST(ReflectionRays, GradientAgreesWithCentralDifferences) {
   SurfaceScene s(7, 6);
   const auto pixels = some_pixels(s);

@@ -31,6 +31,29 @@ struct SurfaceScene {
   }
 };
 
+// The same scene twice: without a median where it is faint, as at a silhouette, and with one there that is
+// the expected depth. Both show the same surface.
+inline std::pair<SurfaceScene, SurfaceScene> with_and_without_medians(SurfaceScene with) {
+  SurfaceScene without = with;
+  for (int64_t i = 0; i < with.depth.size(); i += 4) {
+    with.median_depth[i] = with.depth[i];
+    without.median_depth[i] = 0;
+  }
+  return {std::move(with), std::move(without)};
+}
+
+// Where there is no median the expected depth has all of the gradient.
+inline void expect_gradients_without_medians(const SurfaceScene& without, const Tensor<double>& depth,
+                                             const Tensor<double>& median_depth,
+                                             const Tensor<double>& with_depth,
+                                             const Tensor<double>& with_median) {
+  for (int64_t i = 0; i < depth.size(); ++i) {
+    const bool has_median = without.median_depth[i] > 0;
+    EXPECT_NEAR(depth[i], with_depth[i] + (has_median ? 0 : with_median[i]), 1e-9) << i;
+    EXPECT_NEAR(median_depth[i], has_median ? with_median[i] : 0, 1e-9) << i;
+  }
+}
+
 template <class T>
 std::vector<Tensor<T>> camera_tensors(const CameraGradient<T>& gradient) {
   Tensor<T> rotation({3, 3}), position({3});
