@@ -50,7 +50,7 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
   for (int64_t i = 0; i < count; ++i) {
     const float scale = largest_scale(log_scale, i);
     Fate& f = fate[static_cast<size_t>(i)];
-    if (!(opacity_logit[i] >= faint)) {
+    if (!(opacity_logit[i] >= faint) && (limits.prunes_faint || std::isnan(opacity_logit[i]))) {
       f = Fate::prune_transparent;
     } else if (!(scale <= widest)) {
       f = Fate::prune_large;

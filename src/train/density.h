@@ -14,14 +14,15 @@ namespace traceflow {
 // How large a scene is, in its own units.
 struct SceneSize {
   float extent;  // of the cameras (method §7.6)
-  float cloud;   // radius of the capture's points
+  float cloud;   // radius of the points that the set began with
 };
 
 // What a set is held to at one density control.
 struct DensityLimits {
   SceneSize size;
   int64_t cap;               // the most surfels there may be
-  bool prunes_large = true;  // whether those that are too wide go
+  bool prunes_large = true;  // whether those that are too wide go,
+  bool prunes_faint = true;  // and those that are too faint
 };
 
 // Density control of one set of surfels (method §7.7): surfels whose centre gradient is large multiply, the

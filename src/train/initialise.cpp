@@ -200,6 +200,16 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   return s;
 }
 
+float half_diagonal(const Tensor<float>& points) {
+  if (points.empty()) return 1;
+  Vec3<float> low = load3<float>(points.row(0)), high = low;
+  for (int64_t i = 1; i < points.dim(0); ++i) {
+    low = glm::min(low, load3<float>(points.row(i)));
+    high = glm::max(high, load3<float>(points.row(i)));
+  }
+  return 0.5F * glm::length(high - low);
+}
+
 float cloud_radius(const Tensor<float>& points) {
   const Tensor<float> finite = points.empty() ? Tensor<float>({0, 3}) : finite_points(points);
   const auto count = static_cast<size_t>(finite.dim(0));

@@ -25,6 +25,9 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
 Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points, int64_t limit,
                                const InitialOptions& options, Random& random);
 
+// Half the diagonal of the box around points; 1 where there are none.
+float half_diagonal(const Tensor<float>& points);
+
 // Radius of the ball around the points' median that holds nine tenths of them, in scene units.
 float cloud_radius(const Tensor<float>& points);
 

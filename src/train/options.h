@@ -149,8 +149,9 @@ struct DensityOptions {
             "At most this share of the set multiplies at a time, the strongest signals first.");
     v.field("prune_opacity", prune_opacity, "", "Surfels fainter than this go.");
     v.field("prune_above", prune_above, "extents", "Surfels wider than this go.");
-    v.field("prune_above_cloud", prune_above_cloud, "clouds",
-            "Likewise, in radii of the cloud of the capture's points.");
+    v.field(
+        "prune_above_cloud", prune_above_cloud, "clouds",
+        "Likewise, in radii of the cloud of points; of the environment, in halves of its box's diagonal.");
     v.field("prune_above_from", prune_above_from, "iteration", "From where on the wide ones go.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
             "Interval of opacity resets; 0 for none.");
@@ -244,10 +245,15 @@ struct TrainOptions {
   RateOptions rates;
   ScheduleOptions schedule;
   DensityOptions density;
-  // Surroundings are far away and start coarse (method §7.8): a tenth of the cameras' extent would take
-  // nearly all of them before they have trained.
-  DensityOptions environment_density{
-      .from = 9000, .every = 500, .gradient_threshold = 1e-4F, .prune_above = 2, .max_surfels = 200000};
+  // Surroundings start coarse all over their box (method §7.8), which a camera that moves a little sees
+  // large: a tenth of its extent would take nearly all of them before they have trained. So they are held to
+  // their box.
+  DensityOptions environment_density{.from = 9000,
+                                     .every = 500,
+                                     .gradient_threshold = 1e-4F,
+                                     .prune_above = 1000,
+                                     .prune_above_cloud = 0.15F,
+                                     .max_surfels = 200000};
 
   template <class Visitor>
   void visit(Visitor& v) {

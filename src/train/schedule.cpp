@@ -110,6 +110,25 @@ bool Schedule::prunes_large_environment(int iteration) const {
   return iteration > mark(options_.environment_density.prune_above_from);
 }
 
+int Schedule::last_reset(int iteration, const DensityOptions& density) const {
+  const int every = interval(density.opacity_reset_every);
+  return (iteration - 1) / every * every;
+}
+
+bool Schedule::has_recovered(int iteration, int reset, const DensityOptions& density) const {
+  return iteration - reset >= std::min(density.every, interval(density.opacity_reset_every));
+}
+
+bool Schedule::prunes_faint_main(int iteration) const {
+  const int reset = last_reset(iteration, options_.density);
+  return !resets_main_opacity(reset) || has_recovered(iteration, reset, options_.density);
+}
+
+bool Schedule::prunes_faint_environment(int iteration) const {
+  const int reset = last_reset(iteration, options_.environment_density);
+  return !resets_environment_opacity(reset) || has_recovered(iteration, reset, options_.environment_density);
+}
+
 bool Schedule::resets_main_opacity(int iteration) const {
   return phase(iteration) != Phase::specular && resets(iteration, options_.density);
 }

@@ -35,6 +35,10 @@ class Schedule {
   bool densifies_environment(int iteration) const;
   bool prunes_large_main(int iteration) const;
   bool prunes_large_environment(int iteration) const;
+  // Opacities that were reset have so many iterations to recover as lie between two density controls of a run
+  // of full length: a shorter one has more controls, and the optimiser is not faster for it.
+  bool prunes_faint_main(int iteration) const;
+  bool prunes_faint_environment(int iteration) const;
   bool resets_main_opacity(int iteration) const;
   bool resets_environment_opacity(int iteration) const;
 
@@ -50,6 +54,9 @@ class Schedule {
   int interval(int in_schedule) const;
   bool densifies(int iteration, const DensityOptions& density) const;
   bool resets(int iteration, const DensityOptions& density) const;
+  // The last multiple of the interval of resets before an iteration.
+  int last_reset(int iteration, const DensityOptions& density) const;
+  bool has_recovered(int iteration, int reset, const DensityOptions& density) const;
   int sh_degree(int iteration, int start, int limit) const;
   bool specular() const { return options_.specular != Specular::none; }
 

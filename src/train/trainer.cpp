@@ -1,5 +1,7 @@
 #include "train/trainer.h"
 
+#include <fmt/format.h>
+
 #include <bit>
 #include <chrono>
 #include <cmath>
@@ -133,6 +135,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       main_density_("main", options.density, scene_.main.count(), device),
       environment_density_("environment", options.environment_density, scene_.environment.count(), device),
       cloud_radius_(cloud_radius(capture_.points)),
+      environment_radius_(half_diagonal(scene_.environment.position.on(Device::cpu))),
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
@@ -232,14 +235,19 @@ void Trainer::control_density(int done) {
   };
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
-    const DensityLimits limits{size_of_scene(), memory_.caps.main, schedule_.prunes_large_main(done)};
+    const DensityLimits limits{{scene_.extent, cloud_radius_},
+                               memory_.caps.main,
+                               schedule_.prunes_large_main(done),
+                               schedule_.prunes_faint_main(done)};
     tell(main_density_.update(scene_.main, optimiser_.main(), limits, random_), reset);
     bonds_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
     const bool reset = schedule_.resets_environment_opacity(done);
-    const DensityLimits limits{size_of_scene(), memory_.caps.environment,
-                               schedule_.prunes_large_environment(done)};
+    const DensityLimits limits{{scene_.extent, environment_radius_},
+                               memory_.caps.environment,
+                               schedule_.prunes_large_environment(done),
+                               schedule_.prunes_faint_environment(done)};
     tell(environment_density_.update(scene_.environment, optimiser_.environment(), limits, random_), reset);
   }
   if (schedule_.resets_main_opacity(done)) {
@@ -377,6 +385,7 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["options"] = options_to_json(options_);
   file.metadata["capture"] = capture_.name;
   file.metadata["capture_folder"] = capture_folder_;
+  file.metadata["environment_radius"] = fmt::format("{}", environment_radius_);
   put_views(capture_, file);
   put_caps(memory_.caps, file);
   put_arithmetic(device_, file);
@@ -463,6 +472,9 @@ void Trainer::resume() {
   health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
   iteration_ = static_cast<int>(count_in(file, "iteration"));
   seconds_ = file.number("train_seconds");
+  // Drawn with as many surfels as there was memory for then.
+  if (file.metadata.contains("environment_radius"))
+    environment_radius_ = static_cast<float>(file.number("environment_radius"));
   standing_ = health_.sound() ? Standing::sound : Standing::unsound;
   keep_caps(file);
   if (const std::string other = other_arithmetic(file, device_); !other.empty()) warn(other);

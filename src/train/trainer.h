@@ -81,7 +81,6 @@ class Trainer {
   // Everything of a step that follows a loss that is a number.
   void learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done);
-  SceneSize size_of_scene() const { return {scene_.extent, cloud_radius_}; }
   void tell_start();
   void warn(const std::string& text) { stream_.emit(events::Warning{iteration_, text}); }
   void keep_caps(const Safetensors& file);
@@ -128,9 +127,10 @@ class Trainer {
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
-  Neighbours bonds_;         // of the main surfels, for loss.rigidity; empty until wanted
-  Tensor<float> grad_rest_;  // dL/d(stored positions) of that term
-  float cloud_radius_;
+  Neighbours bonds_;          // of the main surfels, for loss.rigidity; empty until wanted
+  Tensor<float> grad_rest_;   // dL/d(stored positions) of that term
+  float cloud_radius_;        // of the capture's points
+  float environment_radius_;  // half the diagonal of the box that the environment began in
   ViewOrder views_;
   Health health_;
   Renderer renderer_;

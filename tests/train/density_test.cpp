@@ -90,6 +90,17 @@ TEST(Density, PrunesTheWideOnlyWhenItIsTold) {
   EXPECT_EQ(control.update(set.surfels, set.moments, {size, 1000, true}, random).pruned_large, 4);
 }
 
+TEST(Density, LeavesTheFaintAloneWhileTheyRecover) {
+  Set set(3, 0.02F, 0.01F);
+  set.surfels.opacity_logit[1] = 2;
+  set.surfels.opacity_logit[2] = std::nanf("");
+  DensityControl control("main", options(), 3);
+  Random random(1);
+  EXPECT_EQ(control.update(set.surfels, set.moments, {size, 100, true, false}, random).pruned_transparent, 1);
+  EXPECT_EQ(control.update(set.surfels, set.moments, {size, 100}, random).pruned_transparent, 1);
+  EXPECT_EQ(set.surfels.count(), 1);
+}
+
 TEST(Density, SplitsLargeSurfelsIntoTwoSmallerOnesInTheirPlane) {
   Set set(5, 0.05F, 0.5F);
   DensityControl control("main", options(), 5);

@@ -119,6 +119,33 @@ TEST(Schedule, DensityControlRunsAsTheMethodSays) {
   EXPECT_FALSE(s.resets_main_opacity(3100));
 }
 
+// Whatever the run's length: the optimiser needs its iterations to bring an opacity back from a reset.
+TEST(Schedule, OpacitiesHaveTimeToRecoverBeforeTheFaintGo) {
+  for (const int iterations : {6000, 10000, 20000, 25000, 40000, 50000, 60000, 90000}) {
+    TrainOptions options = paper();
+    options.iterations = iterations;
+    const Schedule s(options);
+    int reset_main = 0, reset_environment = 0, prunings = 0;
+    for (int i = 1; i < iterations; ++i) {
+      if (s.densifies_main(i) && s.prunes_faint_main(i)) {
+        ++prunings;
+        EXPECT_TRUE(reset_main == 0 || i - reset_main >= 100) << iterations << " " << i;
+      }
+      if (s.densifies_environment(i) && s.prunes_faint_environment(i)) {
+        ++prunings;
+        EXPECT_TRUE(reset_environment == 0 || i - reset_environment >= std::min(500, iterations / 20)) << i;
+      }
+      if (iterations == 60000) {
+        EXPECT_TRUE(!s.densifies_main(i) || s.prunes_faint_main(i)) << i;
+        EXPECT_TRUE(!s.densifies_environment(i) || s.prunes_faint_environment(i)) << i;
+      }
+      if (s.resets_main_opacity(i)) reset_main = i;
+      if (s.resets_environment_opacity(i)) reset_environment = i;
+    }
+    EXPECT_GT(prunings, 50) << iterations;
+  }
+}
+
 TEST(Options, EveryPresetIsValid) {
   for (const char* name : {"paper", "cpu", "demo"}) EXPECT_NO_THROW(preset(name).validate()) << name;
   EXPECT_THROW(preset("gpu"), InputError);

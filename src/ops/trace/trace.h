@@ -55,8 +55,8 @@ struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
   Tensor<T> origins;     // R×3
   Tensor<T> directions;  // R×3
-  // M, the density-control signal: Σ over hits of |dL/dposition| · t / 2 as EnvGS has it, t in scene units.
-  // The reference leaves it empty.
+  // M, the density-control signal: |Σ over hits of dL/dposition · t / 2| as EnvGS has it, t in scene units.
+  // Hits that pull a surfel to all sides do not ask for more of it. The reference leaves it empty.
   Tensor<T> position_gradient;
 };
 using InputGradient = BasicInputGradient<float>;

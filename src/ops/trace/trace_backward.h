@@ -46,8 +46,8 @@ inline constexpr size_t position = 0;  // along t_u, t_v, n
 inline constexpr size_t turn = 3;      // by a small rotation about t_u, t_v, n
 inline constexpr size_t scale = 6;
 inline constexpr size_t opacity = 8;
-inline constexpr size_t signal = 9;  // |dL/dposition| · distance / 2
-inline constexpr size_t count = 10;
+inline constexpr size_t signal = 9;  // dL/dposition · distance / 2, along t_u, t_v, n
+inline constexpr size_t count = 12;
 inline constexpr size_t padded = 16;
 }  // namespace part
 
@@ -90,7 +90,8 @@ struct FinishSurfel {
     for (int k = 0; k < 4; ++k) rotation[4 * i + k] = q[k];
     for (int k = 0; k < 2; ++k) scale[2 * i + k] = sum[part::scale + static_cast<size_t>(k)];
     opacity[i] = sum[part::opacity];
-    signal[i] = sum[part::signal];
+    // The frame's axes are unit and upright on each other.
+    signal[i] = glm::length(load3<float>(sum + part::signal));
   }
 };
 

@@ -31,7 +31,7 @@ TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& r
   parts[part::scale] = pull_u * u;
   parts[part::scale + 1] = pull_v * v;
   parts[part::opacity] = hit.grad_exponent * f.inverse_opacity;
-  parts[part::signal] = 0.5F * hit.distance * std::sqrt(pull_u * pull_u + pull_v * pull_v + a * a);
+  for (size_t k = 0; k < 3; ++k) parts[part::signal + k] = 0.5F * hit.distance * parts[part::position + k];
   const Vec3<float> moved = grad_x - a * f.normal;
   grad_origin += moved;
   grad_direction += hit.distance * moved;

@@ -109,6 +109,47 @@ TEST(Trace, PositionGradientIsTheNormTimesHalfTheDistance) {
   EXPECT_NEAR(t.gradient.position_gradient[0], glm::length(g) * 2 / 2, 1e-6);
 }
 
+// The scene's first rays with one weight for all, whichever are traced.
+Traced traced_alike(TestScene scene, int64_t first, int64_t count) {
+  Tensor<float> origins({count, 3}), directions({count, 3});
+  std::copy_n(scene.origins.row(first), 3 * count, origins.data());
+  std::copy_n(scene.directions.row(first), 3 * count, directions.data());
+  const BvhPtr bvh = make_bvh();
+  const SavedPtr saved = make_saved();
+  Traced result;
+  build(scene.surfels, {}, *bvh);
+  forward(scene.surfels, *bvh, origins, directions, {}, result.output, saved.get());
+  OutputGradient weights;
+  weights.colour.reset({count, 3});
+  weights.colour.fill(0.7F);
+  backward(scene.surfels, origins, directions, {}, *saved, weights, result.gradient);
+  return result;
+}
+
+// Rays through both sides of a disk: their pulls are added before their length is taken.
+TEST(Trace, PositionGradientOfManyHitsIsTheNormOfTheirSum) {
+  constexpr int64_t rays = 8;
+  TestScene scene = blank_scene(1, 0, rays);
+  set_facing(scene.surfels, 0, 2, 0.5F, 0.8F);
+  for (int64_t ray = 0; ray < rays; ++ray) {
+    scene.origins(ray, 0) = 0.2F * static_cast<float>(ray) - 0.7F;
+    scene.origins(ray, 1) = 0.1F;
+    scene.directions(ray, 0) = 0.05F * static_cast<float>(ray);
+    scene.directions(ray, 2) = 1;
+  }
+  Vec3<float> sum(0);
+  float norms = 0;
+  for (int64_t ray = 0; ray < rays; ++ray) {
+    const Traced one = traced_alike(scene, ray, 1);
+    const float t = one.output.distance[0] * glm::length(load3<float>(scene.directions.row(ray)));
+    sum += 0.5F * t * load3<float>(one.gradient.surfels.position.row(0));
+    norms += one.gradient.position_gradient[0];
+  }
+  const float found = traced_alike(scene, 0, rays).gradient.position_gradient[0];
+  EXPECT_NEAR(found, glm::length(sum), 1e-4F * norms);
+  EXPECT_GT(norms, 1.5F * found) << "some of them pull against each other";
+}
+
 TEST(Trace, HitsPerPassChangesNothing) {
   SceneOptions o{.surfels = 3000, .rays = 600, .scale_max = 0.3};
   for (const double opacity : {0.3, 0.99}) {

@@ -124,11 +124,11 @@ HWY_INLINE RayPull places_backward(const BackwardFrame* frames, const UnitRay& r
     const HitVec pull_v = hn::Mul(hn::Mul(grad_exponent, v), f.inverse_scale_v);
     const HitVec3 grad_x = add_scaled(add_scaled(zero, hn::Neg(pull_u), f.t_u), hn::Neg(pull_v), f.t_v);
     const HitVec a = hn::Div(hn::Add(grad_distance, dot(grad_x, direction)), dot(f.normal, direction));
-    const HitVec norm = hn::Sqrt(hn::MulAdd(a, a, hn::MulAdd(pull_v, pull_v, hn::Mul(pull_u, pull_u))));
+    const HitVec half_distance = hn::Mul(hn::Set(d, 0.5F), distance);
     add_parts({pull_u, pull_v, a, hn::Mul(a, along_v), hn::Neg(hn::Mul(a, along_u)),
                hn::NegMulAdd(pull_u, along_v, hn::Mul(pull_v, along_u)), hn::Mul(pull_u, u),
-               hn::Mul(pull_v, v), hn::Mul(grad_exponent, f.inverse_opacity),
-               hn::Mul(hn::Mul(hn::Set(d, 0.5F), distance), norm), zero.x, zero.x},
+               hn::Mul(pull_v, v), hn::Mul(grad_exponent, f.inverse_opacity), hn::Mul(half_distance, pull_u),
+               hn::Mul(half_distance, pull_v), hn::Mul(half_distance, a)},
               hits.row + i, count);
     const HitVec3 moved = keep_lanes(used, add_scaled(grad_x, hn::Neg(a), f.normal));
     origin_sum = add_scaled(origin_sum, hn::Set(d, 1.0F), moved);

@@ -80,7 +80,6 @@ struct alignas(64) HitParts {
   float part[part::count];
   float passed[3];  // dL/dcolour
   uint32_t ray;     // in the tracer's order
-  float unused[2];
 };
 
 // What forward keeps for backward. Rays are counted in the tracer's order.
