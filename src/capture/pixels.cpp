@@ -20,15 +20,17 @@ void widen(const ViewPixels& pixels, ViewImages& images) {
 }
 
 void take_unknown(const Tensor<float>& rendered, ViewImages& images) {
-  require(images.known.empty() || rendered.shape() == images.colour.shape(),
-          "a render has its photograph's size", rendered.shape().to_string());
+  if (images.known.empty()) return;
+  require(rendered.shape() == images.colour.shape(), "a render has its photograph's size",
+          rendered.shape().to_string());
   parallel_for(images.colour.device(), "capture: take unknown", images.known.size(),
                TakeUnknown{images.known.data(), rendered.data(), images.colour.data()});
 }
 
 void leave_unknown(const ViewImages& images, Tensor<float>& grad_colour) {
-  require(images.known.empty() || grad_colour.shape() == images.colour.shape(),
-          "a gradient has its photograph's size", grad_colour.shape().to_string());
+  if (images.known.empty()) return;
+  require(grad_colour.shape() == images.colour.shape(), "a gradient has its photograph's size",
+          grad_colour.shape().to_string());
   parallel_for(grad_colour.device(), "capture: leave unknown", images.known.size(),
                LeaveUnknown{images.known.data(), grad_colour.data()});
 }

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <string>
 
+#include "base/device_memory.h"
 #include "base/kernel.h"
 #include "base/tensor.h"
 #include "primitives/cublas_lt.h"
@@ -24,6 +25,7 @@ const CublasLt& lt() {
 }
 
 void check(cublasStatus_t result, const char* what) {
+  if (result == CUBLAS_STATUS_ALLOC_FAILED) throw memory::OutOfMemory(0, facts().free_bytes);
   require(result == CUBLAS_STATUS_SUCCESS, what,
           result == CUBLAS_STATUS_SUCCESS ? "" : lt().status_string(result));
 }

@@ -15,7 +15,7 @@ double psnr(double squared_error) { return -10.0 * std::log10(std::max(squared_e
 }  // namespace
 
 void LossMeans::begin(Device device) {
-  means_.place(device).resize({term_count});
+  means_.place(device).reset({term_count});
   weight_ = {};
 }
 

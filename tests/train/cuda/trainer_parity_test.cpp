@@ -105,7 +105,7 @@ TEST_F(TrainerOnDevice, ARunGoesOnOnTheOtherDevice) {
 // a run with more memory goes on from there.
 TEST_F(TrainerOnDevice, RunningOutOfMemoryEndsInASavedState) {
   const TrainOptions options = small_run(20);
-  for (const size_t more : {size_t{0}, size_t{20000}, size_t{60000}, size_t{200000}}) {
+  for (const size_t more : {size_t{0}, size_t{20000}, size_t{60000}, size_t{120000}}) {
     Trainer trainer = make_trainer(options, "memory", Device::cuda);
     trainer.stream().listen([&](const events::Event& event) {
       const auto* step = std::get_if<events::Step>(&event);

@@ -26,11 +26,20 @@ T* room(Tensor<T>& tensor, const Shape& shape) {
   return tensor.data();
 }
 
+// The same for a tensor that is bounded: one that grows is given a quarter more, but where that would pass
+// the bound it is made anew.
+template <class T>
+T* room_within(int64_t most, Tensor<T>& tensor, int64_t count) {
+  if (tensor.size() < count && count + count / 4 > most) tensor = {};
+  return room(tensor, {count});
+}
+
 const float* data_or_null(const Tensor<float>& tensor) { return tensor.empty() ? nullptr : tensor.data(); }
 
 // How many the limit allows.
 int64_t allowed_records(const Saved& saved) {
-  constexpr size_t in_order = sizeof(HitParts) + 2 * (sizeof(uint64_t) + sizeof(uint32_t));
+  // Of a sort that keeps what it is given, and of the ends of spans.
+  constexpr size_t in_order = sizeof(HitParts) + 3 * (sizeof(uint64_t) + sizeof(uint32_t)) + 8;
   const size_t bytes = sizeof(Record) + (deterministic() ? in_order : 0);
   return std::clamp<int64_t>(saved.device_bytes / static_cast<int64_t>(bytes), 1, most_records);
 }
@@ -44,9 +53,9 @@ SavedHits& hits_of(const Saved& saved) {
 }
 
 void make_room(const Saved& saved, int64_t rays, SavedHits& hits) {
-  const int64_t wanted =
-      std::min(allowed_records(saved), std::max(expected_records * rays, hits.most_wanted / 4 * 5));
-  if (hits.records.size() < wanted) room(hits.records, {wanted});
+  const int64_t allowed = allowed_records(saved);
+  const int64_t wanted = std::min(allowed, std::max(expected_records * rays, hits.most_wanted / 4 * 5));
+  if (hits.records.size() < wanted) room_within(allowed, hits.records, wanted);
   room(hits.used, {1});
   room(hits.last_head, {rays});
   room(hits.hits, {rays});
@@ -150,7 +159,7 @@ class Backward {
     const Tensor<uint32_t> counts = hits_.hits.on(Device::cpu);  // waits for the device
     const uint32_t most = *std::max_element(counts.values().begin(), counts.values().end());
     const int64_t space = std::max(std::min(allowed, hits_.records_wanted), records_of(most));
-    if (hits_.records.size() < space) room(hits_.records, {space});
+    if (hits_.records.size() < space) room_within(space, hits_.records, space);
     hits_.overwritten = true;
     for (int64_t first = 0; first < hits_.rays;) {
       int64_t last = first, records = 0;
