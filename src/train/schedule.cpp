@@ -90,8 +90,9 @@ bool Schedule::densifies(int iteration, const DensityOptions& density) const {
 }
 
 bool Schedule::resets(int iteration, const DensityOptions& density) const {
-  return density.opacity_reset_every > 0 && iteration > mark(density.from) &&
-         iteration < mark(density.until) && iteration % interval(density.opacity_reset_every) == 0;
+  const int every = interval(density.opacity_reset_every);
+  return density.opacity_reset_every > 0 && every >= 2 * density.every && iteration > mark(density.from) &&
+         iteration < mark(density.until) && iteration % every == 0;
 }
 
 bool Schedule::densifies_main(int iteration) const {
@@ -116,7 +117,7 @@ int Schedule::last_reset(int iteration, const DensityOptions& density) const {
 }
 
 bool Schedule::has_recovered(int iteration, int reset, const DensityOptions& density) const {
-  return iteration - reset >= std::min(density.every, interval(density.opacity_reset_every));
+  return iteration - reset >= density.every;
 }
 
 bool Schedule::prunes_faint_main(int iteration) const {

@@ -36,7 +36,8 @@ class Schedule {
   bool prunes_large_main(int iteration) const;
   bool prunes_large_environment(int iteration) const;
   // Opacities that were reset have so many iterations to recover as lie between two density controls of a run
-  // of full length: a shorter one has more controls, and the optimiser is not faster for it.
+  // of full length: a shorter one has more controls, and the optimiser is not faster for it. Where resets
+  // would follow each other before twice that, there are none.
   bool prunes_faint_main(int iteration) const;
   bool prunes_faint_environment(int iteration) const;
   bool resets_main_opacity(int iteration) const;
