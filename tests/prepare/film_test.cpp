@@ -22,7 +22,6 @@ namespace traceflow::prepare {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::Each;
 using testing::ElementsAre;
 using testing::HasSubstr;
 

@@ -13,6 +13,8 @@
 #include "support/narrow_lpips.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"
+#include "train/density.h"
+#include "train/initialise.h"
 #include "train/small_run.h"
 
 namespace traceflow {
