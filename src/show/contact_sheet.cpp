@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 
 #include "files/png.h"
 #include "show/drawing.h"
@@ -43,7 +44,9 @@ void ContactSheet::add(const Tensor<float>& photograph, const Frame& frame) {
 
 void ContactSheet::write(const std::filesystem::path& path) const {
   require(!rows_.empty(), "a contact sheet has a row");
-  int64_t width = 0, height = title_height;
+  // No column is narrower than the longest title.
+  int64_t width = letter_width * static_cast<int64_t>(std::string_view(titles[0]).size());
+  int64_t height = title_height;
   for (const auto& row : rows_) {
     width = std::max(width, row[0].dim(1));
     height += row[0].dim(0) + gap;

@@ -118,9 +118,11 @@ TEST(ContactSheet, HasNinePicturesARow) {
   sheet.write(file);
   const Tensor<uint8_t> picture = read_png(file);
   std::filesystem::remove(file);
-  ASSERT_EQ(picture.shape(), (Shape{16 + 2 * (2 + 3), 9 * (2 + 3) - 3, 3}));
+  // As wide as "photograph", though the pictures are smaller.
+  constexpr int64_t column_width = 80 + 3;
+  ASSERT_EQ(picture.shape(), (Shape{16 + 2 * (2 + 3), 9 * column_width - 3, 3}));
   // The second row's photograph, render, difference (three times 0.1) and, last, alpha.
-  const auto at = [&](int64_t column) { return int{picture(16 + 5, column * 5, 1)}; };
+  const auto at = [&](int64_t column) { return int{picture(16 + 5, column * column_width, 1)}; };
   EXPECT_EQ(at(0), 153);
   EXPECT_EQ(at(1), 128);
   EXPECT_NEAR(at(2), 77, 1);
