@@ -17,13 +17,6 @@ cudaStream_t stream() {
 }
 
 void check(cudaError_t result, const char* what) {
-  // Also of what the driver loads when a kernel runs for the first time.
-  if (result == cudaErrorMemoryAllocation) {
-    cudaGetLastError();  // forgets it
-    size_t free = 0, total = 0;
-    cudaMemGetInfo(&free, &total);
-    throw memory::OutOfMemory(0, free);
-  }
   require(result == cudaSuccess, what, result == cudaSuccess ? "" : cudaGetErrorString(result));
 }
 

@@ -202,12 +202,14 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
 
 float half_diagonal(const Tensor<float>& points) {
   if (points.empty()) return 1;
-  Vec3<float> low = load3<float>(points.row(0)), high = low;
-  for (int64_t i = 1; i < points.dim(0); ++i) {
-    low = glm::min(low, load3<float>(points.row(i)));
-    high = glm::max(high, load3<float>(points.row(i)));
+  Vec3<float> size(0);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<float> values;
+    for (int64_t i = 0; i < points.dim(0); ++i) values.push_back(points(i, axis));
+    const Vec2<float> range = robust_range(std::move(values));
+    size[axis] = range[1] - range[0];
   }
-  return 0.5F * glm::length(high - low);
+  return 0.5F * glm::length(size);
 }
 
 float cloud_radius(const Tensor<float>& points) {

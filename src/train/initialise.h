@@ -25,7 +25,8 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
 Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& points, int64_t limit,
                                const InitialOptions& options, Random& random);
 
-// Half the diagonal of the box around points; 1 where there are none.
+// Half the diagonal of the box around points but the outermost half per cent on either side; 1 where there
+// are none.
 float half_diagonal(const Tensor<float>& points);
 
 // Radius of the ball around the points' median that holds nine tenths of them, in scene units.

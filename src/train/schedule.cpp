@@ -91,7 +91,7 @@ bool Schedule::densifies(int iteration, const DensityOptions& density) const {
 
 bool Schedule::resets(int iteration, const DensityOptions& density) const {
   const int every = interval(density.opacity_reset_every);
-  return density.opacity_reset_every > 0 && every >= 2 * density.every && iteration > mark(density.from) &&
+  return density.opacity_reset_every > 0 && every / 2 >= density.every && iteration > mark(density.from) &&
          iteration < mark(density.until) && iteration % every == 0;
 }
 

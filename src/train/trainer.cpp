@@ -473,8 +473,8 @@ void Trainer::resume() {
   iteration_ = static_cast<int>(count_in(file, "iteration"));
   seconds_ = file.number("train_seconds");
   // Drawn with as many surfels as there was memory for then.
-  if (file.metadata.contains("environment_radius"))
-    environment_radius_ = static_cast<float>(file.number("environment_radius"));
+  const bool tells_radius = file.metadata.contains("environment_radius");
+  environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;
   standing_ = health_.sound() ? Standing::sound : Standing::unsound;
   keep_caps(file);
   if (const std::string other = other_arithmetic(file, device_); !other.empty()) warn(other);

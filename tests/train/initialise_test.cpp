@@ -173,6 +173,20 @@ TEST(Neighbours, NearestOfAgreesWithABruteForceSearch) {
   }
 }
 
+TEST(HalfDiagonal, IsOfTheBoxAndForgivesStrays) {
+  Random random(1);
+  Tensor<float> points({2000, 3});
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    points(i, 0) = static_cast<float>(random.uniform(0, 2));
+    points(i, 1) = static_cast<float>(random.uniform(0, 4));
+    points(i, 2) = static_cast<float>(random.uniform(-2, 2));
+  }
+  EXPECT_NEAR(half_diagonal(points), 3, 0.06);
+  points(7, 0) = points(9, 2) = 1e6F;
+  EXPECT_NEAR(half_diagonal(points), 3, 0.06);
+  EXPECT_EQ(half_diagonal({}), 1);
+}
+
 TEST(CloudRadius, HoldsNineTenthsAndForgivesStrays) {
   Tensor<float> points({101, 3});
   for (int64_t i = 0; i < 101; ++i) {
