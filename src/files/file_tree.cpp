@@ -93,7 +93,8 @@ bool FileTree::has_folder(const std::string& folder) const {
     return next != members_.end() && next->first.starts_with(with_slash(*inside));
   }
   std::error_code error;
-  return fs::is_directory(path_ / *inside, error);
+  const fs::path target = follow(*inside, error);
+  return lies_inside(target) && fs::is_directory(target, error);
 }
 
 std::vector<std::string> FileTree::names_in(const std::string& folder, bool folders) const {
@@ -110,10 +111,14 @@ std::vector<std::string> FileTree::names_in(const std::string& folder, bool fold
     }
   } else {
     std::error_code error;
-    for (const fs::directory_entry& entry : fs::directory_iterator(path_ / *inside, error)) {
+    const fs::path target = follow(*inside, error);
+    if (!lies_inside(target)) return {};
+    for (const fs::directory_entry& entry : fs::directory_iterator(target, error)) {
       std::error_code unreadable;
       const bool matches = folders ? entry.is_directory(unreadable) : entry.is_regular_file(unreadable);
-      if (matches) names.insert(entry.path().filename().string());
+      const bool leads_out = matches && folders && entry.is_symlink(unreadable) &&
+                             !lies_inside(fs::canonical(entry.path(), unreadable));
+      if (matches && !leads_out) names.insert(entry.path().filename().string());
     }
   }
   return {names.begin(), names.end()};
@@ -137,16 +142,29 @@ InputFile FileTree::open_file(const std::string& file) const {
     return archive_->part(member.offset, member.size, name_of(*inside));
   }
   std::error_code error;
-  const fs::path target = fs::canonical(canonical_ / *inside, error);
-  if (!error) {
-    const auto [end, rest] =
-        std::mismatch(canonical_.begin(), canonical_.end(), target.begin(), target.end());
-    if (end != canonical_.end()) {
-      throw InputError(name_of(*inside), "", "a link out of the folder, to " + target.string(),
-                       "files inside it", "copy the file there");
-    }
+  const fs::path target = follow(*inside, error);
+  if (error) throw InputError(name_of(*inside), "", error.message(), "a readable file");
+  if (!lies_inside(target)) {
+    throw InputError(name_of(*inside), "", "a link out of the folder, to " + target.string(),
+                     "files inside it", "copy the file there");
   }
-  return InputFile(path_ / *inside);
+  return InputFile::below(canonical_, target.lexically_relative(canonical_), name_of(*inside));
+}
+
+fs::path FileTree::follow(const std::string& inside, std::error_code& error) const {
+  fs::path at = canonical_;
+  for (const fs::path& part : fs::path(inside)) {
+    at /= part;
+    if (fs::is_symlink(at, error)) return fs::canonical(canonical_ / inside, error);
+  }
+  // What is not there says so when it is opened.
+  error.clear();
+  return at;
+}
+
+bool FileTree::lies_inside(const fs::path& target) const {
+  return std::mismatch(canonical_.begin(), canonical_.end(), target.begin(), target.end()).first ==
+         canonical_.end();
 }
 
 }  // namespace traceflow

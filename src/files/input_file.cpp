@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/descriptor.h"
 #include "base/error.h"
 
 namespace traceflow {
@@ -19,17 +20,36 @@ namespace {
 // What the last system call that failed says.
 std::string reason() { return std::generic_category().message(errno); }
 
+// Without waiting for somebody to write, should it be a pipe.
+constexpr int to_read = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
+
+int open_below(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  constexpr int to_pass = O_PATH | O_DIRECTORY | O_CLOEXEC;
+  Descriptor at(::open(folder.c_str(), to_pass));
+  for (const std::filesystem::path& part : file.parent_path()) {
+    if (!at) return -1;
+    at = Descriptor(::openat(at.number(), part.c_str(), to_pass | O_NOFOLLOW));
+  }
+  return at ? ::openat(at.number(), file.filename().c_str(), to_read | O_NOFOLLOW) : -1;
+}
+
 }  // namespace
 
-InputFile::InputFile(const std::filesystem::path& path) : path_(path) {
-  // Without waiting for somebody to write, should it be a pipe.
-  descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-  if (descriptor_ < 0 && errno == ENOENT) throw InputError(path.string(), "", reason(), "a readable file");
-  if (descriptor_ < 0) throw UnreadableFile(path, reason());
+InputFile::InputFile(const std::filesystem::path& path) : InputFile(path, ::open(path.c_str(), to_read)) {}
+
+InputFile InputFile::below(const std::filesystem::path& folder, const std::filesystem::path& file,
+                           std::filesystem::path name) {
+  return {std::move(name), open_below(folder, file)};
+}
+
+InputFile::InputFile(std::filesystem::path path, int descriptor)
+    : path_(std::move(path)), descriptor_(descriptor) {
+  if (descriptor_ < 0 && errno == ENOENT) throw InputError(path_.string(), "", reason(), "a readable file");
+  if (descriptor_ < 0) throw UnreadableFile(path_, reason());
   struct stat status {};
   if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
     close();
-    throw InputError(path.string(), "", "something that is not a regular file", "a readable file");
+    throw InputError(path_.string(), "", "something that is not a regular file", "a readable file");
   }
   size_ = status.st_size;
 }

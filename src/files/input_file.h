@@ -22,6 +22,10 @@ class UnreadableFile : public InputError {
 class InputFile {
  public:
   explicit InputFile(const std::filesystem::path& path);
+  // The file of a folder at a path that has no links: one that was put there since is not followed. Errors
+  // call it `name`.
+  static InputFile below(const std::filesystem::path& folder, const std::filesystem::path& file,
+                         std::filesystem::path name);
   // A nameless file in the machine's temporary folder, gone when closed; errors name `origin`.
   static InputFile scratch(const std::filesystem::path& origin);
   // `size` bytes of this file from `offset`, which it must have, as a file of their own called `name`.
@@ -42,6 +46,8 @@ class InputFile {
   void append(std::span<const std::byte> bytes);
 
  private:
+  // What was opened for reading; -1 where errno says why it could not be.
+  InputFile(std::filesystem::path path, int descriptor);
   InputFile(std::filesystem::path path, int descriptor, int64_t size);
   void close() noexcept;
 

@@ -149,6 +149,14 @@ TEST(ColmapCapture, photographs_without_camera_keep_their_places_in_time) {
   EXPECT_FLOAT_EQ(capture.train[3].time, 1);
 }
 
+// A Mac lays one beside each file that it copies to a foreign disk.
+TEST(ColmapCapture, hidden_files_are_no_photographs) {
+  ColmapCapture fake(10, ".jpg");
+  for (int i = 0; i < 10; ++i) fake.write_text("images/._frame_" + std::to_string(i) + ".jpg", "Mac OS X");
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, IsEmpty());
+}
+
 TEST(ColmapCapture, smaller_images_are_enough) {
   ColmapCapture fake(4);
   fake.save();

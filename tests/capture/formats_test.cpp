@@ -116,6 +116,18 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
               Contains(tells("one-time", Severity::problem, "all training views are of one time")));
 }
 
+TEST(Formats, photographs_end_as_cameras_call_them) {
+  for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"}) {
+    NerfDsCapture fake;
+    const std::string image = "rgb/1x/000001_left";
+    std::filesystem::rename(fake.path() / (image + ".png"), fake.path() / (image + extension));
+    fake.save();
+    const Capture capture = load_capture(fake.path(), {});
+    EXPECT_EQ(capture.train.size(), 4U) << extension;
+    EXPECT_EQ(capture.images->source("000001_left").image.path, image + extension);
+  }
+}
+
 TEST(Formats, are_chosen_by_looking_or_by_name) {
   ColmapCapture both(4);
   both.save();

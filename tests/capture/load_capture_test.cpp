@@ -226,6 +226,38 @@ TEST(Images, grey_and_alpha_become_three_channels) {
   }
 }
 
+TEST(Images, of_sixteen_bits_are_rounded_and_stand_before_the_background) {
+  NerfDsCapture fake;
+  Tensor<uint16_t> rgb({8, 12, 3}), rgba({8, 12, 4});
+  for (int64_t i = 0; i < rgb.size(); ++i) rgb[i] = static_cast<uint16_t>(i * 65535 / (rgb.size() - 1));
+  for (int64_t i = 0; i < rgba.size(); ++i) rgba[i] = static_cast<uint16_t>(40503 * i);
+  rgba[3] = 0;
+  rgba[7] = 65535;
+  write_png(fake.path() / "rgb/1x/000000_left.png", rgb);
+  write_png(fake.path() / "rgb/1x/000001_left.png", rgba);
+  fake.save();
+  for (const auto& [background, level] : {std::pair{Background::automatic, 0.0},
+                                          {Background::black, 0.0},
+                                          {Background::grey, 128 / 255.0},
+                                          {Background::white, 1.0}}) {
+    CaptureOptions options;
+    options.background = background;
+    const Capture capture = load_capture(fake.path(), options);
+    const auto from_rgb = load_images(capture, capture.train[0]),
+               from_rgba = load_images(capture, capture.train[1]);
+    for (int64_t i = 0; i < 96; ++i) {
+      const double alpha = rgba[4 * i + 3] / 65535.0;
+      for (int64_t c = 0; c < 3; ++c) {
+        const auto nearest = static_cast<float>(std::lround(rgb[3 * i + c] / 257.0));
+        EXPECT_EQ(from_rgb->colour[3 * i + c], nearest / 255.0F);
+        const double seen = rgba[4 * i + c] / 65535.0 * alpha + level * (1 - alpha);
+        // The colour, alpha and what is seen of both are rounded each.
+        EXPECT_NEAR(from_rgba->colour[3 * i + c], seen, 1.51 / 255);
+      }
+    }
+  }
+}
+
 TEST(Masks, of_motion_serve_where_there_is_none_of_the_object) {
   NerfDsCapture fake;
   Tensor<uint8_t> white({8, 12});

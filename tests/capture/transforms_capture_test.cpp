@@ -145,6 +145,18 @@ TEST(SyntheticCapture, paths_are_found_by_their_ends_among_many_that_are_nowhere
   EXPECT_THAT(capture.warnings, Contains(says("1 image has no camera (test/r_20.png)")));
 }
 
+TEST(SyntheticCapture, a_frame_that_is_written_in_two_ways_is_one) {
+  SyntheticCapture fake;
+  fake.files["transforms_test.json"]["frames"].push_back(
+      TransformsCapture::frame("/home/someone/lego/train/r_0", 0));
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_EQ(capture.train.size(), 6U);
+  EXPECT_EQ(capture.test.size(), 3U);
+  EXPECT_THAT(capture.warnings,
+              Contains(tells("repeated-id", Severity::problem, "train/r_0 named more than once: used once")));
+}
+
 TEST(SyntheticCapture, what_is_wrong_in_the_test_file_is_told_of_it) {
   SyntheticCapture fake;
   fake.files["transforms_test.json"]["k1"] = -60;
@@ -221,9 +233,75 @@ TEST(NgpCapture, paths_of_another_machine_are_found_by_their_ends) {
   EXPECT_EQ(capture.train.size(), 5U);
   EXPECT_THAT(capture.warnings,
               Contains(tells("path-outside", Severity::notice, "not in the capture as written")));
+  // Points lie beside the images, or where their own path ends.
+  fake.write_text("sparse_pc.ply",
+                  "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+                  "property float z\nend_header\n0 0 0\n0.1 0.2 0.3\n");
+  fake.write_text("data/sparse_pc.ply", "of another capture");
+  for (const char* points : {"/home/someone/data/sparse_pc.ply", "/mnt/scans/sparse_pc.ply"}) {
+    fake.json()["ply_file_path"] = points;
+    fake.save();
+    const Capture with_points = load_capture(fake.path(), {});
+    ASSERT_EQ(with_points.points.shape(), (Shape{2, 3})) << points;
+    const auto told = std::find_if(with_points.warnings.begin(), with_points.warnings.end(),
+                                   [](const Finding& f) { return f.kind == "path-outside"; });
+    ASSERT_NE(told, with_points.warnings.end());
+    EXPECT_THAT(told->files, Contains(points));
+  }
   for (Json& frame : fake.json()["frames"]) frame["file_path"] = "../../etc/passwd";
   fake.save();
   EXPECT_THAT(refusal(fake.path()), HasSubstr("none of 1 images"));
+}
+
+// Masks and priors go by the ids, which lack the folder that all images share: missing ones share it too.
+TEST(NgpCapture, a_missing_image_of_another_machine_changes_no_id) {
+  for (const char* before : {"/home/someone/data/", "data/fox/", "../fox/"}) {
+    NgpCapture fake(6);
+    for (Json& frame : fake.json()["frames"])
+      frame["file_path"] = before + frame["file_path"].get<std::string>();
+    fake.save();
+    std::filesystem::remove(fake.path() / "images/3.jpg");
+    for (const int i : {0, 1, 2, 4, 5})
+      fake.write_image("mask/1x/" + std::to_string(i) + ".png.png",
+                       Tensor<uint8_t>({fake.height, fake.width}));
+    const Capture capture = load_capture(fake.path(), {});
+    EXPECT_THAT(ids(capture.test), ElementsAre("0")) << before;
+    EXPECT_THAT(ids(capture.train), ElementsAre("1", "2", "4", "5")) << before;
+    EXPECT_TRUE(capture.has_masks) << before;
+    EXPECT_THAT(capture.warnings,
+                Contains(tells("missing-image", Severity::problem, "1 of 6 listed views have no image (3)")));
+    EXPECT_THAT(capture.warnings, Not(Contains(says("have no mask"))));
+  }
+}
+
+TEST(NgpCapture, missing_images_of_a_rig_of_another_machine_are_told_apart) {
+  NgpCapture fake(0);
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = (i < 3 ? "images/left/" : "images/right/") + std::to_string(i % 3) + ".jpg";
+    fake.json()["frames"].push_back(NgpCapture::frame("/home/someone/data/" + name, i));
+    if (i % 3 != 1) fake.write_text(name, jpeg_bytes(fake.image(i), 100));
+  }
+  fake.save();
+  const Capture capture = load_capture(fake.path(), {});
+  EXPECT_THAT(ids(capture.test), ElementsAre("left_0"));
+  EXPECT_THAT(ids(capture.train), ElementsAre("left_2", "right_0", "right_2"));
+  ASSERT_THAT(capture.warnings, Contains(tells("missing-image", Severity::problem,
+                                               "2 of 6 listed views have no image (left_1, right_1)")));
+  const auto missing = std::find_if(capture.warnings.begin(), capture.warnings.end(),
+                                    [](const Finding& f) { return f.kind == "missing-image"; });
+  EXPECT_THAT(missing->files, ElementsAre("images/left/1.jpg", "images/right/1.jpg"));
+}
+
+TEST(NgpCapture, a_rolling_shutter_is_told_of) {
+  NgpCapture fake(4);
+  fake.json()["rolling_shutter"] = {0, 0, 0.01, 0};
+  fake.json()["frames"][2]["rolling_shutter"] = {0, 0, 0, 0};
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings,
+              Contains(tells("not-used", Severity::notice, "3 frames say how their camera moved")));
+  fake.json().erase("rolling_shutter");
+  fake.save();
+  EXPECT_THAT(load_capture(fake.path(), {}).warnings, Not(Contains(says("rolling_shutter"))));
 }
 
 TEST(NgpCapture, paths_of_windows_and_from_another_folder_are_found_by_their_ends) {

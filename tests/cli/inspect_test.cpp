@@ -14,7 +14,10 @@
 namespace traceflow::cli {
 namespace {
 
+using testing::AllOf;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::StartsWith;
 using Json = nlohmann::json;
 
 class InspectVerb : public testing::Test {
@@ -73,6 +76,31 @@ TEST_F(InspectVerb, says_them_for_programs) {
   const Json paper = Json::parse(run_with({"inspect", "-d", capture(), "--json", "--quick"}).out);
   EXPECT_LT(small["memory"]["training_cpu_bytes"], report["memory"]["training_cpu_bytes"]);
   EXPECT_GT(paper["memory"]["training_cuda_bytes"], report["memory"]["training_cuda_bytes"]);
+}
+
+TEST_F(InspectVerb, says_that_a_budget_does_not_even_hold_the_images) {
+  const auto inspected = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"inspect", "-d", capture(), "--quick"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome told = run_with(words);
+    EXPECT_EQ(told.code, exit_done) << told.err;
+    return told.out;
+  };
+  const std::string first = "option: memory_budget: found 10 MiB, expected more than ",
+                    last =
+                        " MiB for images of this size; raise it, use --downscale, or lower "
+                        "capture.cache_mebibytes";
+  EXPECT_THAT(inspected({"--memory-budget", "10"}),
+              AllOf(HasSubstr("\nproblem         " + first), HasSubstr(last + "\n")));
+  const Json report = Json::parse(inspected({"--memory-budget", "10", "--json"}));
+  const Json& found = report["findings"][0];
+  EXPECT_EQ(found["kind"], "memory");
+  EXPECT_EQ(found["severity"], "problem");
+  EXPECT_THAT(found["text"].get<std::string>(), AllOf(StartsWith(first), EndsWith(last)));
+  // What training would take is told all the same.
+  EXPECT_GT(report["memory"]["training_cpu_bytes"], int64_t{10} << 20);
+  const Json enough = Json::parse(inspected({"--memory-budget", "1000000", "--json"}));
+  EXPECT_EQ(finding(enough, "memory"), nullptr);
 }
 
 // Names of folders and files may hold what would clear the terminal, or write elsewhere on it.

@@ -100,18 +100,54 @@ INSTANTIATE_TEST_SUITE_P(FileTree, SameFiles, testing::Values("folder", "stored"
 
 TEST(FileTree, LinksAreFollowedInsideAlone) {
   const TempFolder folder;
+  const auto link = [&](const std::filesystem::path& to, const std::string& name) {
+    std::filesystem::create_symlink(to, folder / name);
+  };
   write(folder / "tree/real.txt", "text");
+  write(folder / "tree/sub/deep.txt", "deep");
   write(folder / "treehouse/secret.txt", "secret");
-  std::filesystem::create_symlink("real.txt", folder / "tree/inside.txt");
-  std::filesystem::create_symlink(folder / "treehouse/secret.txt", folder / "tree/outside.txt");
-  std::filesystem::create_directory_symlink(folder / "treehouse", folder / "tree/other");
-  std::filesystem::create_directory_symlink(folder / "tree", folder / "alias");
+  write(folder / "treehouse/room/hidden.txt", "hidden");
+  link("real.txt", "tree/inside.txt");
+  link("../real.txt", "tree/sub/up.txt");
+  link("sub", "tree/near");
+  link("../tree/sub", "tree/round");
+  link(folder / "treehouse/secret.txt", "tree/outside.txt");
+  link(folder / "treehouse", "tree/other");
+  link("../other/room", "tree/sub/further");
+  link(folder.path(), "tree/sub/above");
+  link("missing", "tree/nowhere");
+  link("itself", "tree/itself");
+  link("tree", "alias");
   const auto tree = FileTree::open(folder / "alias");
-  EXPECT_EQ(read(*tree, "inside.txt"), "text");
-  for (const char* path : {"outside.txt", "other/secret.txt"}) {
+
+  EXPECT_THAT(tree->folders_in(""), ElementsAre("near", "round", "sub"));
+  EXPECT_THAT(tree->folders_in("sub"), IsEmpty());
+  for (const char* path : {"near", "round", "sub"}) {
+    EXPECT_TRUE(tree->has_folder(path)) << path;
+    EXPECT_THAT(tree->files_in(path), ElementsAre("deep.txt", "up.txt")) << path;
+  }
+  for (const char* path :
+       {"other", "other/room", "sub/further", "near/further", "near/above", "nowhere", "itself"}) {
+    EXPECT_FALSE(tree->has_folder(path)) << path;
+    EXPECT_THAT(tree->files_in(path), IsEmpty()) << path;
+    EXPECT_THAT(tree->folders_in(path), IsEmpty()) << path;
+  }
+
+  // A file that is a link out is no less there: what asks for it is to be told.
+  EXPECT_THAT(tree->files_in(""), ElementsAre("inside.txt", "outside.txt", "real.txt"));
+  for (const char* path : {"outside.txt", "other/secret.txt", "sub/further/hidden.txt"}) {
+    EXPECT_TRUE(tree->has(path)) << path;
     const std::string error = error_of([&] { read(*tree, path); });
-    EXPECT_THAT(error, HasSubstr(path));
-    EXPECT_THAT(error, HasSubstr("a link out of the folder"));
+    EXPECT_THAT(error, HasSubstr("alias/" + std::string(path) + ": found a link out of the folder, to "));
+    EXPECT_THAT(error, HasSubstr("treehouse"));
+  }
+  for (const char* path : {"inside.txt", "sub/up.txt", "near/up.txt", "near/above/tree/real.txt"}) {
+    EXPECT_TRUE(tree->has(path)) << path;
+    EXPECT_EQ(read(*tree, path), "text") << path;
+  }
+  for (const char* path : {"nowhere", "itself", "nowhere/deep.txt"}) {
+    EXPECT_FALSE(tree->has(path)) << path;
+    EXPECT_THAT(error_of([&] { read(*tree, path); }), HasSubstr(path));
   }
 }
 

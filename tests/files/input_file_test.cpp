@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "base/error.h"
+#include "support/refusal.h"
 #include "support/temp_folder.h"
 
 namespace traceflow {
@@ -43,6 +46,25 @@ TEST(InputFile, AScratchFileIsNotHandedOnToOtherPrograms) {
   EXPECT_EQ(descriptors_handed_on(), before);
   scratch.append(std::as_bytes(std::span("text")));
   EXPECT_EQ(scratch.size(), 5);
+}
+
+// As one that comes between the look at a path and the opening would have to be.
+TEST(InputFileHostile, BelowAFolderNoLinkIsFollowed) {
+  namespace fs = std::filesystem;
+  const TempFolder folder;
+  fs::create_directories(folder / "tree/sub");
+  fs::create_directory(folder / "room");
+  for (const char* name : {"tree/sub/a", "room/a"}) std::ofstream(folder / name) << "text";
+  fs::create_symlink(folder / "room/a", folder / "tree/sub/link");
+  fs::create_directory_symlink(folder / "room", folder / "tree/other");
+  fs::create_directory_symlink("tree", folder / "alias");
+  const InputFile file = InputFile::below(folder / "alias", "sub/a", "name");
+  EXPECT_EQ(file.size(), 4);
+  EXPECT_EQ(file.path(), "name");
+  for (const char* path : {"sub/link", "other/a"})
+    EXPECT_THROW(InputFile::below(folder / "alias", path, "name"), UnreadableFile) << path;
+  EXPECT_EQ(refusal_of([&] { InputFile::below(folder / "alias", "none/a", "name"); }),
+            "name: found No such file or directory, expected a readable file");
 }
 
 }  // namespace

@@ -89,7 +89,7 @@ std::string without_extension(const std::string& path) {
 std::string find_image(const std::function<bool(const std::string& file)>& has, const std::string& path) {
   if (has(path)) return path;
   for (const std::string& stem : {path, without_extension(path)}) {
-    for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"}) {
+    for (const char* extension : image_extensions) {
       if (has(stem + extension)) return stem + extension;
     }
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <functional>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ std::string in_folder(const std::string& folder, const std::string& name);
 
 // The path without the extension of a picture; "train/f_1.5" has none.
 std::string without_extension(const std::string& path);
+
+// What photographs are called by, the usual first.
+inline constexpr std::array image_extensions = {".png", ".jpg", ".jpeg", ".JPG", ".JPEG", ".PNG"};
 
 // The image of this path, or of this path and an extension, or of the same path but its extension; empty
 // where there is none. has: whether there is such a file.

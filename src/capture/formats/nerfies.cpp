@@ -49,7 +49,7 @@ class NerfiesReader {
   // PNG as the families have it, or the same in JPEG.
   std::string image_path(const std::string& id) const {
     const std::string stem = found_.images.folder + "/" + id;
-    for (const char* extension : {".png", ".jpg", ".jpeg", ".JPG"}) {
+    for (const char* extension : image_extensions) {
       if (tree_->has(stem + extension)) return stem + extension;
     }
     return "";

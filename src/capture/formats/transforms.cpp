@@ -1,6 +1,7 @@
 #include "capture/formats/transforms.h"
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <set>
@@ -37,6 +38,17 @@ std::string top_folder(const std::string& path) {
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
+// What stands behind the last slashes of a path, the longest first.
+std::vector<std::string> ends_of(const std::string& path) {
+  constexpr size_t most = 8;
+  std::vector<std::string> ends;
+  for (size_t slash = path.rfind('/'); slash != std::string::npos && ends.size() < most;
+       slash = slash == 0 ? std::string::npos : path.rfind('/', slash - 1))
+    ends.push_back(path.substr(slash + 1));
+  std::reverse(ends.begin(), ends.end());
+  return ends;
+}
+
 // 1, and N where some folder at the top is called anything_N.
 std::set<int> scales_of(const FileTree& tree) {
   std::set<int> scales{1};
@@ -58,7 +70,10 @@ class TransformsReader {
   FoundCapture read() {
     tree_->has(train_file) ? read_split_files() : read_whole_file();
     list_other_files();
+    drop_repeats();
     settle_paths();
+    // What was written in two ways may be one.
+    drop_repeats();
     choose_sizes();
     list_images();
     read_times();
@@ -84,15 +99,13 @@ class TransformsReader {
     found_.background = Background::white;
     found_.format = "nerf-synthetic";
     origin_ = train_file;
-    take(file_called(train_file));
-    is_test_.assign(frames_.size(), false);
+    take_split(file_called(train_file), false);
     const char* other = tree_->has(test_file) ? test_file : tree_->has(val_file) ? val_file : nullptr;
     if (other == nullptr) {
       warn("transforms_test.json is missing: there is nothing to evaluate on", "no-test", Severity::notice);
       return;
     }
-    take(file_called(other));
-    is_test_.resize(frames_.size(), true);
+    take_split(file_called(other), true);
   }
 
   void read_whole_file() {
@@ -114,11 +127,14 @@ class TransformsReader {
              "in-no-split");
       }
       file.frames.erase(in_no_split, file.frames.end());
+      for (TransformsFrame& frame : file.frames) frame.is_test = !train.contains(frame.path);
     }
     take(std::move(file));
-    if (train.empty()) return;
-    for (const TransformsFrame& frame : frames_)
-      is_test_.push_back(test.contains(frame.path) && !train.contains(frame.path));
+  }
+
+  void take_split(TransformsFile file, bool is_test) {
+    for (TransformsFrame& frame : file.frames) frame.is_test = is_test;
+    take(std::move(file));
   }
 
   void take(TransformsFile file) {
@@ -131,20 +147,18 @@ class TransformsReader {
     }
     if (file.depths > 0)
       warn(number(file.depths) + " frames name depth images: not used", "not-used", Severity::notice);
+    const auto rolling = std::count_if(file.frames.begin(), file.frames.end(),
+                                       [](const auto& frame) { return frame.lens.rolling_shutter; });
+    if (rolling > 0) {
+      warn(std::to_string(rolling) +
+               " frames say how their camera moved while it took them (rolling_shutter): not used, "
+               "each has one pose",
+           "not-used", Severity::notice);
+    }
     if (points_path_.empty()) points_path_ = file.points;
     // Fields point into their document.
     documents_.push_back(file.json);
-    // A frame that comes again, in the same file or in the other, is taken once.
-    std::vector<std::string> repeated;
-    for (TransformsFrame& frame : file.frames) {
-      if (seen_.insert(frame.path).second) {
-        frames_.push_back(std::move(frame));
-      } else {
-        repeated.push_back(frame.path);
-      }
-    }
-    if (!repeated.empty())
-      warn(ids_text(repeated) + " named more than once: used once", "repeated-id").files = repeated;
+    std::move(file.frames.begin(), file.frames.end(), std::back_inserter(frames_));
   }
 
   // The frames of files that are not used: their images are not left over.
@@ -169,40 +183,88 @@ class TransformsReader {
                        [&](int stored) { return !image_at(path, stored).empty(); });
   }
 
-  // The longest end of the path that is an image here. Where there is none, the path itself, or its last part
-  // if it leads out of the capture.
-  std::string end_of_path(const std::string& path) {
-    constexpr size_t most_parts = 8;
-    std::vector<std::string> ends;
-    for (size_t slash = path.rfind('/'); slash != std::string::npos && ends.size() < most_parts;
-         slash = slash == 0 ? std::string::npos : path.rfind('/', slash - 1))
-      ends.push_back(path.substr(slash + 1));
+  // The longest end of the path that is an image here; empty where there is none.
+  std::string end_here(const std::string& path) {
+    const std::vector<std::string> ends = ends_of(path);
     // In this order, since most ends are not there, which takes less to tell than where a path leads.
-    const auto found = std::find_if(ends.rbegin(), ends.rend(), [&](const std::string& end) {
-      return is_there(end) && path_in_tree(end);
+    const auto found = std::find_if(
+        ends.begin(), ends.end(), [&](const std::string& end) { return is_there(end) && path_in_tree(end); });
+    return found == ends.end() ? "" : *found;
+  }
+
+  // The path without what stands before the ends of others that are here; empty where it begins otherwise.
+  std::string without_beginning(const std::string& path) const {
+    const std::vector<std::string> ends = ends_of(path);
+    const auto known = std::find_if(ends.begin(), ends.end(), [&](const std::string& end) {
+      return beginnings_.contains(path.substr(0, path.size() - end.size())) && path_in_tree(end);
     });
-    if (found != ends.rend()) return *found;
-    return path_in_tree(path) || ends.empty() ? path : ends.front();
+    return known == ends.end() ? "" : *known;
+  }
+
+  // Where an image that is not here would be: beside the others, or where its path says, of which the last
+  // part remains if it leads out of the capture.
+  std::string place_of_missing(const std::string& path) const {
+    std::string beside_others = without_beginning(path);
+    if (!beside_others.empty()) return beside_others;
+    return path_in_tree(path) ? path : path.substr(path.rfind('/') + 1);
+  }
+
+  // As written, beside the images, or the longest end of the path that is here.
+  std::string place_of_points() const {
+    std::vector<std::string> places = ends_of(points_path_);
+    places.insert(places.begin(), {points_path_, without_beginning(points_path_)});
+    const auto found =
+        std::find_if(places.begin(), places.end(), [&](const std::string& path) { return tree_->has(path); });
+    return found == places.end() ? points_path_ : *found;
   }
 
   // Paths of another machine, or from another folder: their ends may be here.
   void settle_paths() {
     const bool as_written = std::any_of(frames_.begin(), frames_.end(),
                                         [&](const TransformsFrame& frame) { return is_there(frame.path); });
-    const auto settled = [&](const std::string& path) {
-      return as_written && path_in_tree(path) ? path : end_of_path(path);
+    const auto end_of = [&](const std::string& path) {
+      return as_written && path_in_tree(path) ? path : end_here(path);
     };
-    std::vector<std::string> moved;
-    for (TransformsFrame& frame : frames_) {
-      const std::string written = std::exchange(frame.path, settled(frame.path));
-      if (frame.path != written) moved.push_back(written);
+    std::vector<std::string> ends;
+    for (const TransformsFrame& frame : frames_) {
+      const std::string& end = ends.emplace_back(end_of(frame.path));
+      if (!end.empty()) beginnings_.insert(frame.path.substr(0, frame.path.size() - end.size()));
     }
-    std::transform(unused_.begin(), unused_.end(), unused_.begin(), settled);
+    std::vector<std::string> moved;
+    const auto settle = [&](std::string& path, const std::string& place) {
+      if (path != place) moved.push_back(std::exchange(path, place));
+    };
+    for (size_t i = 0; i < frames_.size(); ++i) {
+      std::string& path = frames_[i].path;
+      settle(path, ends[i].empty() ? place_of_missing(path) : ends[i]);
+    }
+    settle(points_path_, place_of_points());
+    for (std::string& path : unused_) {
+      const std::string end = end_of(path);
+      path = end.empty() ? place_of_missing(path) : end;
+    }
     if (moved.empty()) return;
     warn("the paths of " + ids_text(moved) +
              " are not in the capture as written: their last parts are looked for in it",
          "path-outside", Severity::notice)
         .files = moved;
+  }
+
+  // A frame that comes again, in the same file or in the other, is taken once.
+  void drop_repeats() {
+    std::set<std::string> seen;
+    std::vector<std::string> repeated;
+    std::vector<TransformsFrame> once;
+    for (TransformsFrame& frame : frames_) {
+      if (seen.insert(frame.path).second) {
+        once.push_back(std::move(frame));
+      } else {
+        repeated.push_back(frame.path);
+      }
+    }
+    frames_ = std::move(once);
+    if (!repeated.empty())
+      warn(ids_text(repeated) + " named more than once: used once", "repeated-id").files = repeated;
   }
 
   void choose_sizes() {
@@ -271,7 +333,7 @@ class TransformsReader {
         },
         1);
     for (size_t n = 0; n < whole.size(); ++n) {
-      const bool is_test = is_test_.empty() ? tests(n, options_.test_every) : is_test_[place.at(whole[n])];
+      const bool is_test = frames_[place.at(whole[n])].is_test.value_or(tests(n, options_.test_every));
       if (!is_test) found_.train_ids.push_back(whole[n]);
       (is_test ? found_.test : found_.train).push_back(std::move(views[n]));
     }
@@ -315,11 +377,10 @@ class TransformsReader {
   std::string origin_;  // the file to name in errors
   std::vector<std::shared_ptr<const JsonFile>> documents_;
   std::vector<TransformsFrame> frames_;
-  std::vector<bool> is_test_;        // of frames_; empty where nobody says
-  std::vector<std::string> images_;  // of frames_, at the size that is used; empty where there is none
-  std::vector<std::string> unused_;  // paths of frames that make no view
-  std::set<std::string> files_;      // that were read
-  std::set<std::string> seen_;
+  std::vector<std::string> images_;   // of frames_, at the size that is used; empty where there is none
+  std::vector<std::string> unused_;   // paths of frames that make no view
+  std::set<std::string> files_;       // that were read
+  std::set<std::string> beginnings_;  // of paths that are here without them
   std::string points_path_;
   FoundCapture found_;
 };

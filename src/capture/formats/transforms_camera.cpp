@@ -113,6 +113,7 @@ void TransformsLens::take(const JsonField& field) {
     centre_y = y[2];
     skew = x[1];
   }
+  if (field.has("rolling_shutter")) rolling_shutter = !is_off(field["rolling_shutter"].json());
   if (field.has("is_fisheye")) is_fisheye = field["is_fisheye"].yes();
   if (field.has("camera_model")) is_fisheye = is_fisheye_model(field["camera_model"]);
   refuse_other_lenses(field);

@@ -16,6 +16,7 @@ struct TransformsLens {
   double skew = 0;
   double k1 = 0, k2 = 0, k3 = 0, k4 = 0, p1 = 0, p2 = 0;
   bool is_fisheye = false;
+  bool rolling_shutter = false;  // taken from more than one pose
 
   // Takes what `field` gives. Throws InputError for values that make no camera, and for models that no Lens
   // can be, by name.

@@ -16,6 +16,7 @@ struct TransformsFrame {
   TransformsLens lens;
   TransformsPose pose;
   std::optional<double> time;
+  std::optional<bool> is_test;  // where the files split their frames
   std::shared_ptr<const JsonField> json;
 };
 

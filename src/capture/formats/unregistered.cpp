@@ -52,7 +52,8 @@ std::vector<std::string> unregistered_images(const FileTree& tree, const FoundCa
   for (const std::string& folder : folders_to_look_into(tree, found)) {
     for (const std::string& name : tree.files_in(folder)) {
       const std::string path = in_folder(folder, name);
-      if (has_image_name(name) && !belongs(without_extension(path), listed)) unregistered.push_back(path);
+      const bool is_image = has_image_name(name) && !name.starts_with('.');
+      if (is_image && !belongs(without_extension(path), listed)) unregistered.push_back(path);
     }
   }
   return unregistered;
