@@ -4,14 +4,16 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <set>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/folder_lock.h"
 #include "base/work.h"
 #include "capture/decode.h"
+#include "capture/formats/formats.h"
 #include "capture/image_cache.h"
-#include "files/json_document.h"
 #include "files/png.h"
 #include "prepare/capture_folder.h"
 #include "prepare/masks.h"
@@ -101,17 +103,26 @@ std::vector<std::string> ids_of(const std::vector<View>& views) {
   return ids;
 }
 
-// Those that are there, in the order of dataset.json.
-std::vector<std::string> all_ids(const Capture& capture) {
-  std::vector<std::string> ids = ids_of(capture.train);
-  const std::vector<std::string> test = ids_of(capture.test);
-  ids.insert(ids.end(), test.begin(), test.end());
-  const JsonFile dataset(capture.folder / "dataset.json");
-  if (!dataset.has("ids")) return ids;
-  std::vector<std::string> ordered = dataset["ids"].strings();
-  std::erase_if(ordered,
-                [&](const std::string& id) { return std::find(ids.begin(), ids.end(), id) == ids.end(); });
-  return ordered.size() == ids.size() ? ordered : ids;
+ViewIds ids_in(const Capture& capture, const CaptureOptions& options) {
+  const FoundCapture found = read_capture(FileTree::open(capture.folder), options);
+  ViewIds ids{ids_of(capture.train), {}, found.train_ids, found.all_ids};
+  std::set<std::string> there(ids.train.begin(), ids.train.end());
+  for (const View& view : capture.test) there.insert(view.id);
+  std::copy_if(found.all_ids.begin(), found.all_ids.end(), std::back_inserter(ids.all),
+               [&](const std::string& id) { return there.contains(id); });
+  return ids;
+}
+
+// What is asked of a capture is the same at any size, and some keep smaller photographs alone.
+CaptureOptions at_largest_size(const fs::path& capture) {
+  CaptureOptions options;
+  const auto is_there = [&] {
+    return fs::is_directory(capture / "rgb" / (std::to_string(options.downscale) + "x"));
+  };
+  constexpr int most = 64;
+  while (options.downscale < most && !is_there()) ++options.downscale;
+  if (!is_there()) options.downscale = 1;
+  return options;
 }
 
 // f(id, what belongs to it), in the order of the source.
@@ -152,11 +163,10 @@ AxisEvidence measure(const Capture& capture, const NormalSource& source,
   return measure_prior_axes(capture.points, priors);
 }
 
-void attach_normals(const Capture& capture, const AttachOptions& options, const Staging& staging,
-                    const Say& say, const std::atomic<bool>& stop) {
+void attach_normals(const Capture& capture, const ViewIds& ids, const AttachOptions& options,
+                    const Staging& staging, const Say& say, const std::atomic<bool>& stop) {
   const NormalSource source(options.normals, staging / "ffmpeg.log", stop);
-  const auto matched =
-      match_views(options.normals, source.names(), source.count(), ids_of(capture.train), all_ids(capture));
+  const auto matched = match_views(options.normals, source.names(), source.count(), ids);
   const FoundAxes axes = find_axes(options.axes, measure(capture, source, matched, staging), options.normals);
   say(fmt::format("{:<10}{} of {} views", "normals", matched.size(),
                   capture.train.size() + capture.test.size()));
@@ -173,11 +183,10 @@ void attach_normals(const Capture& capture, const AttachOptions& options, const 
       });
 }
 
-void attach_masks(const Capture& capture, const AttachOptions& options, const Staging& staging,
-                  const Say& say, const std::atomic<bool>& stop) {
+void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOptions& options,
+                  const Staging& staging, const Say& say, const std::atomic<bool>& stop) {
   const PictureSource source(options.masks, 0, staging / "ffmpeg.log", stop);
-  const auto matched =
-      match_views(options.masks, source.names(), source.count(), ids_of(capture.train), all_ids(capture));
+  const auto matched = match_views(options.masks, source.names(), source.count(), ids);
   std::map<std::string, Camera<float>> cameras;
   for (const auto* split : {&capture.train, &capture.test}) {
     for (const View& view : *split) cameras.emplace(view.id, view.camera);
@@ -207,28 +216,31 @@ void AttachOptions::validate() const {
 }
 
 std::map<std::string, int64_t> match_views(const std::string& origin, const std::vector<std::string>& names,
-                                           int64_t count, const std::vector<std::string>& train_ids,
-                                           const std::vector<std::string>& all_ids) {
+                                           int64_t count, const ViewIds& ids) {
   std::map<std::string, int64_t> by_name, matched;
   for (size_t i = 0; i < names.size(); ++i) by_name.emplace(stem_of(names[i]), static_cast<int64_t>(i));
-  for (const std::string& id : all_ids) {
+  for (const std::string& id : ids.all) {
     const auto found = by_name.find(id);
     if (found != by_name.end()) matched.emplace(id, found->second);
   }
-  const auto training = std::count_if(train_ids.begin(), train_ids.end(),
+  const auto training = std::count_if(ids.train.begin(), ids.train.end(),
                                       [&](const std::string& id) { return matched.contains(id); });
-  if (training == static_cast<std::ptrdiff_t>(train_ids.size())) return matched;
-  const bool of_train = count == static_cast<int64_t>(train_ids.size()),
-             of_all = count == static_cast<int64_t>(all_ids.size());
-  if (!of_train && !of_all) {
+  if (training == static_cast<std::ptrdiff_t>(ids.train.size())) return matched;
+  const std::array lists{&ids.train, &ids.all, &ids.listed_train, &ids.listed};
+  const auto list = std::find_if(lists.begin(), lists.end(), [&](const std::vector<std::string>* l) {
+    return count == static_cast<int64_t>(l->size());
+  });
+  if (list == lists.end()) {
     throw InputError(
         origin, "count", fmt::format("{}, of which {} have a training view's name", count, training),
-        fmt::format("one for each of {} training views or of all {}", train_ids.size(), all_ids.size()),
-        "make them from the pictures in rgb/1x");
+        fmt::format("one for each of {} training views or of all {}", ids.train.size(), ids.all.size()),
+        "make them from the capture's own pictures");
   }
   matched.clear();
-  const std::vector<std::string>& ids = of_train ? train_ids : all_ids;
-  for (size_t i = 0; i < ids.size(); ++i) matched.emplace(ids[i], static_cast<int64_t>(i));
+  const std::set<std::string> there(ids.all.begin(), ids.all.end());
+  for (size_t i = 0; i < (*list)->size(); ++i) {
+    if (there.contains((**list)[i])) matched.emplace((**list)[i], static_cast<int64_t>(i));
+  }
   return matched;
 }
 
@@ -256,17 +268,19 @@ FoundAxes find_axes(PriorAxes asked, const AxisEvidence& evidence, const std::st
 void attach_priors(const fs::path& capture, const AttachOptions& options, const Say& say,
                    const std::atomic<bool>& stop) {
   options.validate();
-  if (!fs::is_regular_file(capture / "dataset.json")) {
-    throw InputError(capture.string(), "dataset.json", "no such file", "a folder in the layout of NeRF-DS",
-                     "see docs/captures.md");
+  if (!fs::is_directory(capture)) {
+    throw InputError(capture.string(), "", fs::exists(capture) ? "a file" : "nothing", "a capture's folder",
+                     fs::exists(capture) ? "unpack it first" : "");
   }
   const FolderLock lock(capture / ".attach-priors.lock", capture, "attaching priors");
   if (!options.normals.empty()) refuse_to_replace(capture, normals_kind, options);
   if (!options.masks.empty()) refuse_to_replace(capture, masks_kind, options);
-  const Capture loaded = load_capture(capture, {});
+  const CaptureOptions size = at_largest_size(capture);
+  const Capture loaded = load_capture(capture, size);
+  const ViewIds ids = ids_in(loaded, size);
   const Staging staging(capture);
-  if (!options.normals.empty()) attach_normals(loaded, options, staging, say, stop);
-  if (!options.masks.empty()) attach_masks(loaded, options, staging, say, stop);
+  if (!options.normals.empty()) attach_normals(loaded, ids, options, staging, say, stop);
+  if (!options.masks.empty()) attach_masks(loaded, ids, options, staging, say, stop);
   staging.move_in();
 }
 

@@ -30,18 +30,25 @@ struct AttachOptions {
   void validate() const;
 };
 
-// Puts normals and masks of other programs into a capture in the layout of NeRF-DS: normal/1x/ID.png with 16
-// bits and the axes that are the default there (x right, y up, z to the viewer), mask/1x/ID.png.png. `say`
+// Puts normals and masks of other programs into the folder of a capture of any format: normal/1x/ID.png with
+// 16 bits and the axes that are the default there (x right, y up, z to the viewer), mask/1x/ID.png.png. `say`
 // gets a line for everything found. Throws InputError, with the capture as it was, also where another process
 // is at it; and Stopped.
 void attach_priors(const std::filesystem::path& capture, const AttachOptions& options,
                    const std::function<void(const std::string& line)>& say, const std::atomic<bool>& stop);
 
+// The ids of a capture's views in its own order, and all that it lists, of which some may have no photograph
+// or stand in neither split.
+struct ViewIds {
+  std::vector<std::string> train, all;
+  std::vector<std::string> listed_train, listed;
+};
+
 // Which of `count` pictures belongs to which view: by name, where every training view finds its own; else by
-// order, one for each training view or one for each view. Throws InputError where neither fits.
+// order, one for each training view, for each view, or for each that is listed so. Throws InputError where
+// none of these fits.
 std::map<std::string, int64_t> match_views(const std::string& origin, const std::vector<std::string>& names,
-                                           int64_t count, const std::vector<std::string>& train_ids,
-                                           const std::vector<std::string>& all_ids);
+                                           int64_t count, const ViewIds& ids);
 
 // The signs of the axes of normals against the camera's (x right, y down, z forward), and in words how they
 // were found. automatic: the one of the known axes that the evidence agrees with, else the evidence's own;

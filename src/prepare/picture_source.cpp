@@ -42,8 +42,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
 
 std::string stem_of(const std::string& name) {
   std::string stem = fs::path(name).stem().string();
-  if (stem.ends_with(".png") || stem.ends_with(".jpg")) stem.resize(stem.size() - 4);
-  return stem;
+  return is_picture(stem) ? fs::path(stem).stem().string() : stem;
 }
 
 PictureSource::PictureSource(const fs::path& path, int longest_side, fs::path log,

@@ -45,14 +45,29 @@ bool compares_all(const PrepareOptions& options, const Frames& frames) {
   return options.matcher == Matcher::exhaustive;
 }
 
-// COLMAP looks for ID.png.png, and takes features where it is not black.
+// What COLMAP calls the options of any kind of features, by what it says itself: "Feature", or "Sift" before
+// 3.13, which knew no other kind.
+std::string kind_of_features(const PoseFolder& folder, const Work& work) {
+  const fs::path log = folder.top / "help.log";
+  run_program({"colmap", "feature_extractor", "--help"}, log, work,
+              [](const std::string&) { return std::optional<Share>(); });
+  const std::string help = read_text(log);
+  for (const char* kind : {"Feature", "Sift"}) {
+    if (help.find(fmt::format("--{}Extraction.use_gpu", kind)) != std::string::npos) return kind;
+  }
+  throw InputError("colmap feature_extractor", "help", "no option use_gpu", "COLMAP 3.8 or later",
+                   "see " + log.string());
+}
+
+// COLMAP looks for ID.png.png, and takes features where it is not black. From 3.12 on it leaves a picture out
+// that has none.
 void write_feature_masks(const Frames& frames, const fs::path& masks, const fs::path& feature_masks) {
   fs::remove_all(feature_masks);
   fs::create_directories(feature_masks);
   for (const Frame& frame : frames.frames) {
     const fs::path mask = masks / (frame.id + ".png");
-    if (!fs::exists(mask)) continue;
-    Tensor<uint8_t> still = as_mask(read_png(mask));
+    Tensor<uint8_t> still({frame.height, frame.width});
+    if (fs::exists(mask)) still = as_mask(read_png(mask));
     for (uint8_t& value : still.values()) value = value != 0 ? 0 : 1;
     write_mask(feature_masks / (frame.id + ".png.png"), still);
   }
@@ -87,10 +102,12 @@ std::string advice(const PrepareOptions& options, const Frames& frames) {
   return text + ", or film again with a camera that moves sideways around the scene";
 }
 
+// said: what the mapper ended with, where it failed.
 [[noreturn]] void refuse_poses(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder,
-                               int64_t registered) {
+                               int64_t registered, const std::string& said = "") {
   throw InputError(folder.models().string(), "poses",
-                   fmt::format("{} of {} frames registered", registered, frames.frames.size()),
+                   fmt::format("{} of {} frames registered{}", registered, frames.frames.size(),
+                               said.empty() ? "" : fmt::format(" (colmap mapper: {})", said)),
                    fmt::format("at least {} and {:g}% (--least-registered)", fewest_frames,
                                100 * options.least_registered),
                    advice(options, frames));
@@ -100,13 +117,6 @@ struct Registered {
   fs::path model;
   int64_t frames = 0;
 };
-
-// Whether the mapper failed for want of anything to register, as its versions call it.
-bool found_nothing(const PoseFolder& folder) {
-  const std::string said = last_line(folder.top / "mapper.log");
-  return fs::is_empty(folder.models()) && (said.find("No good initial image pair") != std::string::npos ||
-                                           said.find("failed to create sparse model") != std::string::npos);
-}
 
 Registered largest_model(const fs::path& models) {
   Registered best;
@@ -129,6 +139,7 @@ std::string extract_features(const PrepareOptions& options, const Frames& frames
   fs::create_directories(folder.top);
   remove_database(folder.features());
   const bool masked = wants_masks(options);
+  const std::string extraction = "--" + kind_of_features(folder, work) + "Extraction.";
   const ReadShare share = share_of_all(frames);
   if (masked) write_feature_masks(frames, masks, folder.masks());
   for (size_t camera = 0; camera < frames.source_frames.size(); ++camera) {
@@ -147,11 +158,11 @@ std::string extract_features(const PrepareOptions& options, const Frames& frames
                 "1",
                 "--ImageReader.camera_model",
                 colmap_name(options.camera_model),
-                "--SiftExtraction.use_gpu",
+                extraction + "use_gpu",
                 "0",
                 "--SiftExtraction.max_num_features",
                 std::to_string(options.features),
-                "--SiftExtraction.num_threads",
+                extraction + "num_threads",
                 std::to_string(thread_count())};
     if (masked) words.insert(words.end(), {"--ImageReader.mask_path", folder.masks().string()});
     run_program(words, folder.top / fmt::format("features_{}.log", camera), work, share);
@@ -165,13 +176,14 @@ std::string match_features(const PrepareOptions& options, const Frames& frames, 
   remove_database(folder.matches());
   fs::copy_file(folder.features(), folder.matches());
   const bool all = compares_all(options, frames);
+  const std::string matching = "--" + kind_of_features(folder, work) + "Matching.";
   Words words{"colmap",
               all ? "exhaustive_matcher" : "sequential_matcher",
               "--database_path",
               folder.matches().string(),
-              "--SiftMatching.use_gpu",
+              matching + "use_gpu",
               "0",
-              "--SiftMatching.num_threads",
+              matching + "num_threads",
               std::to_string(thread_count())};
   if (!all) words.insert(words.end(), {"--SequentialMatching.overlap", std::to_string(options.overlap)});
   run_program(words, folder.top / "matches.log", work, share_of_all(frames));
@@ -183,16 +195,20 @@ std::string find_poses(const PrepareOptions& options, const Frames& frames, cons
                        const PoseFolder& folder, const Work& work) {
   fs::remove_all(folder.models());
   fs::create_directories(folder.models());
+  const fs::path log = folder.top / "mapper.log";
+  std::string failure;
   try {
     run_program({"colmap", "mapper", "--database_path", folder.matches().string(), "--image_path",
                  pictures.string(), "--output_path", folder.models().string(), "--Mapper.num_threads",
                  std::to_string(thread_count()), "--Mapper.min_model_size", "3"},
-                folder.top / "mapper.log", work, share_of_all(frames));
+                log, work, share_of_all(frames));
   } catch (const InputError&) {
-    if (!found_nothing(folder)) throw;
+    // It fails where it registers nothing, and each version says so in words of its own.
+    failure = last_line(log);
+    if (failure.empty() || !fs::is_empty(folder.models())) throw;
   }
   const Registered best = largest_model(folder.models());
-  if (best.frames == 0) refuse_poses(options, frames, folder, 0);
+  if (best.frames == 0) refuse_poses(options, frames, folder, 0, failure);
   write_atomically(folder.chosen(), best.model.filename().string());
   const ColmapModel model = read_chosen_model(folder);
   const Lens& lens = model.cameras.front().lens;
@@ -225,11 +241,14 @@ std::optional<Share> share_said(const std::string& said, int64_t frames) {
       return at == std::string::npos ? 0 : std::sscanf(line.c_str() + at, format, &n[0], &n[1], &n[2], &n[3]);
     };
     if (numbers("Processed file [", "Processed file [%lld/%lld") == 2 ||
-        numbers("Matching image [", "Matching image [%lld/%lld") == 2)
+        numbers("Matching image [", "Matching image [%lld/%lld") == 2 ||
+        numbers("Processing image [", "Processing image [%lld/%lld") == 2)
       share = {n[0], n[1]};
-    else if (numbers("Matching block [", "Matching block [%lld/%lld, %lld/%lld") == 4)
+    else if (numbers("Matching block [", "Matching block [%lld/%lld, %lld/%lld") == 4 ||
+             numbers("Processing block [", "Processing block [%lld/%lld, %lld/%lld") == 4)
       share = {(n[0] - 1) * n[3] + n[2], n[1] * n[3]};
-    else if (numbers("Registering image #", "Registering image #%lld (%lld)") == 2)
+    else if (numbers("Registering image #", "Registering image #%lld (%lld)") == 2 ||
+             numbers("Registering image #", "Registering image #%lld (num_reg_frames=%lld)") == 2)
       share = {n[1], frames};
   }
   return share;

@@ -9,7 +9,7 @@
 #include "prepare/frames.h"
 #include "prepare/programs.h"
 
-// Cameras and points by the program `colmap`, of versions 3.8 to 3.11.
+// Cameras and points by the program `colmap`, of versions 3.8 to 4.1.
 namespace traceflow::prepare {
 
 // Where COLMAP reads and writes. Logs are beside it.
@@ -38,8 +38,10 @@ ColmapModel read_chosen_model(const PoseFolder& folder);
 // Throws InputError unless that has 10 frames, and the share that the options ask for.
 void require_registered(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder);
 
-// How far COLMAP is, by the last line of these that tells: "Processed file [3/87]", "Matching image [3/87]",
-// "Matching block [1/3, 2/3]", and of the mapper "Registering image #59 (36)", 36 of `frames` by then.
+// How far COLMAP is, by the last line of these that tells: "Processed file [3/87]"; "Matching image [3/87]"
+// and "Matching block [1/3, 2/3]", from 3.13 on "Processing image [3/87]" and "Processing block [1/3, 2/3]";
+// of the mapper "Registering image #59 (36)", from 3.12 on "Registering image #59 (num_reg_frames=36)", 36 of
+// `frames` by then.
 std::optional<Share> share_said(const std::string& said, int64_t frames);
 
 // The mean distance of a point's projections from its features, in pixels, over all features; of the points.

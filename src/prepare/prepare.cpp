@@ -25,6 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
+// Raised when a capture comes out otherwise than before: one that stands is then made again from its poses.
+constexpr int made_capture = 2;
+
 // Beside a link's target, not the link, what is made can be moved into place.
 fs::path without_links(const fs::path& path) {
   const fs::path whole = fs::weakly_canonical(fs::absolute(path));
@@ -123,7 +126,7 @@ class Preparation {
         return require_registered(options_, frames_, poses());
       case Step::capture:
         return steps_.run(
-            step, {{"test_every", options_.test_every}},
+            step, {{"test_every", options_.test_every}, {"made", made_capture}},
             [&] { return fs::exists(capture_ / "prepare.json"); }, [&] { return finish(); });
     }
   }

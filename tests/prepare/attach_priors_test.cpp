@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <glm/gtc/quaternion.hpp>
 #include <numeric>
 
 #include "base/error.h"
@@ -18,6 +21,8 @@
 #include "prepare/capture_folder.h"
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
+#include "prepare/picture_source.h"
+#include "support/colmap_writer.h"
 #include "support/file_bytes.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"
@@ -27,6 +32,7 @@ namespace traceflow::prepare {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
 
 SynthOptions small() {
@@ -87,15 +93,60 @@ class AttachPriors : public testing::Test {
     }
   }
 
-  std::string attach(const AttachOptions& options) {
+  std::string attach(const AttachOptions& options) { return attach(options, capture()); }
+  std::string attach(const AttachOptions& options, const fs::path& capture) {
     std::string said;
     attach_priors(
-        capture(), options, [&](const std::string& line) { said += line + "\n"; }, never_);
+        capture, options, [&](const std::string& line) { said += line + "\n"; }, never_);
     return said;
   }
 
-  void expect_normals_of_the_truth(double tolerance) const {
+  // In degrees, of all pixels of the training views in the order of size.
+  std::vector<double> angles_to_the_truth() const {
+    std::vector<double> angles;
     const Capture attached = load_capture(capture(), {});
+    for (const View& view : attached.train) {
+      const auto found = load_images(attached, view), truth = load_images(truth_, view);
+      for (int64_t k = 0; k < truth->normal_prior.size(); k += 3) {
+        const double cosine =
+            dot(load3<float>(&found->normal_prior[k]), load3<float>(&truth->normal_prior[k]));
+        angles.push_back(glm::degrees(std::acos(std::clamp(cosine, -1.0, 1.0))));
+      }
+    }
+    std::sort(angles.begin(), angles.end());
+    return angles;
+  }
+
+  // A COLMAP project of what the left camera saw.
+  fs::path write_colmap_project() const {
+    fs::path project = folder_ / "project";
+    fs::create_directories(project / "images");
+    ColmapFiles files;
+    for (const SynthView& view : synth_views(small())) {
+      if (view.is_test) continue;
+      const Camera<double>& c = view.camera;
+      if (files.cameras.empty())
+        files.cameras.push_back({1, 1, "PINHOLE", 80, 48, {c.focal_x, c.focal_y, c.centre_x, c.centre_y}});
+      const glm::dquat q = glm::quat_cast(c.camera_from_world);
+      const Vec3<double> t = -(c.camera_from_world * c.position);
+      const auto id = static_cast<uint32_t>(files.images.size() + 1);
+      files.images.push_back({id, {q.w, q.x, q.y, q.z}, {t.x, t.y, t.z}, 1, view.id + ".png", {}});
+      fs::copy(*made / "capture/rgb/1x" / (view.id + ".png"), project / "images");
+    }
+    const Tensor<float> points = synth_points(small());
+    for (int64_t i = 0; i < points.dim(0); ++i) {
+      const Vec3<double> x(load3<float>(points.row(i)));
+      files.points.push_back({static_cast<uint64_t>(i + 1), {x.x, x.y, x.z}, {9, 9, 9}, 0.5, 3});
+    }
+    files.save_binary(project / "sparse/0");
+    return project;
+  }
+
+  void expect_normals_of_the_truth(double tolerance) const {
+    expect_normals_of_the_truth(tolerance, capture());
+  }
+  void expect_normals_of_the_truth(double tolerance, const fs::path& capture) const {
+    const Capture attached = load_capture(capture, {});
     EXPECT_EQ(attached.prior_axes, PriorAxes::opengl);
     for (const View& view : attached.train) {
       const auto found = load_images(attached, view), truth = load_images(truth_, view);
@@ -206,6 +257,68 @@ TEST_F(AttachPriors, AFilmOfPicturesIsTakenByOrder) {
   options.normals = folder_ / "x_vis.mkv";
   EXPECT_THAT(attach(options), HasSubstr(": stable-normal"));
   expect_normals_of_the_truth(0.02);
+}
+
+// What NormalCrafter's writer of films asks ffmpeg for. It keeps one colour for each four pixels: at the
+// edges, which are many in so small a picture, normals are those of neither side.
+TEST_F(AttachPriors, AFilmAsNormalCrafterWritesItIsNearEnough) {
+  if (!is_in_path("ffmpeg")) GTEST_SKIP() << "films need ffmpeg";
+  write_normal_pictures(normals_in({1, -1, -1}), folder_ / "pictures", ".png");
+  const Descriptor log = open_log(folder_ / "make.log");
+  const bool is_made =
+      Process({"ffmpeg", "-nostdin", "-framerate", "8", "-i", folder_ / "pictures/%d.png", "-c:v", "libx264",
+               "-pix_fmt", "yuv420p", "-crf", "18", folder_ / "x_vis.mp4"},
+              {.error = log.number()})
+          .wait();
+  const std::string said = bytes_of(folder_ / "make.log");
+  if (said.find("Unknown encoder") != std::string::npos) GTEST_SKIP() << "this ffmpeg has no libx264";
+  ASSERT_TRUE(is_made) << said;
+  AttachOptions options;
+  options.normals = folder_ / "x_vis.mp4";
+  EXPECT_THAT(attach(options), HasSubstr(": opengl"));
+  const std::vector<double> angles = angles_to_the_truth();
+  EXPECT_LT(angles[angles.size() / 2], 4);
+  EXPECT_LT(angles[angles.size() * 9 / 10], 30);
+}
+
+TEST_F(AttachPriors, ACaptureOfColmapTakesThemToo) {
+  const fs::path project = write_colmap_project();
+  write_npy(folder_ / "normals.npy", normals_in({-1, -1, -1}));
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  options.masks = *made / "capture/mask/1x";
+  // One for each view by the order of the file names, of which the first tests.
+  EXPECT_THAT(attach(options, project),
+              AllOf(HasSubstr("normals   5 of 5 views"), HasSubstr(": stable-normal"),
+                    HasSubstr("masks     5 of 5 views")));
+  const Capture attached = load_capture(project, {});
+  EXPECT_EQ(attached.format, "colmap");
+  EXPECT_EQ(attached.train.size(), 4U);
+  EXPECT_TRUE(attached.has_masks);
+  expect_normals_of_the_truth(0.012, project);
+}
+
+TEST_F(AttachPriors, ACaptureOfSmallerPhotographsAloneTakesThemToo) {
+  fs::rename(capture() / "rgb/1x", capture() / "rgb/2x");
+  write_npy(folder_ / "normals.npy", normals_in({-1, -1, -1}));
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  attach(options);
+  CaptureOptions half;
+  half.downscale = 2;
+  EXPECT_TRUE(load_capture(capture(), half).has_normal_priors);
+}
+
+TEST_F(AttachPriors, WhatIsNoFolderIsRefused) {
+  AttachOptions options;
+  options.normals = folder_ / "normals.npy";
+  write_bytes(folder_ / "capture.zip", "PK");
+  EXPECT_THAT(refusal_of([&] { attach(options, folder_ / "capture.zip"); }),
+              HasSubstr("capture.zip: found a file, expected a capture's folder; unpack it first"));
+  EXPECT_THAT(refusal_of([&] { attach(options, folder_ / "nowhere"); }), HasSubstr("nowhere: found nothing"));
+  fs::create_directory(folder_ / "empty");
+  EXPECT_THAT(refusal_of([&] { attach(options, folder_ / "empty"); }), HasSubstr("empty: found no capture"));
+  EXPECT_TRUE(fs::is_empty(folder_ / "empty"));
 }
 
 TEST_F(AttachPriors, MasksThatWereTurnedAreRefused) {
@@ -341,12 +454,20 @@ TEST(FindAxes, EvidenceThatFitsTwoKindsAsksWhichItIs) {
 
 TEST(MatchViews, ByNameElseByOrder) {
   using Map = std::map<std::string, int64_t>;
-  const std::vector<std::string> train{"a", "c"}, all{"a", "b", "c"};
-  EXPECT_EQ(match_views("n", {"b.png", "c.png", "a.png"}, 3, train, all),
-            (Map{{"a", 2}, {"b", 0}, {"c", 1}}));
-  EXPECT_EQ(match_views("n", {}, 2, train, all), (Map{{"a", 0}, {"c", 1}}));
-  EXPECT_EQ(match_views("n", {"x", "y", "z"}, 3, train, all), (Map{{"a", 0}, {"b", 1}, {"c", 2}}));
-  EXPECT_THROW(match_views("n", {"a"}, 1, train, all), InputError);
+  const ViewIds ids{{"a", "c"}, {"a", "b", "c"}, {"a", "lost", "another", "c"}, {"a", "x", "b", "y", "c"}};
+  EXPECT_EQ(match_views("n", {"b.png", "c.png", "a.png"}, 3, ids), (Map{{"a", 2}, {"b", 0}, {"c", 1}}));
+  EXPECT_EQ(match_views("n", {}, 2, ids), (Map{{"a", 0}, {"c", 1}}));
+  EXPECT_EQ(match_views("n", {"x", "y", "z"}, 3, ids), (Map{{"a", 0}, {"b", 1}, {"c", 2}}));
+  EXPECT_THROW(match_views("n", {"a"}, 1, ids), InputError);
+  // As the loader takes an array: its elements belong to what is listed, photographs or not.
+  EXPECT_EQ(match_views("n", {}, 4, ids), (Map{{"a", 0}, {"c", 3}}));
+  EXPECT_EQ(match_views("n", {}, 5, ids), (Map{{"a", 0}, {"b", 2}, {"c", 4}}));
+}
+
+TEST(StemOf, LeavesTheEndingsOfPicturesOutHoweverTheyAreWritten) {
+  for (const char* name : {"b/a.png", "a.JPG", "a.png.png", "a.JPG.png", "a.jpeg.png", "a.PNG.PNG"})
+    EXPECT_EQ(stem_of(name), "a") << name;
+  EXPECT_EQ(stem_of("view_1.5.png"), "view_1.5");
 }
 
 TEST(NormalPicture, HasSixteenBitsAndBlackForNone) {

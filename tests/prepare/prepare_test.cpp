@@ -5,217 +5,24 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
 #include <glm/gtc/quaternion.hpp>
 #include <iomanip>
-#include <sstream>
 #include <thread>
 
 #include "base/folder_lock.h"
 #include "capture/capture.h"
-#include "capture/synth/synth.h"
-#include "files/eight_bit.h"
 #include "files/json_document.h"
 #include "files/png.h"
-#include "prepare/poses.h"
-#include "prepare/steps.h"
+#include "prepare/prepare_case.h"
 #include "support/file_bytes.h"
-#include "support/refusal.h"
-#include "support/temp_folder.h"
 
-// The whole of `prepare`, with small scripts in the place of ffmpeg and colmap that give out what was
-// recorded.
 namespace traceflow::prepare {
 namespace {
 
-namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-// For a film F it writes F.ppm or F.pgm, a row of pictures, and says F.times.
-constexpr const char* fake_ffmpeg = R"sh(#!/bin/sh
-kind=ppm
-words=$*
-while [ $# -gt 0 ]; do
-  case "$1" in
-    -i) film=${2#file:} ;;
-    pgm) kind=pgm ;;
-  esac
-  shift
-done
-echo "ffmpeg $kind $words" >> "$CALLS"
-[ "$FAIL" != silent ] || sleep 1000
-[ -e "$film.$kind" ] || { echo "$film: Invalid data found when processing input" >&2; exit 1; }
-cat "$film.times" >&2
-cat "$film.$kind"
-)sh";
-
-// Writes what COLMAP would have left where its arguments say; the model is $MODEL.
-constexpr const char* fake_colmap = R"sh(#!/bin/sh
-echo "colmap $*" >> "$CALLS"
-verb=$1
-while [ $# -gt 0 ]; do
-  case "$1" in
-    --database_path) database=$2 ;;
-    --output_path) output=$2 ;;
-  esac
-  shift
-done
-case $verb in
-  feature_extractor) [ "$FAIL" != features ] || { echo "Check failed: no memory" >&2; exit 1; }; echo features > "$database" ;;
-  *_matcher) [ "$(cat "$database")" = features ] || exit 1; echo matches > "$database" ;;
-  mapper)
-    [ "$(cat "$database")" = matches ] || exit 1
-    [ "$FAIL" != mapper ] || { echo "No good initial image pair found." >&2; exit 1; }
-    [ "$FAIL" != slow ] || sleep 1000
-    mkdir "$output/0" "$output/1"
-    cp "$MODEL"/* "$output/1/"
-    cp "$MODEL"/cameras.txt "$output/0/"
-    grep -v 000003 "$MODEL"/images.txt > "$output/0/images.txt"
-    cp "$MODEL"/points3D.txt "$output/0/" ;;
-esac
-)sh";
-
-// NOLINTNEXTLINE(concurrency-mt-unsafe): one thread reads and writes the environment
-void set_variable(const char* name, const std::string& value) { ::setenv(name, value.c_str(), 1); }
-
-class PrepareTest : public testing::Test {
- protected:
-  static constexpr int frames = 14;
-
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): one thread reads and writes the environment
-  PrepareTest() : path_(std::getenv("PATH")) {
-    fs::create_directories(folder_ / "bin");
-    fs::create_directories(folder_ / "model");
-    write_program("ffmpeg", fake_ffmpeg);
-    write_program("colmap", fake_colmap);
-    set_variable("PATH", ((folder_ / "bin").string() + ":" + path_));
-    set_variable("CALLS", (folder_ / "calls"));
-    set_variable("MODEL", (folder_ / "model"));
-    set_variable("FAIL", "");
-    SynthOptions options;
-    options.frames = frames;
-    options.width = 64;
-    options.height = 40;
-    options.samples = 1;
-    options.points = 300;
-    options.test_every = frames;
-    for (const SynthView& view : synth_views(options)) {
-      if (!view.is_test) views_.push_back(view);
-    }
-    write_film(options, film());
-    write_model(options);
-  }
-  ~PrepareTest() override { set_variable("PATH", path_); }
-
-  void write_program(const std::string& name, const std::string& text) const {
-    std::ofstream(folder_ / "bin" / name) << text;
-    fs::permissions(folder_ / "bin" / name, fs::perms::owner_all);
-  }
-
-  // Every picture twice, the second time sharper; a quarter of a second apart, from one second on.
-  void write_film(const SynthOptions& options, const std::string& film) const {
-    std::ofstream colour(film + ".ppm", std::ios::binary), grey(film + ".pgm", std::ios::binary),
-        times(film + ".times");
-    std::ofstream(film) << "a film";
-    times << "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/4, frame_rate: 4/1\n";
-    for (const SynthView& view : views_) {
-      const Tensor<uint8_t> sharp = to_8bit(synth_images(options, view).colour);
-      Tensor<uint8_t> blurred = sharp;
-      blurred.fill(90);
-      const Tensor<uint8_t>& flat = blurred;
-      for (const Tensor<uint8_t>* picture : {&flat, &sharp}) {
-        colour << "P6\n64 40\n255\n";
-        grey << "P5\n64 40\n255\n";
-        colour.write(reinterpret_cast<const char*>(picture->data()), picture->size());
-        for (int64_t i = 0; i < picture->size(); i += 3) grey.put(static_cast<char>((*picture)[i + 1]));
-        times << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:      "
-              << 4 + 2 * view.frame + (picture == &sharp ? 1 : 0) << " pts_time:0       fmt:rgb24\n";
-      }
-    }
-  }
-
-  void write_model(const SynthOptions& options) const {
-    std::ofstream cameras(folder_ / "model/cameras.txt"), images(folder_ / "model/images.txt"),
-        points(folder_ / "model/points3D.txt");
-    for (std::ofstream* file : {&cameras, &images, &points}) *file << std::setprecision(17);
-    const Camera<double>& lens = views_.front().camera;
-    cameras << "1 PINHOLE 64 40 " << lens.focal_x << " " << lens.focal_y << " " << lens.centre_x << " "
-            << lens.centre_y << "\n";
-    for (const SynthView& view : views_) {
-      const glm::dquat q = glm::quat_cast(view.camera.camera_from_world);
-      const Vec3<double> t = -(view.camera.camera_from_world * view.camera.position);
-      std::ostringstream name;
-      name << std::setw(6) << std::setfill('0') << view.frame << ".png";
-      images << view.frame + 1 << " " << q.w << " " << q.x << " " << q.y << " " << q.z << " " << t.x << " "
-             << t.y << " " << t.z << " 1 " << name.str() << "\n\n";
-    }
-    const Tensor<float> cloud = synth_points(options);
-    for (int64_t i = 0; i < cloud.dim(0); ++i) {
-      points << i + 1 << " " << cloud(i, 0) << " " << cloud(i, 1) << " " << cloud(i, 2)
-             << " 9 9 9 0.5 1 0 2 0 3 0\n";
-    }
-  }
-
-  std::string film() const { return (folder_ / "film.mp4").string(); }
-  fs::path capture() const { return folder_ / "capture"; }
-
-  PrepareOptions options() const {
-    PrepareOptions o;
-    o.frames = frames;
-    o.masks = "none";
-    o.test_every = 4;
-    return o;
-  }
-
-  bool prepare(const PrepareOptions& options) { return prepare(film(), capture(), options); }
-  bool prepare(const fs::path& input, const fs::path& capture, const PrepareOptions& options) {
-    lines_.clear();
-    told_.clear();
-    fs::remove(folder_ / "calls");
-    return prepare_capture(input, capture, options,
-                           {[this](const std::string& line) { lines_.push_back(line); },
-                            [this](Step step, int64_t done, int64_t all) {
-                              told_.push_back(fmt::format("{} {}/{}", step_name(step), done, all));
-                            }},
-                           stop_);
-  }
-  std::string refusal(const PrepareOptions& options) {
-    return refusal_of([&] { prepare(options); });
-  }
-  // A folder of a mask for each frame, white in its left half, for the ffmpeg of these tests to read.
-  fs::path write_masks(int width, int height, const std::string& name = "mine") const {
-    fs::create_directory(folder_ / name);
-    for (int i = 0; i < frames; ++i) {
-      const std::string file = folder_ / name / fmt::format("{:06}.png", i);
-      std::ofstream(file) << "a picture";
-      std::ofstream(file + ".times") << "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/25\n"
-                                     << "[Parsed_showinfo_1 @ 0x55] n:   0 pts:   0\n";
-      std::ofstream grey(file + ".pgm", std::ios::binary);
-      grey << "P5\n" << width << " " << height << "\n255\n";
-      for (int k = 0; k < width * height; ++k) grey.put(k % width < width / 2 ? '\xff' : '\0');
-    }
-    return folder_ / name;
-  }
-  // Which programs were called: "ffmpeg pgm", "colmap mapper".
-  std::vector<std::string> calls() const {
-    std::vector<std::string> found;
-    std::ifstream file(folder_ / "calls");
-    for (std::string program, verb, rest; file >> program >> verb;) {
-      std::getline(file, rest);
-      found.push_back(program + " " + verb);
-    }
-    return found;
-  }
-
-  std::string path_;
-  TempFolder folder_;
-  std::vector<SynthView> views_;
-  std::vector<std::string> lines_, told_;
-  std::atomic<bool> stop_ = false;
-};
 
 TEST_F(PrepareTest, MakesACaptureWithTheKnownCameras) {
   ASSERT_TRUE(prepare(options()));
@@ -244,19 +51,28 @@ TEST_F(PrepareTest, MakesACaptureWithTheKnownCameras) {
   EXPECT_NE(*std::max_element(taken.data(), taken.data() + taken.size()), 90);
 }
 
-TEST(ShareSaid, IsWhatColmapSaysLast) {
-  const auto said = [](const std::string& text) {
-    const auto share = share_said(text, 87);
-    return share ? fmt::format("{}/{}", share->done, share->all) : "nothing";
-  };
-  EXPECT_EQ(
-      said("Processed file [1/87]\n  Name: 000000.png\nI2024 17 x.cc:9] Processed file [12/87]\n  Name:"),
-      "12/87");
-  EXPECT_EQ(said("Matching image [9/87] in 0.551s\nMatching image [10/87]"), "10/87");
-  EXPECT_EQ(said("Matching block [2/3, 1/3] in 0.5s"), "4/9");
-  EXPECT_EQ(said("Registering image #59 (36)\n\n  => Image sees 312 / 512 points"), "36/87");
-  EXPECT_EQ(said("tching image [9/8"), "nothing");
-  EXPECT_EQ(said(""), "nothing");
+TEST_F(PrepareTest, AFoldersPicturesHaveTheirPlacesForTimes) {
+  ASSERT_TRUE(prepare(write_pictures(), capture(), options()));
+  EXPECT_THAT(lines_[0], HasSubstr("14 of 28 pictures, the sharpest of each interval, 64×40 ("));
+  const Capture made = load_capture(capture(), {});
+  EXPECT_TRUE(made.warnings.empty()) << made.warnings.front().text;
+  ASSERT_EQ(made.train.size(), 11U);
+  ASSERT_EQ(made.test.size(), 3U);
+  // The sharp ones are the pictures 0, 3, 4, 7, 8, … 27.
+  for (const auto* split : {&made.train, &made.test}) {
+    for (const View& view : *split) {
+      const int i = std::stoi(view.id);
+      EXPECT_NEAR(view.time, (2 * i + i % 2) / 27.0, 1e-6) << view.id;
+      EXPECT_NE(read_png(capture() / "rgb/1x" / (view.id + ".png"))[0], 90) << view.id;
+    }
+  }
+  const JsonFile list(work_folder(capture()) / "frames.list.json");
+  std::vector<std::string> sources;
+  for (const JsonField& frame : list["frames"].elements()) sources.push_back(frame["source"].text());
+  ASSERT_EQ(sources.size(), 14U);
+  EXPECT_EQ(sources[0], "IMG_8.png");
+  EXPECT_EQ(sources[1], "IMG_11.png");
+  EXPECT_EQ(sources[13], "IMG_35.png");
 }
 
 TEST_F(PrepareTest, WhatStandsIsNotDoneAgain) {
@@ -321,6 +137,12 @@ TEST_F(PrepareTest, AProgramsFailureIsOneLineWithItsOwnWords) {
   fs::remove(film() + ".pgm");
   std::ofstream(film()) << "another film";
   EXPECT_THAT(refusal(options()), testing::AllOf(HasSubstr("film.mp4"), HasSubstr("Invalid data found")));
+}
+
+// It is not for want of anything to register.
+TEST_F(PrepareTest, AMapperThatFailsAtWritingItsModelIsAFailure) {
+  set_variable("FAIL", "disk");
+  EXPECT_THAT(refusal(options()), HasSubstr("colmap mapper: found a failure: No space left on device"));
 }
 
 TEST_F(PrepareTest, AStopEndsTheProgramAndTheNextCallGoesOn) {
