@@ -130,7 +130,7 @@ void squared_error_on_device(benchmark::State& state) {
   if (bench::no_device(state)) return;
   measure_on_device(state, 3, floor_of(2, 3),
                     [](const auto& image, const auto& target, auto&, auto&, const auto& slot) {
-                      loss::squared_error(image, target, slot);
+                      loss::squared_error(image, target, {}, slot);
                     });
 }
 

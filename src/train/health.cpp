@@ -22,9 +22,10 @@ std::string Health::check(const LossTerms& terms, const NonFiniteGradients& grad
       return std::to_string(gradients.count) + " gradients are not numbers, the first at " + gradients.first;
     }
   }
+  if (!terms.psnr) return "";
   ++steps_;
   const double weight = std::max(smoothing, 1.0 / static_cast<double>(steps_));
-  smoothed_ += weight * (terms.psnr - smoothed_);
+  smoothed_ += weight * (*terms.psnr - smoothed_);
   if (steps_ < settling_steps) return "";
   best_ = std::max(best_, smoothed_);
   if (collapse_decibels_ > 0 && smoothed_ < best_ - static_cast<double>(collapse_decibels_)) {

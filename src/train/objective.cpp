@@ -10,7 +10,10 @@ namespace traceflow {
 
 namespace {
 
-double psnr(double squared_error) { return -10.0 * std::log10(std::max(squared_error, 1e-10)); }
+std::optional<double> psnr(const loss::Mean& squared_error) {
+  if (squared_error.count == 0) return std::nullopt;
+  return -10.0 * std::log10(std::max(squared_error.value, 1e-10));
+}
 
 }  // namespace
 
@@ -27,15 +30,15 @@ loss::MeanSlot LossMeans::add(Term term, double weight) {
 LossTerms LossMeans::read() const {
   LossTerms terms;
   const Tensor<loss::Mean> means = means_.on(Device::cpu);
-  const std::array<double*, term_count> values{&terms.l1,           &terms.ssim,       &terms.normal,
-                                               &terms.normal_prior, &terms.distortion, &terms.lpips,
-                                               &terms.rigidity,     &terms.psnr};
-  for (size_t term = 0; term < term_count; ++term) {
+  const std::array<double*, squared_error> values{&terms.l1,           &terms.ssim,       &terms.normal,
+                                                  &terms.normal_prior, &terms.distortion, &terms.lpips,
+                                                  &terms.rigidity};
+  for (size_t term = 0; term < values.size(); ++term) {
     if (!weight_[term]) continue;
-    const double value = means[static_cast<int64_t>(term)].value;
-    *values[term] = term == squared_error ? psnr(value) : value;
-    if (term != squared_error) terms.total += *weight_[term] * value;
+    *values[term] = means[static_cast<int64_t>(term)].value;
+    terms.total += *weight_[term] * *values[term];
   }
+  if (weight_[squared_error]) terms.psnr = psnr(means[squared_error]);
   return terms;
 }
 
@@ -53,7 +56,7 @@ void evaluate_objective(const Frame& frame, const ViewImages& target, const Loss
   gradient.distortion.place(device).reset(options.distortion > 0 ? frame.raster.distortion.shape() : none);
 
   const auto slot = [&](LossMeans::Term term, double weight) { return means.add(term, weight); };
-  loss::squared_error(frame.colour, target.colour, slot(LossMeans::squared_error, 0));
+  loss::squared_error(frame.colour, target.colour, target.known, slot(LossMeans::squared_error, 0));
   loss::l1(frame.colour, target.colour, 1 - options.ssim, gradient.colour,
            slot(LossMeans::l1, 1 - options.ssim));
   if (options.ssim > 0) {

@@ -21,14 +21,15 @@ struct LossTerms {
   double distortion = 0;
   double rigidity = 0;
   double lpips = 0;
-  double psnr = 0;  // dB, of the image as it is, not rounded
+  // dB, of the image as it is, not rounded; absent where nothing of the photograph is known.
+  std::optional<double> psnr;
 };
 
 // The terms of one frame's loss as they were computed, on the frame's device: nobody waits for them until
 // they are read.
 class LossMeans {
  public:
-  // In the order in which they are added up.
+  // In the order in which they are added up; the last is no term of the sum.
   enum Term { l1, ssim, normal, normal_prior, distortion, lpips, rigidity, squared_error, term_count };
 
   // Forgets the last frame's.

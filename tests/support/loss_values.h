@@ -29,8 +29,9 @@ inline double normal_prior(const Tensor<float>& normal, const Tensor<float>& pri
 inline double distortion(const Tensor<float>& map, double weight, Tensor<float>& grad_map) {
   return value_of(map.device(), [&](const MeanSlot& slot) { distortion(map, weight, grad_map, slot); });
 }
-inline double squared_error(const Tensor<float>& image, const Tensor<float>& target) {
-  return value_of(image.device(), [&](const MeanSlot& slot) { squared_error(image, target, slot); });
+inline double squared_error(const Tensor<float>& image, const Tensor<float>& target,
+                            const Tensor<uint8_t>& known = {}) {
+  return value_of(image.device(), [&](const MeanSlot& slot) { squared_error(image, target, known, slot); });
 }
 inline double rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tensor<int32_t>& subset,
                        const Neighbours& edges, double strain, double weight, Tensor<float>& grad_rest,

@@ -21,6 +21,14 @@ TEST(Health, ASteadyRunIsSound) {
   EXPECT_NEAR(health.smoothed_psnr(), 22, 0.2);
 }
 
+TEST(Health, APhotographOfWhichNothingIsKnownSaysNothing) {
+  Health health(NonFinite::stop, 5);
+  LossTerms unknown = at_psnr(0);
+  unknown.psnr.reset();
+  for (int i = 0; i < 2000; ++i) EXPECT_EQ(health.check(i % 2 == 0 ? at_psnr(20) : unknown, {}), "");
+  EXPECT_DOUBLE_EQ(health.smoothed_psnr(), 20);
+}
+
 TEST(Health, ACollapseIsReported) {
   Health health(NonFinite::stop, 5);
   for (int i = 0; i < 1000; ++i) ASSERT_EQ(health.check(at_psnr(25), {}), "");

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "capture/pixels.h"
 #include "support/gradients.h"
 #include "support/narrow_lpips.h"
 #include "support/refusal.h"
@@ -53,6 +54,24 @@ TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
               (1 - o.ssim) * t.l1 + o.ssim * t.ssim + o.normal * t.normal + o.normal_prior * t.normal_prior +
                   o.distortion * t.distortion + o.lpips * t.lpips,
               1e-12);
+}
+
+// What is not known has the render's colours, which are no error and no measure.
+TEST(Objective, PsnrIsOfWhatIsKnown) {
+  Fixture f;
+  FrameGradient gradient;
+  const double all = evaluate(f, gradient).psnr.value();
+  f.target.known.resize({20, 24});
+  f.target.known.fill(1);
+  EXPECT_NEAR(evaluate(f, gradient).psnr.value(), all, 1e-9);
+  for (int64_t y = 0; y < 20; ++y) {
+    for (int64_t x = 0; x < 18; ++x) f.target.known(y, x) = 0;
+  }
+  take_unknown(f.frame.colour, f.target);
+  EXPECT_NEAR(evaluate(f, gradient).psnr.value(), all, 1)
+      << "not the 6 dB that three quarters of no error give";
+  f.target.known.fill(0);
+  EXPECT_FALSE(evaluate(f, gradient).psnr.has_value());
 }
 
 TEST(Objective, WithoutItsNetworkTheImageHasNoPerceptualTerm) {

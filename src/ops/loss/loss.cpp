@@ -77,11 +77,19 @@ void distortion(const Tensor<float>& distortion_map, double weight, Tensor<float
                       MeanOver{count, value.on(distortion_map.device())}, block_pixels);
 }
 
-void squared_error(const Tensor<float>& image, const Tensor<float>& target, const MeanSlot& value) {
+void squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& known,
+                   const MeanSlot& value) {
   check_same_shape(image, target, image);
-  ordered_sum<double>(image.device(), "loss: squared error", image.size(),
-                      SquaredError{image.data(), target.data()},
-                      MeanOver{static_cast<double>(image.size()), value.on(image.device())}, block_pixels);
+  const SquaredError error{image.data(), target.data()};
+  Mean* const mean = value.on(image.device());
+  if (known.empty()) {
+    ordered_sum<double>(image.device(), "loss: squared error", image.size(), error,
+                        MeanOver{static_cast<double>(image.size()), mean}, block_pixels);
+    return;
+  }
+  require(3 * known.size() == image.size(), "every pixel is known or not", known.shape().to_string());
+  ordered_sum<CountedSum>(image.device(), "loss: squared error of what is known", known.size(),
+                          KnownSquaredError{error, known.data()}, MeanOverCounted{mean}, block_pixels);
 }
 
 }  // namespace traceflow::loss

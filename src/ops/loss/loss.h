@@ -45,7 +45,9 @@ double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>
 void distortion(const Tensor<float>& distortion_map, double weight, Tensor<float>& grad_distortion,
                 const MeanSlot& value);
 
-// mean (image − target)² over pixels and channels, which PSNR is made of; no term of the loss.
-void squared_error(const Tensor<float>& image, const Tensor<float>& target, const MeanSlot& value);
+// mean (image − target)² over channels and pixels, which PSNR is made of; no term of the loss. known (H×W,
+// may be empty) restricts the mean to pixels where it is non-zero.
+void squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& known,
+                   const MeanSlot& value);
 
 }  // namespace traceflow::loss

@@ -8,6 +8,8 @@ using loss::MeanOverCounted;
 
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::L1&, const MeanOver&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::SquaredError&, const MeanOver&);
+template void cuda::sum_each_index<CountedSum>(const char*, int64_t, const loss::KnownSquaredError&,
+                                               const MeanOverCounted&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::Distortion&, const MeanOver&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::NormalConsistency<float>&,
                                            const MeanOver&);

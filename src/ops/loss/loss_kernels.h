@@ -88,6 +88,17 @@ struct SquaredError {
   }
 };
 
+// Of one pixel.
+struct KnownSquaredError {
+  SquaredError error;
+  const uint8_t* known;
+
+  TRACEFLOW_HD CountedSum operator()(int64_t i) const {
+    if (known[i] == 0) return {};
+    return {error(3 * i) + error(3 * i + 1) + error(3 * i + 2), 3};
+  }
+};
+
 struct Distortion {
   const float* map;
   float scale;

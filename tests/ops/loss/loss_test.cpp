@@ -138,6 +138,20 @@ TEST(Distortion, IsTheMeanOfItsMap) {
   for (const float g : gradient.values()) EXPECT_EQ(g, 2);
 }
 
+TEST(SquaredError, IsTheMeanOverWhatIsKnown) {
+  Tensor<float> image({1, 3, 3}), target({1, 3, 3});
+  for (int64_t pixel = 0; pixel < 3; ++pixel) {
+    for (int64_t channel = 0; channel < 3; ++channel) image[pixel * 3 + channel] = static_cast<float>(pixel);
+  }
+  image[4] = 3;
+  EXPECT_DOUBLE_EQ(squared_error(image, target), (0 + 1 + 9 + 1 + 3 * 4) / 9.0);
+  Tensor<uint8_t> known({1, 3});
+  EXPECT_EQ(squared_error(image, target, known), 0) << "nothing is known";
+  known[1] = 1;
+  EXPECT_DOUBLE_EQ(squared_error(image, target, known), (1 + 9 + 1) / 3.0);
+  EXPECT_THROW(squared_error(image, target, Tensor<uint8_t>({1, 2})), InternalError);
+}
+
 TEST(Losses, HostilePixelsShowInTheValueAndGiveNoGradient) {
   const Normals n(10, 10);
   const Shape shape = n.unit.shape();

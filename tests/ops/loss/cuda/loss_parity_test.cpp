@@ -16,6 +16,7 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 // A picture of each kind: colours, and normals of which every seventh is missing.
 struct Pictures {
   Tensor<float> image, target, normal, unit;
+  Tensor<uint8_t> known;  // one of three
 
   Pictures(int64_t height, int64_t width, uint64_t seed = 1) {
     Random random(seed);
@@ -24,6 +25,8 @@ struct Pictures {
     target = random_tensor<float>(shape, random, 0, 1);
     normal = random_tensor<float>(shape, random, -0.5, 0.5);
     unit = random_tensor<float>(shape, random, -1, 1);
+    known.resize({height, width});
+    for (int64_t i = 0; i < known.size(); ++i) known[i] = i % 3 == 0 ? 1 : 0;
     for (int64_t i = 3; i < height * width; i += 7) std::fill_n(unit.data() + 3 * i, 3, 0.0F);
     for (int64_t i = 5; i < height * width; i += 7) std::fill_n(normal.data() + 3 * i, 3, 0.0F);
   }
@@ -60,6 +63,7 @@ std::vector<Result> run(const Pictures& p, Device device) {
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0]); });
   with(1, [&](auto& g) { return distortion(image, 3, g[0]); });
   with(0, [&](auto&) { return squared_error(image, target); });
+  with(0, [&](auto&) { return squared_error(image, target, p.known.on(device)); });
   with(0, [&](auto&) { return ssim(image, target, {}); });
   return all;
 }
@@ -145,8 +149,8 @@ TEST_F(LossOnDevice, NothingWeighsNothing) {
 TEST_F(LossOnDevice, ASlotElsewhereIsRefused) {
   Tensor<float> image({2, 2, 3}, Device::cuda);
   Tensor<Mean> here({1}), there({1}, Device::cuda);
-  EXPECT_THROW(squared_error(image, image, {here, 0}), InternalError);
-  EXPECT_THROW(squared_error(image, image, {there, 1}), InternalError);
+  EXPECT_THROW(squared_error(image, image, {}, {here, 0}), InternalError);
+  EXPECT_THROW(squared_error(image, image, {}, {there, 1}), InternalError);
 }
 
 }  // namespace
