@@ -20,6 +20,9 @@ using Json = nlohmann::ordered_json;
 constexpr size_t line_cap = size_t{1} << 20;
 constexpr int depth_cap = 8;
 constexpr size_t value_cap = 4000;
+// Beyond what any run does; so small that sums over a whole log stay numbers.
+constexpr int64_t iteration_cap = int64_t{1} << 53;
+constexpr double call_cap = 1e11;
 
 // An object, or null.
 Json parsed(const std::string& line) {
@@ -83,7 +86,7 @@ void add_measured(const Json& json, double iterations, std::vector<profile::Entr
   for (const Json& step : *steps) {
     const std::string name = step.is_object() ? text_in(step, "name") : std::string();
     const double calls = name.empty() ? 0 : number_in(step, "calls");
-    if (!(calls >= 0 && calls < 1e15)) continue;
+    if (!(calls >= 0 && share * calls < call_cap)) continue;
     auto sum =
         std::find_if(sums.begin(), sums.end(), [&](const profile::Entry& e) { return e.name == name; });
     if (sum == sums.end()) sum = sums.insert(sums.end(), {name, 0, 0});
@@ -99,7 +102,7 @@ std::optional<LoggedEvent> read_event(const std::string& line) {
   const auto iteration = json.is_object() ? json.find("iteration") : json.end();
   if (iteration == json.end() || !iteration->is_number_integer()) return std::nullopt;
   LoggedEvent event{text_in(json, "event"), iteration->get<int64_t>(), json.dump()};
-  if (event.kind.empty() || event.iteration < 0) return std::nullopt;
+  if (event.kind.empty() || event.iteration < 0 || event.iteration > iteration_cap) return std::nullopt;
   return event;
 }
 

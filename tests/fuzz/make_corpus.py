@@ -330,6 +330,39 @@ def messages():
         + b'\n{"type":"\\ud800","id":1}\n1e400')
 
 
+def documents():
+    put("json", "kinds",
+        '{"a": {"b": [1, 2.5, -3]}, "w": 7, "t": "word", "y": true, "n": null, "i": ["x", 4], "": {}}')
+    put("json", "rotation", "[[0, -1, 0], [1.004, 0, 0], [0, 0, 0.998]]")
+    put("json", "numbers", "[0, -0.0, 1e308, 5e-324, -1, [1e15, -1e15, 1e16]]")
+    put("json", "beyond", "[1, 1e400]")
+    put("json", "whole", "[9007199254740992, 9007199254740993, -9223372036854775808, 18446744073709551616, 1e0, -3.0]")
+    put("json", "texts", r'["\ud83d\ude00", "\u0000\u001b[2J", "\"\\/\b\f\n\r\t", "[{,", "é", {"a.b\u007f": "x"}]')
+    put("json", "twice", b'\xef\xbb\xbf{"a": 1, "a": [2, [3]], "b": {"c": {"d": null}}}')
+    put("json", "deep", "[" * 64 + "]" * 64)
+    put("json", "deeper", '{"":' * 65 + "0" + "}" * 65)
+    put("json", "halved", '{"a": [1, {"b": "\\')
+
+    step = {"event": "step", "iterations": 40, "phase": "warm up", "loss": 0.5, "terms": {"colour": 0.25}}
+    start = {"event": "started", "iteration": 0, "capture": "é", "surfels": {"main": 3, "environment": 0}}
+    timed = {"event": "measured", "iteration": 10, "phase": "warm up", "iterations": 5,
+             "steps": [{"name": "raster", "calls": 10, "seconds": 0.25}, {"name": "loss", "calls": 5, "seconds": 0.1}]}
+    ended = {"event": "finished", "iteration": 20, "ending": "interrupted"}
+    told = {"event": "warning", "iteration": 5, "text": "once"}
+    session = [start, told, *({**step, "iteration": i, "seconds": i / 8} for i in (1, 5, 10)), timed,
+               {"event": "phase_entered", "iteration": 10, "phase": "whole"},
+               *({**step, "iteration": i, "phase": "whole", "seconds": i / 8} for i in (15, 20)), told, ended]
+    resumed = [{**start, "iteration": 10}, *({**step, "iteration": i, "phase": "whole"} for i in (15, 20, 25))]
+    lines = [json.dumps(line, ensure_ascii=False) for line in session + resumed]
+    put("json", "log", "\n".join(lines[:6]) + "\n")
+    put("json", "resumed", "\n".join(lines))
+    put("json", "anew", "\r\n".join(lines[2:5] + lines[2:4] + [lines[9]] + lines[3:4]))
+    put("json", "strange_log", '{"event":"step","iteration":1e3}\n{"event":"","iteration":1}\n[]\n\n{"event":"step"\n'
+        '{"event":"measured","iteration":1,"iterations":1e-300,"steps":[{"name":"a","calls":1e14},0]}\n'
+        '{"event":"step","iteration":-1}\n{"event":"a","iteration":18446744073709551615}\n'
+        '{"event":"a","iteration":2,"b":' + "[" * 12 + "]" * 12 + "}\n" + '{"event":"step","iteration":3,"seconds":-1e308}')
+
+
 def archives():
     files = {"top/dataset.json": b"{}", "top/rgb/1x/a.png": b"png", "top/empty": b""}
     put("zip", "stored", archive(files))
@@ -338,5 +371,5 @@ def archives():
     put("zip", "outside", archive({"../a": b"a", "b": b"b"}))
 
 
-for make in (arrays, images, models, settings, captures, models_of_colmap, messages, archives):
+for make in (arrays, images, models, settings, captures, models_of_colmap, messages, documents, archives):
     make()

@@ -49,22 +49,28 @@ inline int free_descriptor() {
   return descriptor;
 }
 
-// Whether the reader took the input; what it throws otherwise is an InputError of one line that can be shown,
-// and names `where`.
+// Whether it is read; what it throws otherwise is an InputError of one line that can be shown, and names
+// `where`.
 template <class F>
-bool accepts(const std::string& where, F&& read) {
-  const int before = free_descriptor();
-  bool accepted = true;
+bool can_read(const std::string& where, F&& read) {
   try {
     read();
   } catch (const InputError& error) {
-    accepted = false;
     const std::string_view text = error.what();
     promise(text.find(where) != std::string_view::npos, "an error names the file");
     promise(text.size() < 2000 + where.size(), "an error is short");
     for (const char c : text)
       promise(static_cast<unsigned char>(c) >= 32 && c != 127, "an error can be shown");
+    return false;
   }
+  return true;
+}
+
+// The same of what opens files.
+template <class F>
+bool accepts(const std::string& where, F&& read) {
+  const int before = free_descriptor();
+  const bool accepted = can_read(where, read);
   promise(free_descriptor() == before, "no file is left open");
   return accepted;
 }

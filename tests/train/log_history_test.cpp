@@ -194,6 +194,18 @@ TEST(LogHistory, PhasesOfOddEventsAreNoError) {
   }
 }
 
+// Sums over them would be beyond any number.
+TEST(LogHistory, CountsThatNoRunReachesAreNone) {
+  EXPECT_FALSE(read_event(R"({"event":"step","iteration":9223372036854775807})"));
+  EXPECT_TRUE(read_event(R"({"event":"step","iteration":9007199254740992})"));
+  const std::vector<LoggedPhase> phases = phases_of(
+      read(R"({"event":"measured","iteration":9000000000000000,"phase":"a","iterations":9000000000000000,)"
+           R"("steps":[{"name":"many","calls":1e14},{"name":"few","calls":2}]})"));
+  ASSERT_EQ(phases.size(), 1U);
+  ASSERT_EQ(phases[0].steps.size(), 1U);
+  EXPECT_EQ(phases[0].steps[0].name, "few");
+}
+
 // A text, as often as wanted, of which nothing is kept.
 class Repeated : public std::streambuf {
  public:
