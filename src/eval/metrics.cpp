@@ -108,9 +108,10 @@ Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const 
   const Tensor<uint8_t>& known = brought(is_all_known ? all : *truth.known, device, known_room);
   const Tensor<uint8_t>& mask = brought(truth.mask, device, mask_room);
   Metrics m;
-  m.psnr = psnr(image, target, known);
-  m.ssim = loss::ssim(image, target, known);
-  if (network != nullptr && std::min(image.dim(0), image.dim(1)) >= lpips::min_side) {
+  const CountedSum whole = squared_error(image, target, known);
+  m.psnr = psnr_of(whole);
+  if (whole.count > 0) m.ssim = loss::ssim(image, target, known);
+  if (whole.count > 0 && network != nullptr && std::min(image.dim(0), image.dim(1)) >= lpips::min_side) {
     m.lpips = lpips::distance(*network, image, target, lpips::Input::defined);
     m.lpips_published = lpips::distance(*network, image, target, lpips::Input::published);
   }

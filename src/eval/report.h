@@ -19,7 +19,8 @@ struct ViewReport {
 // What is known of a scene's quality: the content of metrics.json.
 struct Report {
   std::string capture;
-  std::string split;  // "test" or "train"
+  std::string split;             // "test" or "train"
+  bool views_as_trained = true;  // else times and splits may be others than the run's
   int downscale = 1;
   std::string device = "cpu";
   int64_t iterations = 0;

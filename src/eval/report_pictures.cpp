@@ -55,13 +55,14 @@ bool among_spread(size_t i, size_t n, size_t wanted) {
 ReportPictures::ReportPictures(size_t views, size_t budget)
     : views_(views), shown_(std::min(views, most_views)), share_(budget / std::max<size_t>(1, shown_)) {}
 
-void ReportPictures::add(const std::string& id, const Tensor<float>& photograph, const Frame& frame) {
+void ReportPictures::add(const std::string& id, const Tensor<float>& photograph, const Frame& frame,
+                         const Tensor<uint8_t>& known) {
   const Tensor<float> render = show::layer_values(frame, Layer::rgb, 1);
   const auto layer = [&](Layer which) {
     return show::in_colour(painter_.paint(which, show::layer_values(frame, which, 1)));
   };
   Pictures pictures = {
-      to_8bit(photograph),   to_8bit(render),        to_8bit(show::difference(photograph, render)),
+      to_8bit(photograph),   to_8bit(render),        to_8bit(show::difference(photograph, render, known)),
       layer(Layer::diffuse), layer(Layer::specular), layer(Layer::normal),
       layer(Layer::depth)};
   const int64_t height = render.dim(0), width = render.dim(1);

@@ -27,8 +27,9 @@ class ReportPictures {
 
   // Whether view i of all is to be added.
   bool wants(size_t i) const { return among_spread(i, views_, shown_); }
-  // photograph: on the host; the frame is on any device.
-  void add(const std::string& id, const Tensor<float>& photograph, const Frame& frame);
+  // photograph, and what of it is known (H×W, may be empty): on the host; the frame is on any device.
+  void add(const std::string& id, const Tensor<float>& photograph, const Frame& frame,
+           const Tensor<uint8_t>& known = {});
   std::vector<ReportPicture> take() { return std::move(pictures_); }
 
  private:

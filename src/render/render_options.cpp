@@ -1,5 +1,7 @@
 #include "render/render_options.h"
 
+#include <algorithm>
+
 namespace traceflow {
 
 void RenderOptions::validate() const {
@@ -17,7 +19,7 @@ raster::Options RenderOptions::raster_options(float extent) const {
   options.low_pass = low_pass;
   options.alpha_min = alpha_min;
   options.alpha_max = alpha_max;
-  options.transmittance_min = transmittance_min;
+  options.transmittance_min = std::max(transmittance_min, raster::least_transmittance);
   options.background = background;
   return options;
 }

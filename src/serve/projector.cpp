@@ -37,6 +37,18 @@ Tensor<float> fitted(const Tensor<float>& image, int64_t width, int64_t height) 
                           static_cast<double>(image.dim(0)) / static_cast<double>(height)});
 }
 
+// A new pixel is known where all of what it is made of is.
+Tensor<uint8_t> fitted_known(const Tensor<uint8_t>& known, int64_t width, int64_t height) {
+  if (known.empty() || (known.dim(0) == height && known.dim(1) == width)) return known;
+  constexpr float whole = 0.999F;
+  Tensor<float> share({known.dim(0), known.dim(1), 1});
+  for (int64_t i = 0; i < share.size(); ++i) share[i] = known[i];
+  share = fitted(share, width, height);
+  Tensor<uint8_t> result({height, width});
+  for (int64_t i = 0; i < result.size(); ++i) result[i] = share[i] > whole ? 1 : 0;
+  return result;
+}
+
 bool shows_reflections(const std::string& layer) {
   const auto* const known = std::find(show::layer_names.begin(), show::layer_names.end(), layer);
   return known == show::layer_names.end() ||
@@ -102,7 +114,10 @@ void Projector::answer(const Job& job, const Stage& stage) {
     if (!audience_.anybody_lacks_memory()) audience_.tell_trouble(about_memory, "");
   } catch (const std::bad_alloc& error) {
     forget();
-    const std::string why = std::string("No memory for a picture of this size: ") + error.what();
+    // What the host says has no numbers.
+    const auto* const device = dynamic_cast<const memory::OutOfMemory*>(&error);
+    const std::string why = "No memory for a picture of this size" +
+                            (device == nullptr ? "." : ": " + std::string(device->what()));
     if (std::holds_alternative<FrameJob>(job.what)) {
       audience_.no_memory_for(job);
       audience_.tell_trouble(about_memory, why);
@@ -124,12 +139,12 @@ FrameRequest Projector::request_for(const Look& look, const Stage& stage, double
   return request;
 }
 
-Tensor<float> Projector::photograph(const PhotoRef& photo) const {
+std::shared_ptr<const ViewImages> Projector::photograph(const PhotoRef& photo) const {
   if (setting_.capture == nullptr)
     throw InputError("message", "photo", "a scene without photographs", "a run");
   captured(photo, setting_);
   const std::vector<View>& views = photo.test ? setting_.capture->test : setting_.capture->train;
-  return load_images(*setting_.capture, views.at(static_cast<size_t>(photo.index)))->colour;
+  return load_images(*setting_.capture, views.at(static_cast<size_t>(photo.index)));
 }
 
 Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request, const Stage& stage,
@@ -146,8 +161,10 @@ Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request
     return show::in_colour(
         painter.paint(layer, show::layer_values(frame, layer, stage.scene.normalisation.scale)));
   }
-  return painter.paint_difference(show::difference_values(
-      frame, fitted(photograph(*photo), request.camera.width, request.camera.height)));
+  const std::shared_ptr<const ViewImages> images = photograph(*photo);
+  const int64_t width = request.camera.width, height = request.camera.height;
+  return painter.paint_difference(show::difference_values(frame, fitted(images->colour, width, height),
+                                                          fitted_known(images->known, width, height)));
 }
 
 void Projector::answer(const Job& job, const FrameJob& frame, const Stage& stage) {
@@ -190,7 +207,8 @@ void Projector::answer(const Job& job, const StillJob& still, const Stage& stage
 }
 
 void Projector::answer(const Job& job, const Photo& photo, const Stage&) {
-  const Tensor<float> colour = photograph(photo.photo);
+  const std::shared_ptr<const ViewImages> images = photograph(photo.photo);
+  const Tensor<float>& colour = images->colour;
   const int64_t width = std::min<int64_t>(photo.width, colour.dim(1));
   const int64_t height = std::max<int64_t>(
       1, std::llround(static_cast<double>(width * colour.dim(0)) / static_cast<double>(colour.dim(1))));

@@ -35,7 +35,7 @@ class Projector {
 
   FrameRequest request_for(const Look& look, const Stage& stage, double divisor) const;
   // As the capture has it, on the host. Throws InputError.
-  Tensor<float> photograph(const PhotoRef& photo) const;
+  std::shared_ptr<const ViewImages> photograph(const PhotoRef& photo) const;
   // What a Look shows, as 8-bit colours.
   Tensor<uint8_t> picture(const Look& look, const FrameRequest& request, const Stage& stage,
                           show::Painter& painter);

@@ -24,18 +24,21 @@ constexpr float difference_gain = 3;
 
 }  // namespace
 
-Tensor<float> difference(const Tensor<float>& a, const Tensor<float>& b) {
-  Tensor<float> result(a.shape());
-  for (int64_t i = 0; i < a.size(); ++i) result[i] = difference_gain * std::abs(a[i] - b[i]);
+Tensor<float> difference(const Tensor<float>& photograph, const Tensor<float>& render,
+                         const Tensor<uint8_t>& known) {
+  Tensor<float> result(photograph.shape());
+  for (int64_t i = 0; i < result.size(); ++i) {
+    if (known.empty() || known[i / 3] != 0) result[i] = difference_gain * std::abs(photograph[i] - render[i]);
+  }
   return result;
 }
 
-void ContactSheet::add(const Tensor<float>& photograph, const Frame& frame) {
+void ContactSheet::add(const Tensor<float>& photograph, const Frame& frame, const Tensor<uint8_t>& known) {
   require(photograph.shape() == frame.colour.shape(), "photograph and render have one shape",
           photograph.shape().to_string() + " and " + frame.colour.shape().to_string());
   const Tensor<float> render = layer_values(frame, Layer::rgb, 1);
   std::vector<Tensor<uint8_t>> row = {to_8bit(photograph), to_8bit(render),
-                                      to_8bit(difference(photograph, render))};
+                                      to_8bit(difference(photograph, render, known))};
   for (const Layer layer : shown_layers)
     row.push_back(in_colour(painter_.paint(layer, layer_values(frame, layer, 1))));
   for (Tensor<uint8_t>& cell : row) cell = shrink(cell, cell_width_);

@@ -13,8 +13,8 @@ class ContactSheet {
   // cell_width: columns of one picture, pixels.
   explicit ContactSheet(int64_t cell_width) : cell_width_(cell_width) {}
 
-  // photograph: on the host; the frame is on any device.
-  void add(const Tensor<float>& photograph, const Frame& frame);
+  // photograph, and what of it is known (H×W, may be empty): on the host; the frame is on any device.
+  void add(const Tensor<float>& photograph, const Frame& frame, const Tensor<uint8_t>& known = {});
   // Written atomically. There must be a row.
   void write(const std::filesystem::path& path) const;
 
@@ -24,7 +24,9 @@ class ContactSheet {
   std::vector<std::vector<Tensor<uint8_t>>> rows_;
 };
 
-// |a − b|, three times as strong, to be seen.
-Tensor<float> difference(const Tensor<float>& a, const Tensor<float>& b);
+// |photograph − render|, three times as strong, to be seen; 0 where the photograph is not known (H×W, may be
+// empty).
+Tensor<float> difference(const Tensor<float>& photograph, const Tensor<float>& render,
+                         const Tensor<uint8_t>& known);
 
 }  // namespace traceflow::show

@@ -72,13 +72,15 @@ Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
   return {};
 }
 
-Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph) {
+Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph,
+                                const Tensor<uint8_t>& known) {
   require(photograph.shape() == frame.colour.shape(), "photograph and render have one shape",
           photograph.shape().to_string() + " and " + frame.colour.shape().to_string());
   Tensor<float> fetched;
   const Tensor<float>& render = on_host(frame.colour, fetched);
   Tensor<float> difference(Shape{render.dim(0), render.dim(1)});
   parallel_for("show: difference", difference.size(), [&](int64_t i) {
+    if (!known.empty() && known[i] == 0) return;
     const Vec3<float> d = abs(load3<float>(photograph.data() + 3 * i) - load3<float>(render.data() + 3 * i));
     difference[i] = (d.x + d.y + d.z) / 3;
   });

@@ -29,7 +29,9 @@ std::vector<Layer> parse_layers(const std::string& list);
 // is.
 Tensor<float> layer_values(const Frame& frame, Layer layer, double scale);
 
-// H×W: |photograph − render|, the mean of the three channels. The photograph is H×W×3 on the host.
-Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph);
+// H×W: |photograph − render|, the mean of the three channels. The photograph is H×W×3 on the host; where it
+// is not known (H×W, may be empty) the difference is 0.
+Tensor<float> difference_values(const Frame& frame, const Tensor<float>& photograph,
+                                const Tensor<uint8_t>& known = {});
 
 }  // namespace traceflow::show

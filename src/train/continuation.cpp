@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "base/device_memory.h"
+#include "base/version.h"
 #include "files/options_json.h"
 #include "primitives/instructions.h"
 
@@ -17,6 +18,8 @@ namespace {
 
 constexpr const char* views_key = "views_crc32";
 constexpr const char* arithmetic_key = "arithmetic";
+constexpr const char* version_key = "program_version";
+constexpr const char* other_end = ": it ends in other bytes than one that was never stopped";
 
 // Rounded, so that a compiler that rounds the last bit otherwise makes no other capture of it.
 int64_t rounded(double value) { return std::llround(value * 1e5); }
@@ -76,11 +79,12 @@ std::optional<std::string> entry(const Safetensors& checkpoint, const std::strin
 
 }  // namespace
 
-TrainOptions options_in(const Safetensors& checkpoint) {
+TrainOptions options_in(const Safetensors& checkpoint, const std::string& where) {
   TrainOptions options = preset("paper");
-  // Checkpoints from before this option pruned from the first density control on.
+  // Checkpoints from before these options pruned from the first density control on, by extents alone.
   options.density.prune_above_from = options.environment_density.prune_above_from = 0;
-  options_from_json(checkpoint.text("options"), option_fields(options), "checkpoint");
+  options.environment_density.prune_above_cloud = 1000;
+  options_from_json(checkpoint.text("options"), option_fields(options), where + ": options");
   return options;
 }
 
@@ -107,10 +111,16 @@ void put_views(const Capture& capture, Safetensors& checkpoint) {
   checkpoint.metadata[views_key] = checksum_of_views(capture);
 }
 
+std::string views_in(const Safetensors& checkpoint) { return entry(checkpoint, views_key).value_or(""); }
+
+bool are_views_of(const std::string& views, const SceneNormalisation& normalisation, const Capture& capture) {
+  return agree(capture.normalisation, normalisation) &&
+         (views.empty() || views == checksum_of_views(capture));
+}
+
 void check_views(const Safetensors& checkpoint, const SceneNormalisation& normalisation,
                  const Capture& capture) {
-  const auto views = entry(checkpoint, views_key);
-  if (agree(capture.normalisation, normalisation) && (!views || *views == checksum_of_views(capture))) return;
+  if (are_views_of(views_in(checkpoint), normalisation, capture)) return;
   throw InputError("--data", "", capture.folder.string() + ", whose views have other names, times or poses",
                    "the capture that the run was begun with, then in " + checkpoint.text("capture_folder"),
                    "begin a new run for another capture");
@@ -142,8 +152,15 @@ std::string other_arithmetic(const Safetensors& checkpoint, Device device) {
   const auto before = entry(checkpoint, arithmetic_key);
   const std::string now = arithmetic_of(device);
   if (!before || *before == now) return "";
-  return "the run was computed on " + *before + " and goes on on " + now +
-         ": it ends in other bytes than one that was never stopped";
+  return "the run was computed on " + *before + " and goes on on " + now + other_end;
+}
+
+void put_version(Safetensors& checkpoint) { checkpoint.metadata[version_key] = version(); }
+
+std::string other_version(const Safetensors& checkpoint) {
+  const auto before = entry(checkpoint, version_key);
+  if (!before || *before == version()) return "";
+  return "the run was computed by version " + *before + " and goes on by version " + version() + other_end;
 }
 
 }  // namespace traceflow

@@ -13,8 +13,8 @@
 // written are taken as they are.
 namespace traceflow {
 
-// The options that a checkpoint was written with.
-TrainOptions options_in(const Safetensors& checkpoint);
+// The options that a checkpoint was written with. where: what refusals name it.
+TrainOptions options_in(const Safetensors& checkpoint, const std::string& where = "checkpoint");
 
 // Throws InputError for a setting that is part of what the checkpoint holds already, so that another value
 // would do nothing: what the scene started from and what its fields are.
@@ -23,8 +23,13 @@ void refuse_reshaping(const TrainOptions& before, const TrainOptions& now);
 void refuse_other_preset(const std::string& name, const TrainOptions& of_preset, const TrainOptions& now);
 
 void put_views(const Capture& capture, Safetensors& checkpoint);
+// What a checkpoint says of the views that it was trained on; nothing in older ones.
+std::string views_in(const Safetensors& checkpoint);
+// Whether they are the capture's, for a scene that is normalised so: by the views' names, times and poses,
+// not by their pixels.
+bool are_views_of(const std::string& views, const SceneNormalisation& normalisation, const Capture& capture);
 // Throws InputError where the capture is not the one that the run, whose scene is normalised so, was begun
-// with: by the views' names, times and poses, not by their pixels.
+// with.
 void check_views(const Safetensors& checkpoint, const SceneNormalisation& normalisation,
                  const Capture& capture);
 
@@ -36,5 +41,9 @@ std::optional<SurfelCaps> caps_to_keep(const Safetensors& checkpoint, const Trai
 void put_arithmetic(Device device, Safetensors& checkpoint);
 // What is to be said where it is another than the checkpoint's; else nothing.
 std::string other_arithmetic(const Safetensors& checkpoint, Device device);
+
+// Which program computed them. As above.
+void put_version(Safetensors& checkpoint);
+std::string other_version(const Safetensors& checkpoint);
 
 }  // namespace traceflow

@@ -153,9 +153,9 @@ struct DensityOptions {
         "prune_above_cloud", prune_above_cloud, "clouds",
         "Likewise, in radii of the cloud of points; of the environment, in halves of its box's diagonal.");
     v.field("prune_above_from", prune_above_from, "iteration", "From where on the wide ones go.");
-    v.field(
-        "opacity_reset_every", opacity_reset_every, "iterations",
-        "Interval of opacity resets; 0 for none. Runs too short for opacities to recover have none either.");
+    v.field("opacity_reset_every", opacity_reset_every, "iterations",
+            "Interval of opacity resets; 0 for none. None either where half of it, in the run's own "
+            "iterations, is under \"every\": opacities could not recover.");
     v.field("opacity_reset", opacity_reset, "", "Opacity that a reset leaves at most.");
     v.field("max_surfels", max_surfels, "surfels", "Hard cap on the set's size.");
   }

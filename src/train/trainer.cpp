@@ -389,6 +389,7 @@ Safetensors Trainer::checkpoint() const {
   put_views(capture_, file);
   put_caps(memory_.caps, file);
   put_arithmetic(device_, file);
+  put_version(file);
   return file;
 }
 
@@ -477,7 +478,9 @@ void Trainer::resume() {
   environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;
   standing_ = health_.sound() ? Standing::sound : Standing::unsound;
   keep_caps(file);
-  if (const std::string other = other_arithmetic(file, device_); !other.empty()) warn(other);
+  for (const std::string& other : {other_arithmetic(file, device_), other_version(file)}) {
+    if (!other.empty()) warn(other);
+  }
   if (note.empty()) return;
   // Last: a run that is not resumed keeps its files as they are.
   warn(note);

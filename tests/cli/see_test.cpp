@@ -14,6 +14,7 @@
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/png.h"
+#include "files/safetensors.h"
 #include "support/file_bytes.h"
 
 // `report`, `eval`'s page and the films of `render`, from a run's folder to the files they leave.
@@ -132,6 +133,47 @@ TEST_F(See, EvalLeavesTheSamePage) {
     page->erase("render_fps");
   }
   EXPECT_EQ(eval, report);
+}
+
+// What training refuses today, an old run may have been trained with: its scene is shown all the same.
+TEST_F(See, ARunOfOlderOptionsIsShown) {
+  fs::copy(folder() / "run", folder() / "older", fs::copy_options::recursive);
+  const fs::path checkpoint = folder() / "older/checkpoint.safetensors";
+  Safetensors file = Safetensors::read(checkpoint);
+  Json options = Json::parse(file.metadata["options"]);
+  options["render"]["transmittance_min"] = 0;
+  options["density"]["prune_above"] = 0;
+  options["density"].erase("prune_above_from");
+  file.metadata["options"] = options.dump();
+  file.write(checkpoint);
+  const Outcome made = run_with({"report", path("older")});
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  for (const Json& setting : data_of(folder() / "older/report.html")["settings"]) {
+    if (setting["path"] == "density.prune_above_from") {
+      EXPECT_EQ(setting["value"], "0");
+    }
+  }
+}
+
+// Times are shares of the views that there are, and a split deals them out.
+TEST_F(See, FiguresOfACaptureThatHasChangedSayThatItHas) {
+  const auto metrics = [] { return Json::parse(bytes_of(folder() / "run/eval/test/metrics.json")); };
+  const std::vector<std::string> eval = {"eval", path("run"), "--layers", "none", "-d"};
+  const auto eval_on = [&](const std::string& capture) {
+    std::vector<std::string> words = eval;
+    words.push_back(capture);
+    const Outcome made = run_with(words);
+    EXPECT_EQ(made.code, exit_done) << made.err;
+    return made.err;
+  };
+  EXPECT_THAT(eval_on(path("capture")), testing::Not(HasSubstr("times may have moved")));
+  EXPECT_EQ(metrics()["views_as_trained"], true);
+  fs::copy(folder() / "capture", folder() / "changed", fs::copy_options::recursive);
+  Json dataset = Json::parse(bytes_of(folder() / "changed/dataset.json"));
+  dataset["train_ids"].erase(1);
+  std::ofstream(folder() / "changed/dataset.json") << dataset;
+  EXPECT_THAT(eval_on(path("changed")), HasSubstr("times may have moved"));
+  EXPECT_EQ(metrics()["views_as_trained"], false);
 }
 
 TEST_F(See, AReportOfARunWithoutALogHasNoEvents) {

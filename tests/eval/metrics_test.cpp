@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/random.h"
+#include "support/narrow_lpips.h"
 
 namespace traceflow::eval {
 namespace {
@@ -111,6 +112,15 @@ TEST(Measure, CountsColoursThatAreKnown) {
   const Metrics unknown_counts = measure(image, {}, {target, mask, {}}, nullptr);
   EXPECT_GT(*unknown_counts.psnr, *m.psnr + 0.4);
   EXPECT_GT(*unknown_counts.masked_ssim, *m.masked_ssim);
+}
+
+TEST(Measure, APictureOfWhichNothingIsKnownHasNoFigures) {
+  const Tensor<float> image = constant(40, 40, 0.4F);
+  const Tensor<uint8_t> known(Shape{40, 40});
+  const lpips::Network network = lpips::network_of(traceflow::testing::narrow_lpips_weights(1));
+  EXPECT_TRUE(measure(image, {}, {image, {}, {}}, &network).lpips);
+  const Metrics m = measure(image, {}, {image, {}, {}, &known}, &network);
+  EXPECT_FALSE(m.psnr || m.ssim || m.lpips || m.lpips_published);
 }
 
 TEST(Mean, IsOverTheViewsThatHaveTheFigure) {

@@ -62,11 +62,11 @@ TEST(Report, HasTheKeysThatScriptsReadAndNullWhereAFigureCannotBeHad) {
       R"("normal_mae_deg":null,"masked_normal_mae_deg":null})";
   EXPECT_EQ(
       compact,
-      R"({"capture":"kettle","split":"test","downscale":2,"device":"cpu","iterations":100,"train_seconds":1.5,)"
+      R"({"capture":"kettle","split":"test","views_as_trained":true,"downscale":2,"device":"cpu","iterations":100,"train_seconds":1.5,)"
       R"("render_fps":null,"surfels":{"main":7,"environment":0},"mean":{"psnr":21.5,)" +
           rest + R"(,"views":[{"id":"000","psnr":20.0,)" + rest + R"(,{"id":"001","psnr":23.0,)" + rest +
           "]}");
-  EXPECT_THAT(report_table(report), testing::HasSubstr("21.50"));
+  EXPECT_THAT(report_table(report), ::testing::HasSubstr("21.50"));
 }
 
 // A capture that has gained a view, or lost one, is normalised anew: the scene stays as it was trained.

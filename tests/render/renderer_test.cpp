@@ -253,6 +253,23 @@ TEST(Renderer, ColourIsTheBlendOfItsLayers) {
   }
 }
 
+// Of whoever wants no ray cut.
+TEST(Renderer, ARayMayGoOnForAsLongAsNumbersReach) {
+  Fixture f;
+  const Tensor<float> cut = Renderer(RenderOptions{}).forward(f.scene, f.request).colour;
+  RenderOptions options;
+  options.transmittance_min = 0;
+  options.validate();
+  const Tensor<float> whole = Renderer(options).forward(f.scene, f.request).colour;
+  float most = 0;
+  for (int64_t i = 0; i < cut.size(); ++i) most = std::max(most, std::abs(cut[i] - whole[i]));
+  EXPECT_LT(most, 5e-3F);
+  for (const float refused : {-1e-9F, 1.0F, std::nanf("")}) {
+    options.transmittance_min = refused;
+    EXPECT_THROW(options.validate(), InputError);
+  }
+}
+
 TEST(Renderer, AnEmptyViewIsBackground) {
   Fixture f;
   f.request.camera.position = {0, 0, 50};

@@ -235,7 +235,7 @@ TEST(Projector, DoesNotBeginAPictureForWhichThereIsNoMemory) {
   huge.layer = "smell";
   s.projector.answer(Job{1, StillJob{huge, Still{2, side, side}}}, s.stage());
   ASSERT_EQ(s.page.of("refused").size(), 1U);
-  EXPECT_THAT(s.page.of("refused").at(0).json["text"].get<std::string>(), ::testing::StartsWith("No memory"));
+  EXPECT_EQ(s.page.of("refused").at(0).json["text"], "No memory for a picture of this size.");
   EXPECT_FALSE(s.audience.anybody_lacks_memory());
 
   s.projector.answer(Job{1, FrameJob{huge, Coarseness{}}}, s.stage());

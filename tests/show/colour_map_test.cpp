@@ -144,6 +144,10 @@ TEST(Difference, IsTheMeanOfTheChannels) {
   EXPECT_EQ(pixel(picture, 1)[0], to_8bit(0.48F));
   EXPECT_EQ(Painter({.map = ColourMap::grey, .exposure = 1}).paint_difference(difference)(0, 1, 0),
             to_8bit(0.96F));
+  Tensor<uint8_t> known(Shape{1, 2});
+  EXPECT_EQ(difference_values(frame, photograph, known)[1], 0);
+  known[1] = 1;
+  EXPECT_EQ(difference_values(frame, photograph, known)[1], difference[1]);
   EXPECT_THROW(difference_values(frame, Tensor<float>(Shape{2, 1, 3})), InternalError);
 }
 

@@ -113,7 +113,7 @@ TEST(ContactSheet, HasNinePicturesARow) {
   Tensor<float> photograph(Shape{2, 2, 3});
   photograph.fill(0.6F);
   ContactSheet sheet(100);
-  sheet.add(photograph, frame);
+  sheet.add(photograph, frame, Tensor<uint8_t>(Shape{2, 2}));
   sheet.add(photograph, frame);
   sheet.write(file);
   const Tensor<uint8_t> picture = read_png(file);
@@ -127,6 +127,7 @@ TEST(ContactSheet, HasNinePicturesARow) {
   EXPECT_EQ(at(1), 128);
   EXPECT_NEAR(at(2), 77, 1);
   EXPECT_EQ(at(8), 255);
+  EXPECT_EQ(picture(16, 2 * column_width, 1), 0) << "of the first row's photograph nothing is known";
 }
 
 }  // namespace

@@ -96,5 +96,39 @@ TEST(Continuation, CapsAreKeptUntilWhatTheyComeFromIsChanged) {
   }
 }
 
+TEST(Continuation, ACaptureIsThatOfTheRunOrNot) {
+  const Capture capture = three_views();
+  const std::string views = views_in(checkpoint_of(capture));
+  EXPECT_TRUE(are_views_of(views, capture.normalisation, capture));
+  Capture other = three_views();
+  other.train[1].time = 0.4F;
+  EXPECT_FALSE(are_views_of(views, capture.normalisation, other));
+  EXPECT_TRUE(are_views_of(views_in(Safetensors()), capture.normalisation, other))
+      << "nothing is known of them";
+}
+
+// Bounds that came later do not change how a run that has none of them goes on.
+TEST(Continuation, OlderCheckpointsKeepTheBoundsThatTheyHad) {
+  Safetensors file;
+  file.metadata["options"] = R"({"iterations": 100})";
+  const TrainOptions options = options_in(file);
+  EXPECT_EQ(options.iterations, 100);
+  for (const DensityOptions& density : {options.density, options.environment_density}) {
+    EXPECT_EQ(density.prune_above_from, 0);
+    EXPECT_EQ(density.prune_above_cloud, 1000);
+  }
+  file.metadata["options"] = R"({"nonsense": 100})";
+  EXPECT_THAT(refusal_of([&] { options_in(file, "a/checkpoint"); }), HasSubstr("a/checkpoint: options"));
+}
+
+TEST(Continuation, AnotherVersionIsTold) {
+  Safetensors file;
+  EXPECT_EQ(other_version(file), "");
+  put_version(file);
+  EXPECT_EQ(other_version(file), "");
+  file.metadata["program_version"] = "0.0.9";
+  EXPECT_THAT(other_version(file), AllOf(HasSubstr("version 0.0.9"), HasSubstr("other bytes")));
+}
+
 }  // namespace
 }  // namespace traceflow

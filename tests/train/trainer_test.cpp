@@ -27,7 +27,7 @@ TEST(Trainer, LearnsTheCapture) {
   TrainOptions options = small_run(300);
   options.specular = Specular::none;
   Trainer trainer = make_trainer(options, "learns");
-  const double before = trainer.step().psnr;
+  const double before = trainer.step().psnr.value();
   const events::Finished end = trainer.run(never);
   EXPECT_EQ(end.ending, events::Ending::completed);
   EXPECT_GT(end.psnr, before + 1.5) << "from " << before;
@@ -263,9 +263,9 @@ TEST(Trainer, ResumingSaysWhatMakesTheEndAnother) {
     return text;
   };
   EXPECT_EQ(said(), "");
-  rewrite(run, {{"arithmetic", "the CPU with pencils"}});
+  rewrite(run, {{"arithmetic", "the CPU with pencils"}, {"program_version", "0.0.9"}});
   EXPECT_THAT(said(), AllOf(HasSubstr("the CPU with pencils and goes on on the CPU with "),
-                            HasSubstr("other bytes")));
+                            HasSubstr("other bytes"), HasSubstr("by version 0.0.9")));
   // More than any machine has.
   rewrite(run, {{"cap_main", "2000000000"}});
   EXPECT_THAT(said(), AllOf(HasSubstr(" MiB, as when it began"), HasSubstr("--memory-budget")));

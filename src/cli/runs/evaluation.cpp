@@ -89,6 +89,7 @@ Evaluation::Evaluation(const EvaluationArguments& a, const DeviceArguments& devi
   report_.split = a.split;
   report_.downscale = a.downscale > 0 ? a.downscale : run_.options.capture.downscale;
   report_.device = name_of(device_);
+  report_.views_as_trained = has_views_of(run_, capture_);
   report_.iterations = run_.iterations;
   report_.train_seconds = run_.train_seconds;
 }
@@ -98,7 +99,7 @@ void Evaluation::measure(const eval::ViewListener& listener) {
       run_.subject, capture_, *views_, network_ ? &*network_ : nullptr,
       [&](const View& view, const ViewImages& images, const Frame& frame) {
         if (pictures_.wants(static_cast<size_t>(&view - views_->data())))
-          pictures_.add(view.id, images.colour, frame);
+          pictures_.add(view.id, images.colour, frame, images.known);
         if (listener) listener(view, images, frame);
       },
       report_);

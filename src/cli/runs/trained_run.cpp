@@ -1,10 +1,11 @@
 #include "cli/runs/trained_run.h"
 
 #include <cmath>
+#include <iostream>
 
-#include "files/options_json.h"
 #include "scene/run_folder.h"
 #include "scene/scene_file.h"
+#include "train/continuation.h"
 #include "train/schedule.h"
 
 namespace traceflow::cli {
@@ -18,27 +19,40 @@ TrainedRun read_run(const std::filesystem::path& folder) {
   const std::string where = files.checkpoint().string();
   TrainedRun run;
   const Safetensors file = read_checkpoint(files, run.note);
-  options_from_json(file.text("options"), option_fields(run.options), where + ": options");
-  run.options.validate();
+  run.options = options_in(file, where);
+  // What training alone must keep to is no matter of what it has made.
+  run.options.render.validate();
   run.subject.scene = get_scene(file);
   run.subject.render = run.options.render;
   run.iterations = std::llround(file.number("iteration"));
   run.subject.request = picture_request(run.options, run.iterations);
   run.train_seconds = file.number("train_seconds");
+  run.views = views_in(file);
   run.capture = file.text("capture");
   run.capture_folder = file.text("capture_folder");
   return run;
 }
 
+bool has_views_of(const TrainedRun& run, const Capture& capture) {
+  return are_views_of(run.views, run.subject.scene.normalisation, capture);
+}
+
 Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale) {
   CaptureOptions options = run.options.capture;
   if (downscale > 0) options.downscale = downscale;
-  if (!folder.empty()) return load_capture(folder, options);
-  if (!std::filesystem::exists(run.capture_folder)) {
-    throw InputError(run.capture_folder.string(), "", "no such folder",
-                     "the capture that the run was trained on", "say where it is now with -d CAPTURE");
+  const std::filesystem::path& where = folder.empty() ? run.capture_folder : folder;
+  if (folder.empty() && !std::filesystem::exists(where)) {
+    throw InputError(where.string(), "", "no such folder", "the capture that the run was trained on",
+                     "say where it is now with -d CAPTURE");
   }
-  return load_capture(run.capture_folder, options);
+  Capture capture = load_capture(where, options);
+  if (!has_views_of(run, capture)) {
+    std::cerr << where.string()
+              << ": its training views are not those that the run was trained on: times may have moved, and "
+                 "views that were trained on may be test views now"
+              << std::endl;
+  }
+  return capture;
 }
 
 const std::vector<View>& views_of(const Capture& capture, const std::string& split) {

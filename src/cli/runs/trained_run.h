@@ -14,6 +14,7 @@ struct TrainedRun {
   TrainOptions options;
   std::string capture;                   // its name
   std::filesystem::path capture_folder;  // where it was when the run was trained
+  std::string views;                     // that it was trained on, as a checkpoint tells them
   int64_t iterations = 0;                // done
   double train_seconds = 0;
   std::string note;  // one line when the checkpoint is not the newest; else empty
@@ -26,8 +27,11 @@ std::string run_name(const std::filesystem::path& folder);
 TrainedRun read_run(const std::filesystem::path& folder);
 
 // The capture that the run was trained on, or the one in `folder` when that is not empty; downscale 0: the
-// run's.
+// run's. Says on the standard error where its views are not those that the run was trained on.
 Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale);
+
+// Whether a capture's training views are those that the run was trained on, as far as its checkpoint tells.
+bool has_views_of(const TrainedRun& run, const Capture& capture);
 
 // The views of a split by its name. Throws InputError when the capture has none.
 const std::vector<View>& views_of(const Capture& capture, const std::string& split);

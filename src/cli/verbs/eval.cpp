@@ -34,7 +34,7 @@ void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
     files.write(view.id, frame);
     const auto i = static_cast<size_t>(&view - views.data());
     if (!a.sheet.empty() && eval::among_spread(i, views.size(), static_cast<size_t>(a.sheet_views))) {
-      sheet.add(images.colour, frame);
+      sheet.add(images.colour, frame, images.known);
     }
   });
   if (!a.sheet.empty()) sheet.write(a.sheet);

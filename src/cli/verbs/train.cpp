@@ -65,8 +65,9 @@ TrainOptions settings(const TrainArguments& arguments, const OptionArguments& gi
 Checkpoint checkpoint_to_resume(const TrainArguments& arguments) {
   if (!arguments.resume) return {};
   std::string note;
-  const Safetensors file = read_checkpoint(RunFolder{arguments.output}, note);
-  return {options_in(file), file.text("capture_folder")};
+  const RunFolder run{arguments.output};
+  const Safetensors file = read_checkpoint(run, note);
+  return {options_in(file, run.checkpoint().string()), file.text("capture_folder")};
 }
 
 void refuse_another_run(const TrainArguments& arguments) {

@@ -17,9 +17,8 @@ void Options::validate() const {
                "a length above near_plane");
   check_option(alpha_min >= 1e-6F && alpha_min < 1, "alpha_min", alpha_min, "1e-6 or more, and under 1");
   check_option(alpha_max > alpha_min && alpha_max < 1, "alpha_max", alpha_max, "between alpha_min and 1");
-  // The way back divides by what is left: it must not be zero.
-  check_option(transmittance_min >= 1e-30F && transmittance_min < 1, "transmittance_min", transmittance_min,
-               "1e-30 or more, and under 1");
+  check_option(transmittance_min >= least_transmittance && transmittance_min < 1, "transmittance_min",
+               transmittance_min, number_text(least_transmittance) + " or more, and under 1");
   for (int c = 0; c < 3; ++c) {
     check_option(std::isfinite(background[c]), "background", background[c], "finite numbers");
   }

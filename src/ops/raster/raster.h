@@ -18,6 +18,9 @@ namespace traceflow::raster {
 enum class SortOrder { centre, hit };
 constexpr std::array<std::string_view, 2> enum_names(SortOrder) { return {"centre", "hit"}; }
 
+// The least that a ray may be cut at: the way back divides by what is left.
+inline constexpr float least_transmittance = 1e-30F;
+
 struct Options {
   SortOrder sort = SortOrder::centre;
   // Camera z under which a hit (and, for sort = centre, a whole surfel by its centre) is dropped; scene

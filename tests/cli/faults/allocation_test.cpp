@@ -4,6 +4,7 @@
 #include <functional>
 #include <iostream>
 #include <set>
+#include <utility>
 
 #include "base/random.h"
 #include "cli/faults/small_training.h"
@@ -36,6 +37,19 @@ class Allocation : public Faults {
     EXPECT_EQ(counted.code, 0) << counted.error;
     return allocations_said(counted.error);
   }
+  // After which iterations density control was done, and in which set: where it finds no room it is left out.
+  static std::set<std::pair<int, std::string>> controlled(const std::string& name) {
+    std::set<std::pair<int, std::string>> result;
+    for (const nlohmann::json& event : logged(name)) {
+      if (event["event"] == "density_changed")
+        result.emplace(event["iteration"].get<int>(), event["set"].get<std::string>());
+    }
+    return result;
+  }
+  static void expect_nothing_half_written(const std::string& name) {
+    if (!fs::exists(path(name))) return;
+    for (const std::string& file : files_in(name)) EXPECT_FALSE(file.ends_with(".partial")) << file;
+  }
 
   Random random_{7};
 };
@@ -43,7 +57,7 @@ class Allocation : public Faults {
 TEST_F(Allocation, ATrainingEndsInOneLineAndAStateThatGoesOn) {
   const int64_t all = allocations_of(training("counted"));
   ASSERT_GT(all, 10'000);
-  int ended = 0, saved = 0;
+  int ended = 0, saved = 0, whole = 0;
   for (const bool from_there : {false, true}) {
     for (const int64_t n : moments(all)) {
       SCOPED_TRACE((from_there ? "from allocation " : "allocation ") + std::to_string(n));
@@ -56,18 +70,26 @@ TEST_F(Allocation, ATrainingEndsInOneLineAndAStateThatGoesOn) {
         continue;
       }
       ++ended;
+      expect_nothing_half_written("starved");
       expect_one_line(end, 4);
       EXPECT_THAT(end.error, HasSubstr("out of memory"));
       if (!run_in("starved").holds_a_run()) continue;
       ++saved;
       const Outcome resumed = run(resuming("starved"));
       EXPECT_EQ(resumed.code, 0) << resumed.error;
+      expect_completed("starved");
+      if (controlled("starved") == controlled("whole")) {
+        expect_whole("starved");
+        ++whole;
+      }
       if (HasFailure()) return;
     }
   }
   EXPECT_GT(saved, 0);
+  EXPECT_GT(2 * whole, saved) << "few of an iteration's requests are density control's";
   std::cout << ended << " of " << 2 * trials_wanted() << " trainings ended, " << saved
-            << " in a saved state; " << all << " allocations in all\n";
+            << " in a saved state, of which " << whole << " came to the same bytes; " << all
+            << " allocations in all\n";
 }
 
 TEST_F(Allocation, VerbsThatReadARunEndInOneLine) {

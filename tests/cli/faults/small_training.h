@@ -116,7 +116,7 @@ class Faults : public testing::Test {
   // Of a run that nothing went wrong with.
   static std::string whole_state() { return state_of(path("whole")); }
 
-  // That a training ended in one line and nothing half written beside the run's own files.
+  // That a program ended in one line.
   static void expect_one_line(const Outcome& outcome, int code) {
     EXPECT_EQ(outcome.code, code) << outcome.error;
     EXPECT_EQ(lines(outcome.error), 1) << outcome.error;
@@ -124,8 +124,31 @@ class Faults : public testing::Test {
     EXPECT_EQ(outcome.output, "");
   }
   static std::vector<std::string> files_in(const std::string& name) { return names_in(path(name)); }
+  // That a run, whatever it went through, came to its end and left nothing beside its own files.
+  static void expect_completed(const std::string& name) {
+    EXPECT_EQ(logged(name).back()["ending"], "completed");
+    EXPECT_EQ(files_in(name), (std::vector<std::string>{"checkpoint.previous.safetensors",
+                                                        "checkpoint.safetensors", "log.jsonl"}));
+  }
+  // That it did so in the bytes of the run that nothing went wrong with.
+  static void expect_whole(const std::string& name) {
+    expect_completed(name);
+    EXPECT_TRUE(state_of(path(name)) == whole_state());
+    if (!fs::exists(path("whole_ply"))) export_run("whole", "whole_ply");
+    export_run(name, "ply");
+    for (const char* set : {"main.ply", "environment.ply"}) {
+      const std::string bytes = bytes_of(*shared_folder / "ply" / set);
+      EXPECT_FALSE(bytes.empty());
+      EXPECT_TRUE(bytes == bytes_of(*shared_folder / "whole_ply" / set)) << set;
+    }
+  }
 
  private:
+  static void export_run(const std::string& name, const std::string& to) {
+    const Outcome end = run({"export", path(name), "-o", path(to)});
+    EXPECT_EQ(end.code, 0) << end.error;
+  }
+
   static inline const TempFolder* shared_folder = nullptr;
 };
 

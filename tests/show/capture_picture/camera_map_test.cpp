@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "show/capture_picture/inks.h"
+
 namespace traceflow::show {
 namespace {
 
@@ -20,8 +22,7 @@ View view(const std::string& id, float time, const Vec3<float>& from) {
 bool has(const Tensor<uint8_t>& picture, const Ink& ink, int64_t left, int64_t right) {
   for (int64_t y = 40; y < picture.dim(0) - 30; ++y) {
     for (int64_t x = left; x < right; ++x) {
-      const uint8_t* p = &picture(y, x, 0);
-      if (p[0] == ink.red && p[1] == ink.green && p[2] == ink.blue) return true;
+      if (is(picture, y, x, ink)) return true;
     }
   }
   return false;
@@ -59,6 +60,30 @@ TEST(CameraMap, holds_cameras_that_are_marked_for_something_else) {
   EXPECT_TRUE(has(map, time_ink(1), 130, 170)) << "in the middle between a and c";
   EXPECT_TRUE(has(map, alarm_ink, 260, 300));
   EXPECT_FALSE(has(map, alarm_ink, 0, 260));
+}
+
+TEST(CameraMap, shows_points_at_their_places_and_brighter_where_there_are_more) {
+  Capture capture;
+  capture.train = {view("a", 0, {-1, 0, 0}), view("b", 1, {1, 0, 0})};
+  for (View& v : capture.train) {
+    v.camera.focal_x = v.camera.focal_y = 1;
+    v.camera.centre_x = 20;
+    v.camera.centre_y = 15;
+  }
+  // The last one, which lies behind the cameras, does not shrink the map.
+  const std::vector<Vec3<float>> points{
+      {0.25F, 0.75F, 0}, {-0.25F, 0.25F, 0.1F}, {-0.25F, 0.25F, -0.1F}, {0.25F, 1, 0}, {0, -40, 0}};
+  capture.points = Tensor<float>({5, 3});
+  for (int64_t i = 0; i < 5; ++i) store3(capture.points.row(i), points[static_cast<size_t>(i)]);
+  const Tensor<uint8_t> map = camera_map(capture, {}, {{1, 0, 0}, {0, 1, 0}}, "", {300, 200});
+  // What it holds is 2 wide, on 252 pixels between the margins, and its middle is (0, 0.5).
+  const Ink one{110, 110, 110}, two{140, 140, 140};
+  EXPECT_TRUE(is(map, 68, 181, one)) << "(0.25, 0.75) is at 150 + 31.5 and 100 - 31.5";
+  EXPECT_TRUE(is(map, 131, 118, two)) << "(-0.25, 0.25) is at 150 - 31.5 and 100 + 31.5";
+  for (const int64_t step : {-1, 1}) {
+    EXPECT_TRUE(is(map, 68 + step, 181, paper));
+    EXPECT_TRUE(is(map, 68, 181 + step, paper));
+  }
 }
 
 TEST(CameraMap, of_one_camera_and_of_none_that_does_not_stand_apart) {

@@ -3,16 +3,12 @@
 #include <gtest/gtest.h>
 
 #include "capture/fake_capture.h"
+#include "show/capture_picture/inks.h"
 
 namespace traceflow::show {
 namespace {
 
 constexpr Ink blue{1, 2, 250};  // of no other picture and no mark
-
-bool is(const Tensor<uint8_t>& picture, int64_t y, int64_t x, const Ink& ink) {
-  const uint8_t* p = &picture(y, x, 0);
-  return p[0] == ink.red && p[1] == ink.green && p[2] == ink.blue;
-}
 
 std::vector<Pixel> all_of(const Tensor<uint8_t>& picture, const Ink& ink) {
   std::vector<Pixel> found;
