@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -148,11 +149,13 @@ TEST_F(See, ARunOfOlderOptionsIsShown) {
   file.write(checkpoint);
   const Outcome made = run_with({"report", path("older")});
   ASSERT_EQ(made.code, exit_done) << made.err;
-  for (const Json& setting : data_of(folder() / "older/report.html")["settings"]) {
-    if (setting["path"] == "density.prune_above_from") {
-      EXPECT_EQ(setting["value"], "0");
-    }
-  }
+  const Json report = data_of(folder() / "older/report.html");
+  const Json& settings = report["settings"];
+  const auto pruned_from = std::find_if(settings.begin(), settings.end(), [](const Json& setting) {
+    return setting["path"] == "density.prune_above_from";
+  });
+  ASSERT_NE(pruned_from, settings.end());
+  EXPECT_EQ((*pruned_from)["value"], "0");
 }
 
 // Times are shares of the views that there are, and a split deals them out.
