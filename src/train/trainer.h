@@ -95,6 +95,8 @@ class Trainer {
   End iterate(const std::atomic<bool>& stop);
   // One of them, with what is told of it; what is wrong with its numbers, or nothing.
   std::string tell_iteration();
+  // What to try where the fields made the scene fly apart.
+  std::string against_collapse() const;
   // Throw NotSaved where save() fails, the second only where no checkpoint stands.
   void save_or_say_why_not();
   void save_on_the_way();

@@ -166,6 +166,39 @@ TEST(TrainingFaults, ACollapseDoesNotPushTheLastSoundStateOut) {
   EXPECT_EQ(Safetensors::read(run.previous_checkpoint()).number("iteration"), 6);
 }
 
+TEST(TrainingFaults, ACollapseWhileThingsMoveNamesSlowerFields) {
+  TrainOptions options = small_run(20);
+  options.collapse_decibels = 10;
+  options.rates.field = 0.001F;
+  options.rates.field_end = 0.0004F;
+  for (const bool moves : {true, false}) {
+    options.deform.main = moves;
+    const RunFolder run{new_run("apart")};
+    {
+      Trainer first(options, load_capture(capture_folder(), options.capture), run.folder);
+      std::atomic<bool> stop{false};
+      after(first, 16, [&] { stop = true; });
+      first.run(stop);
+    }
+    Safetensors file = Safetensors::read(run.checkpoint());
+    Tensor<double> health(Shape{3});
+    health[0] = 31;
+    health[1] = 60;
+    health[2] = 400;
+    file.add("health", health);
+    file.write(run.checkpoint());
+    Trainer trainer(options, load_capture(capture_folder(), options.capture), run.folder);
+    trainer.resume();
+    const events::Finished end = trainer.run(never);
+    EXPECT_EQ(end.ending, events::Ending::diverged);
+    EXPECT_EQ(end.iteration, 17);
+    EXPECT_THAT(end.reason, HasSubstr("the mean PSNR fell from 60"));
+    EXPECT_EQ(end.reason.find("--set rates.field=0.00025 --set rates.field_end=0.0001") != std::string::npos,
+              moves)
+        << end.reason;
+  }
+}
+
 // Checkpoints of version 1 had no checksums and are else the same.
 TEST(TrainingFaults, ACheckpointOfAnEarlierVersionIsResumed) {
   const TrainOptions options = small_run(12);
