@@ -136,6 +136,17 @@ TEST(TrainingFaults, ACaptureThatVanishesEndsInTheStateBeforeThatIteration) {
   fs::remove_all(fleeting);
 }
 
+// Lets a run's checkpoint say that its mean PSNR, of many views by now, was so and had been so at best.
+void pretend_psnr(const RunFolder& run, double smoothed, double best) {
+  Safetensors file = Safetensors::read(run.checkpoint());
+  Tensor<double> health(Shape{3});
+  health[0] = smoothed;
+  health[1] = best;
+  health[2] = 400;
+  file.add("health", health);
+  file.write(run.checkpoint());
+}
+
 // However often somebody saves a run whose PSNR falls, the state from before stays.
 TEST(TrainingFaults, ACollapseDoesNotPushTheLastSoundStateOut) {
   TrainOptions options = small_run(20);
@@ -153,13 +164,7 @@ TEST(TrainingFaults, ACollapseDoesNotPushTheLastSoundStateOut) {
   };
   stopped_at(6);
   // A mean PSNR far above what this run has: sound for the moment.
-  Safetensors file = Safetensors::read(run.checkpoint());
-  Tensor<double> health(Shape{3});
-  health[0] = 35.01;
-  health[1] = 40;
-  health[2] = 400;
-  file.add("health", health);
-  file.write(run.checkpoint());
+  pretend_psnr(run, 35.01, 40);
   stopped_at(9);
   EXPECT_EQ(Safetensors::read(run.previous_checkpoint()).number("iteration"), 6);
   stopped_at(12);
@@ -180,13 +185,7 @@ TEST(TrainingFaults, ACollapseWhileThingsMoveNamesSlowerFields) {
       after(first, 16, [&] { stop = true; });
       first.run(stop);
     }
-    Safetensors file = Safetensors::read(run.checkpoint());
-    Tensor<double> health(Shape{3});
-    health[0] = 31;
-    health[1] = 60;
-    health[2] = 400;
-    file.add("health", health);
-    file.write(run.checkpoint());
+    pretend_psnr(run, 31, 60);
     Trainer trainer(options, load_capture(capture_folder(), options.capture), run.folder);
     trainer.resume();
     const events::Finished end = trainer.run(never);
