@@ -24,7 +24,8 @@ namespace {
 // A surfel is bound to 8 of its 32 nearest: enough to hold a shape, far enough to hold it beyond a wrinkle.
 constexpr int bonds_each = 8;
 constexpr int bond_stride = 4;
-// Of their rates, where they collapsed: what kept the film that docs/results.md tells of.
+// Of their rates, after a collapse: held a film of 8,000 iterations that fell apart at the preset's
+// (docs/results.md).
 constexpr float slower_fields = 0.25F;
 
 constexpr const char* when_there_is_room =
