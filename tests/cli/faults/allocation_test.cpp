@@ -18,7 +18,7 @@ namespace {
 
 using testing::HasSubstr;
 
-int trials_wanted() { return number_from_environment("TRACEFLOW_REFUSALS", 12); }
+int trials_wanted() { return number_from_environment("TRACEFLOW_REFUSALS", 4); }
 
 class Allocation : public Faults {
  protected:

@@ -19,7 +19,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
-int kills_wanted() { return number_from_environment("TRACEFLOW_KILLS", 6); }
+int kills_wanted() { return number_from_environment("TRACEFLOW_KILLS", 4); }
 
 bool is_half_written(const RunFolder& run) {
   return fs::exists(run.folder / "checkpoint.new.safetensors.partial") ||
