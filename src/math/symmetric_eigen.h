@@ -6,25 +6,26 @@
 
 namespace traceflow {
 
-// Eigenvectors (columns) and eigenvalues of a symmetric 3×3 matrix by Jacobi rotations, in ascending order of
-// eigenvalue.
-template <class T>
+// Eigenvectors (columns) and eigenvalues of a symmetric size×size matrix (size up to 4) by Jacobi rotations,
+// in ascending order of eigenvalue.
+template <int size, class T>
 struct SymmetricEigen {
-  Vec3<T> values;
-  Mat3<T> vectors;
+  glm::vec<size, T, glm::defaultp> values;
+  glm::mat<size, size, T, glm::defaultp> vectors;
 };
 
-template <class T>
-TRACEFLOW_HD SymmetricEigen<T> symmetric_eigen(Mat3<T> a) {
-  Mat3<T> v(T(1));
+template <int size, class T>
+TRACEFLOW_HD SymmetricEigen<size, T> symmetric_eigen(glm::mat<size, size, T, glm::defaultp> a) {
+  using Matrix = glm::mat<size, size, T, glm::defaultp>;
+  Matrix v(T(1));
   for (int sweep = 0; sweep < 12; ++sweep) {
-    for (int p = 0; p < 2; ++p) {
-      for (int q = p + 1; q < 3; ++q) {
+    for (int p = 0; p < size - 1; ++p) {
+      for (int q = p + 1; q < size; ++q) {
         if (a[q][p] == T(0)) continue;
         const T theta = (a[q][q] - a[p][p]) / (T(2) * a[q][p]);
         const T t = (theta >= T(0) ? T(1) : T(-1)) / (std::abs(theta) + std::sqrt(theta * theta + T(1)));
         const T c = T(1) / std::sqrt(t * t + T(1));
-        Mat3<T> j(T(1));
+        Matrix j(T(1));
         j[p][p] = c;
         j[q][q] = c;
         j[q][p] = t * c;
@@ -34,19 +35,20 @@ TRACEFLOW_HD SymmetricEigen<T> symmetric_eigen(Mat3<T> a) {
       }
     }
   }
-  SymmetricEigen<T> result{{a[0][0], a[1][1], a[2][2]}, v};
-  const auto order = [&](int i, int k) {
-    if (result.values[i] <= result.values[k]) return;
-    const T value = result.values[i];
-    result.values[i] = result.values[k];
-    result.values[k] = value;
-    const Vec3<T> column = result.vectors[i];
-    result.vectors[i] = result.vectors[k];
-    result.vectors[k] = column;
-  };
-  order(0, 1);
-  order(1, 2);
-  order(0, 1);
+  SymmetricEigen<size, T> result;
+  result.vectors = v;
+  for (int i = 0; i < size; ++i) result.values[i] = a[i][i];
+  for (int last = size - 1; last > 0; --last) {
+    for (int i = 0; i < last; ++i) {
+      if (result.values[i] <= result.values[i + 1]) continue;
+      const T value = result.values[i];
+      result.values[i] = result.values[i + 1];
+      result.values[i + 1] = value;
+      const auto column = result.vectors[i];
+      result.vectors[i] = result.vectors[i + 1];
+      result.vectors[i + 1] = column;
+    }
+  }
   return result;
 }
 
