@@ -1,5 +1,6 @@
 #include "scene/neighbours.h"
 
+#include <algorithm>
 #include <nanoflann.hpp>
 
 #include "base/parallel.h"
@@ -86,6 +87,27 @@ Tensor<int32_t> nearest_of(const Tensor<float>& points, const Tensor<float>& que
     nearest[i] = static_cast<int32_t>(index);
   });
   return nearest;
+}
+
+Neighbours nearest_of(const Tensor<float>& points, const Tensor<float>& queries, int k) {
+  const int64_t count = queries.empty() ? 0 : queries.dim(0);
+  Neighbours result{Tensor<int32_t>({count, k}), Tensor<float>({count, k})};
+  std::fill_n(result.index.data(), result.index.size(), -1);
+  if (count == 0 || points.empty()) return result;
+  const Cloud cloud{points};
+  const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  parallel_for("scene: nearest of", count, [&](int64_t i) {
+    std::vector<size_t> index(static_cast<size_t>(k));
+    std::vector<float> distance2(static_cast<size_t>(k));
+    nanoflann::KNNResultSet<float> found(static_cast<size_t>(k));
+    found.init(index.data(), distance2.data());
+    tree.findNeighbors(found, queries.row(i), SearchParameters());
+    for (size_t j = 0; j < found.size(); ++j) {
+      result.index(i, static_cast<int64_t>(j)) = static_cast<int32_t>(index[j]);
+      result.distance2(i, static_cast<int64_t>(j)) = distance2[j];
+    }
+  });
+  return result;
 }
 
 }  // namespace traceflow

@@ -18,5 +18,8 @@ Neighbours nearest_neighbours(const Tensor<float>& points, int k);
 Neighbours spread_neighbours(const Tensor<float>& points, int k, int stride);
 // For each of M queries (M×3) the nearest of N ≥ 1 points.
 Tensor<int32_t> nearest_of(const Tensor<float>& points, const Tensor<float>& queries);
+// For each of M queries (M×3) the k nearest of N points, nearest first. Of fewer than k points the places
+// that are left have index -1 and distance 0.
+Neighbours nearest_of(const Tensor<float>& points, const Tensor<float>& queries, int k);
 
 }  // namespace traceflow
