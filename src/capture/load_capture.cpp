@@ -396,6 +396,8 @@ class Assembly {
       const ViewSource& source = sources_.at(view.id);
       capture_.has_truth |= source.truth_normal || source.truth_depth;
     }
+    shared_.motion_points = first_file({"truth/motion/points.npy"});
+    shared_.motion_objects = first_file({"truth/motion/object.npy"});
   }
 
   void choose_axes() {

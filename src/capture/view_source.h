@@ -30,9 +30,10 @@ struct ViewSource {
 
 // What all views of a capture share.
 struct CaptureSource {
-  std::optional<NpyFile> prior_array;   // T×H×W×3
-  Vec3<double> prior_signs{1, -1, -1};  // the priors' axes against OpenCV's
-  double scale = 1;                     // scene units per capture unit
+  std::optional<NpyFile> prior_array;      // T×H×W×3
+  Vec3<double> prior_signs{1, -1, -1};     // the priors' axes against OpenCV's
+  double scale = 1;                        // scene units per capture unit
+  TreeFile motion_points, motion_objects;  // truth of what moves
 };
 
 }  // namespace traceflow
