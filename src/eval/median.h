@@ -1,0 +1,22 @@
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include "base/error.h"
+
+namespace traceflow::eval {
+
+// Of numbers that are all numbers, one at least; their order is lost. Of an even count the middle between the
+// two in the middle.
+template <class T>
+double median(std::span<T> values) {
+  require(!values.empty(), "a median is of something");
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  const auto upper = static_cast<double>(*middle);
+  if (values.size() % 2 == 1) return upper;
+  return (static_cast<double>(*std::max_element(values.begin(), middle)) + upper) / 2;
+}
+
+}  // namespace traceflow::eval
