@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "eval/mask_core.h"
+#include "eval/median.h"
 #include "eval/metrics_kernels.h"
 #include "ops/loss/loss.h"
 #include "primitives/sums.h"
@@ -76,6 +78,30 @@ const Tensor<uint8_t>& both(const Tensor<uint8_t>& mask, const Tensor<uint8_t>& 
   return room;
 }
 
+// What else a mask says, where it is.
+struct Masks {
+  Tensor<uint8_t> core, outside;
+};
+
+Masks masks_of(const Tensor<uint8_t>& mask) {
+  Masks masks;
+  masks.core = core_of(mask.on(Device::cpu)).on(mask.device());
+  masks.outside.place(mask.device()).resize(mask.shape());
+  parallel_for(mask.device(), "metrics: outside the mask", mask.size(),
+               OtherMask{mask.data(), masks.outside.data()});
+  return masks;
+}
+
+// Of the errors that count, on the host. Of an even number the middle between the two in the middle.
+std::optional<double> median_error(const Tensor<float>& errors, const Tensor<uint8_t>& mask) {
+  std::vector<float> counted;
+  for (int64_t i = 0; i < errors.size(); ++i) {
+    if (mask[i] != 0 && errors[i] >= 0) counted.push_back(errors[i]);
+  }
+  if (counted.empty()) return std::nullopt;
+  return median(std::span<float>(counted));
+}
+
 }  // namespace
 
 std::optional<double> psnr(const Tensor<float>& image, const Tensor<float>& target,
@@ -94,15 +120,28 @@ std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<f
                         NormalError{normal.data(), truth.data(), address(mask)}));
 }
 
-Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const Truth& truth,
-                const lpips::Network* network) {
-  const Device device = colour.device();
+Tensor<float> depth_errors(const Tensor<float>& depth, const Tensor<float>& alpha, const Tensor<float>& truth,
+                           double z_per_truth) {
+  require(depth.shape() == truth.shape(), "depths and truth have one shape",
+          depth.shape().to_string() + " and " + truth.shape().to_string());
+  require(alpha.empty() || alpha.shape() == depth.shape(), "depth and alpha have one shape");
+  require_beside(depth, truth);
+  require_beside(depth, alpha);
+  Tensor<float> errors;
+  errors.place(depth.device()).resize(depth.shape());
+  parallel_for(depth.device(), "metrics: depths", depth.size(),
+               DepthErrors{depth.data(), alpha.empty() ? nullptr : alpha.data(), truth.data(), z_per_truth,
+                           errors.data()});
+  return errors;
+}
+
+Metrics measure(const Rendered& rendered, const Truth& truth, const lpips::Network* network) {
+  const Device device = rendered.colour.device();
   const Tensor<uint8_t> all;
-  Tensor<float> colour_room, normal_room, true_normal_room;
-  Tensor<uint8_t> mask_room, known_room, both_room;
-  const Tensor<float> image = rounded(colour);
+  Tensor<float> colour_room, true_normal_room, true_depth_room;
+  Tensor<uint8_t> mask_room, known_room, both_room, core_room;
+  const Tensor<float> image = rounded(rendered.colour);
   const Tensor<float> target = rounded(brought(truth.colour, device, colour_room));
-  const Tensor<float>& normals = brought(normal, device, normal_room);
   const Tensor<float>& true_normals = brought(truth.normal, device, true_normal_room);
   const bool is_all_known = truth.known == nullptr || truth.known->empty();
   const Tensor<uint8_t>& known = brought(is_all_known ? all : *truth.known, device, known_room);
@@ -115,14 +154,32 @@ Metrics measure(const Tensor<float>& colour, const Tensor<float>& normal, const 
     m.lpips = lpips::distance(*network, image, target, lpips::Input::defined);
     m.lpips_published = lpips::distance(*network, image, target, lpips::Input::published);
   }
-  m.normal_mae_deg = normal_mae_deg(normals, true_normals, {});
+  m.normal_mae_deg = normal_mae_deg(rendered.normal, true_normals, {});
+  if (mask.empty()) return m;
+
   const Tensor<uint8_t>& masked_known = both(mask, known, both_room);
-  const CountedSum masked = mask.empty() ? CountedSum{} : squared_error(image, target, masked_known);
+  const CountedSum masked = squared_error(image, target, masked_known);
+  const Masks masks = masks_of(mask);
   if (masked.count > 0) {
     m.masked_psnr = psnr_of(masked);
     m.masked_ssim = loss::ssim(image, target, masked_known);
-    m.masked_normal_mae_deg = normal_mae_deg(normals, true_normals, mask);
+    m.masked_normal_mae_deg = normal_mae_deg(rendered.normal, true_normals, mask);
+    m.core_psnr = psnr_of(squared_error(image, target, both(masks.core, known, core_room)));
   }
+  if (truth.depth == nullptr || truth.depth->empty() || rendered.depth.empty()) return m;
+
+  const Tensor<float> errors = depth_errors(
+      rendered.depth, rendered.alpha, brought(*truth.depth, device, true_depth_room), truth.z_per_truth);
+  const Tensor<float> errors_on_host = errors.on(Device::cpu);
+  const auto put = [&](const Tensor<uint8_t>& where, std::optional<double>& mean,
+                       std::optional<double>& median) {
+    mean = mean_of(
+        sum_of(device, "metrics: depth error", errors.size(), MeanError{errors.data(), where.data()}));
+    median = median_error(errors_on_host, where.on(Device::cpu));
+  };
+  put(mask, m.masked_depth_error_mean, m.masked_depth_error_median);
+  put(masks.core, m.core_depth_error_mean, m.core_depth_error_median);
+  put(masks.outside, m.outside_depth_error_mean, m.outside_depth_error_median);
   return m;
 }
 

@@ -12,6 +12,8 @@
 namespace traceflow::eval {
 
 inline constexpr int64_t pixels_per_sum = 4096;
+inline constexpr float least_alpha = 0.5F;  // of a depth
+inline constexpr float no_error = -1;
 
 struct KeepSum {
   CountedSum* kept;
@@ -28,6 +30,13 @@ struct BothMasks {
   uint8_t* both;
 
   TRACEFLOW_HD void operator()(int64_t i) const { both[i] = a[i] != 0 && b[i] != 0 ? 1 : 0; }
+};
+
+struct OtherMask {
+  const uint8_t* mask;
+  uint8_t* other;
+
+  TRACEFLOW_HD void operator()(int64_t i) const { other[i] = mask[i] != 0 ? 0 : 1; }
 };
 
 struct RoundTo8Bit {
@@ -65,6 +74,33 @@ struct NormalError {
     const auto expected = load3<double>(truth + 3 * pixel);
     if (!counts(mask, pixel) || !(dot(expected, expected) > 0)) return {};
     return {angle_deg(load3<double>(normal + 3 * pixel), expected), 1};
+  }
+};
+
+// alpha null: everywhere 1.
+struct DepthErrors {
+  const float *depth, *alpha, *truth;
+  double z_per_truth;
+  float* errors;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const double expected = static_cast<double>(truth[i]) * z_per_truth;
+    const bool is_rendered =
+        depth[i] > 0 && std::isfinite(depth[i]) && (alpha == nullptr || alpha[i] >= least_alpha);
+    errors[i] = !(expected > 0 && std::isfinite(expected)) ? no_error
+                : is_rendered ? static_cast<float>(std::abs(static_cast<double>(depth[i]) / expected - 1))
+                              : 1.0F;
+  }
+};
+
+// Errors are not negative; others are none.
+struct MeanError {
+  const float* errors;
+  const uint8_t* mask;
+
+  TRACEFLOW_HD CountedSum operator()(int64_t pixel) const {
+    if (!counts(mask, pixel) || !(errors[pixel] >= 0)) return {};
+    return {static_cast<double>(errors[pixel]), 1};
   }
 };
 

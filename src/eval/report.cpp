@@ -1,37 +1,14 @@
 #include "eval/report.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <chrono>
-#include <nlohmann/json.hpp>
 
+#include "capture/motion_truth.h"
 #include "capture/pixels.h"
+#include "eval/carriers.h"
+#include "eval/figures_json.h"
 #include "scene/viewpoint.h"
 
 namespace traceflow::eval {
-
-namespace {
-
-using Json = nlohmann::ordered_json;
-
-void put_metrics(const Metrics& metrics, Json& json) {
-  Metrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
-    json[name] = value ? Json(*value) : Json(nullptr);
-  });
-}
-
-// One line of the table; a figure that cannot be had is a dash.
-std::string table_line(const std::string& label, size_t width, const Metrics& m) {
-  const auto cell = [](const std::optional<double>& value, int decimals) {
-    return value ? fmt::format("{:>10.{}f}", *value, decimals) : fmt::format("{:>10}", "-");
-  };
-  return fmt::format("{:<{}}", label, width) + cell(m.psnr, 2) + cell(m.ssim, 4) + cell(m.lpips, 4) +
-         cell(m.lpips_published, 4) + cell(m.masked_psnr, 2) + cell(m.masked_ssim, 4) +
-         cell(m.normal_mae_deg, 2) + cell(m.masked_normal_mae_deg, 2) + "\n";
-}
-
-}  // namespace
 
 Metrics mean_of(const Report& report) {
   std::vector<Metrics> all;
@@ -44,6 +21,9 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
   using Clock = std::chrono::steady_clock;
   report.main_surfels = subject.scene.main.count();
   report.environment_surfels = subject.scene.environment.count();
+  const std::optional<MotionTruth> motion = load_motion_truth(capture);
+  // True depths are in the capture's scene units, which may be others than the run's.
+  const double z_per_truth = subject.scene.normalisation.scale / capture.normalisation.scale;
   Renderer renderer(subject.render);
   double seconds = 0;
   for (const View& view : views) {
@@ -63,17 +43,21 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
     ViewImages filled = is_all_known ? ViewImages{} : *images;
     if (!is_all_known) take_unknown(frame.colour.on(Device::cpu), filled);
     const ViewImages& compared = is_all_known ? *images : filled;
-    report.views.push_back({view.id,
-                            measure(frame.colour, frame.raster.normal,
-                                    {compared.colour, compared.mask, truth.normal, &compared.known}, network),
-                            view.time});
+    const raster::Output& drawn = frame.raster;
+    report.views.push_back(
+        {view.id,
+         measure({frame.colour, drawn.normal, drawn.depth, drawn.alpha},
+                 {compared.colour, compared.mask, truth.normal, &compared.known, &truth.depth, z_per_truth},
+                 network),
+         view.time});
     if (listener) listener(view, *images, frame);
   }
   if (seconds > 0) report.render_fps = static_cast<double>(views.size()) / seconds;
+  if (motion) report.motion = motion_error(*motion, carriers_of(subject));
 }
 
 std::string report_json(const Report& report) {
-  Json json;
+  nlohmann::ordered_json json;
   json["capture"] = report.capture;
   json["split"] = report.split;
   json["views_as_trained"] = report.views_as_trained;
@@ -81,27 +65,17 @@ std::string report_json(const Report& report) {
   json["device"] = report.device;
   json["iterations"] = report.iterations;
   json["train_seconds"] = report.train_seconds;
-  json["render_fps"] = report.render_fps ? Json(*report.render_fps) : Json(nullptr);
+  json["render_fps"] = figure_json(report.render_fps);
   json["surfels"] = {{"main", report.main_surfels}, {"environment", report.environment_surfels}};
-  put_metrics(mean_of(report), json["mean"]);
-  json["views"] = Json::array();
+  put_figures(mean_of(report), json["mean"]);
+  json["motion"] = motion_json(report.motion);
+  json["views"] = nlohmann::ordered_json::array();
   for (const ViewReport& view : report.views) {
-    Json entry;
-    entry["id"] = view.id;
-    put_metrics(view.metrics, entry);
+    nlohmann::ordered_json entry = {{"id", view.id}, {"time", view.time}};
+    put_figures(view.metrics, entry);
     json["views"].push_back(std::move(entry));
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-std::string report_table(const Report& report) {
-  size_t width = 6;
-  for (const ViewReport& view : report.views) width = std::max(width, view.id.size() + 1);
-  std::string text =
-      fmt::format("{:<{}}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}\n", "view", width, "PSNR", "SSIM",
-                  "LPIPS", "LPIPS-pub", "mPSNR", "mSSIM", "normal°", "mnormal°");
-  for (const ViewReport& view : report.views) text += table_line(view.id, width, view.metrics);
-  return text + table_line("mean", width, mean_of(report));
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace traceflow::eval

@@ -6,6 +6,7 @@
 
 #include "capture/capture.h"
 #include "eval/metrics.h"
+#include "eval/motion_error.h"
 #include "show/subject.h"
 
 namespace traceflow::eval {
@@ -29,12 +30,14 @@ struct Report {
   int64_t main_surfels = 0;
   int64_t environment_surfels = 0;
   std::vector<ViewReport> views;
+  std::optional<MotionReport> motion;  // where the capture has truth/motion
 };
 
 // Called with each view's photograph and frame, in order.
 using ViewListener = std::function<void(const View& view, const ViewImages& images, const Frame& frame)>;
 
-// Renders every view, measures it, and adds it to the report; sets render_fps and the surfel counts.
+// Renders every view, measures it, and adds it to the report; sets render_fps, the surfel counts and the
+// motion. Throws InputError for truth that cannot be used.
 void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report);
 
@@ -44,7 +47,8 @@ Metrics mean_of(const Report& report);
 // The report as JSON text: figures that cannot be had are null.
 std::string report_json(const Report& report);
 
-// The report as a table: a line for each view and one for the mean.
+// The report as a table: a line for each view and one for the mean, a column for each figure that some view
+// has; below it the motion of each thing.
 std::string report_table(const Report& report);
 
 }  // namespace traceflow::eval

@@ -1,9 +1,9 @@
 #include "eval/report_page.h"
 
-#include <nlohmann/json.hpp>
 #include <span>
 
 #include "base/embedded_file.h"
+#include "eval/figures_json.h"
 
 namespace traceflow::eval {
 
@@ -30,12 +30,6 @@ std::string text_of(const Json& json) {
     }
   }
   return text;
-}
-
-void put_figures(const Metrics& metrics, Json& json) {
-  Metrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
-    json[name] = value ? Json(*value) : Json(nullptr);
-  });
 }
 
 Json machine_json(const Machine& machine) {
@@ -78,9 +72,10 @@ Json page_json(const ReportPage& page) {
                {"machine", machine_json(page.machine)},
                {"iterations", report.iterations},
                {"train_seconds", report.train_seconds},
-               {"render_fps", report.render_fps ? Json(*report.render_fps) : Json(nullptr)},
+               {"render_fps", figure_json(report.render_fps)},
                {"surfels", {{"main", report.main_surfels}, {"environment", report.environment_surfels}}}};
   put_figures(mean_of(report), json["mean"]);
+  json["motion"] = motion_json(report.motion);
   Json& views = json["views"] = Json::array();
   for (const ViewReport& view : report.views) {
     views.push_back({{"id", view.id}, {"time", view.time}});

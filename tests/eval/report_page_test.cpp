@@ -51,14 +51,16 @@ ReportPage some_page() {
 
 TEST(ReportPage, HoldsTheDataOfTheContract) {
   const std::string metrics =
-      R"("ssim":null,"lpips":null,"lpips_published":null,"masked_psnr":null,"masked_ssim":null,
-         "normal_mae_deg":null,"masked_normal_mae_deg":null})";
+      R"("ssim":null,"lpips":null,"lpips_published":null,"masked_psnr":null,"masked_ssim":null,"core_psnr":null,
+         "normal_mae_deg":null,"masked_normal_mae_deg":null,"masked_depth_error_median":null,
+         "masked_depth_error_mean":null,"core_depth_error_median":null,"core_depth_error_mean":null,
+         "outside_depth_error_median":null,"outside_depth_error_mean":null})";
   EXPECT_EQ(
       data_of(report_page(some_page())), Json::parse(R"({"version":"1.2.3","made":"2026-01-02T03:04:05Z",
     "run":"run","capture":"kettle","split":"test","downscale":1,"device":"cuda",
     "machine":{"processor":"chip","threads":4,"memory_bytes":8192,"system":"Linux","gpu":"card"},
     "iterations":7,"train_seconds":0.0,"render_fps":2.5,"surfels":{"main":3,"environment":0},
-    "mean":{"psnr":20.0,)" + metrics + R"(,
+    "mean":{"psnr":20.0,)" + metrics + R"(,"motion":null,
     "views":[{"id":"000","time":0.25,"psnr":20.0,)" + metrics +
                                                      R"(,{"id":"001","time":1.0,"psnr":null,)" + metrics +
                                                      R"(],

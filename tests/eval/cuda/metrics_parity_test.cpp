@@ -17,6 +17,7 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 struct Case {
   Tensor<float> colour, normal;
   Tensor<float> true_colour, true_normal;
+  Tensor<float> depth, alpha, true_depth;
   Tensor<uint8_t> mask;
 };
 
@@ -28,14 +29,22 @@ Case random_case(int64_t height, int64_t width) {
   c.normal = random_tensor<float>({height, width, 3}, random, -1, 1);
   c.true_normal = random_tensor<float>({height, width, 3}, random, -1, 1);
   c.mask = Tensor<uint8_t>({height, width});
-  for (uint8_t& v : c.mask.values()) v = static_cast<uint8_t>(random.below(3) == 0 ? 255 : 0);
+  // Pieces large enough to have a core.
+  for (int64_t y = 0; y < height; ++y) {
+    for (int64_t x = 0; x < width; ++x) c.mask(y, x) = y % 9 < 5 && x % 11 < 6 ? 255 : 0;
+  }
+  c.depth = random_tensor<float>({height, width}, random, -0.2, 4);
+  c.alpha = random_tensor<float>({height, width}, random, 0.3, 1);
+  c.true_depth = random_tensor<float>({height, width}, random, -0.5, 3);
   return c;
 }
 
 Metrics measured(const Case& c, Device pictures, Device truth) {
   const Tensor<float> colour = c.true_colour.on(truth), normal = c.true_normal.on(truth);
   const Tensor<uint8_t> mask = c.mask.on(truth);
-  return measure(c.colour.on(pictures), c.normal.on(pictures), {colour, mask, normal}, nullptr);
+  const Tensor<float> depth = c.true_depth.on(truth);
+  return measure({c.colour.on(pictures), c.normal.on(pictures), c.depth.on(pictures), c.alpha.on(pictures)},
+                 {colour, mask, normal, nullptr, &depth, 1.25}, nullptr);
 }
 
 void expect_agreement(const Metrics& found, const Metrics& expected) {
@@ -66,8 +75,10 @@ void expect_agreement(const Case& c) {
 TEST_F(MetricsOnDevice, AgreeWithTheCpu) {
   const Case c = random_case(67, 83);  // more pixels than a block sums
   const Metrics m = measured(c, Device::cpu, Device::cpu);
-  ASSERT_TRUE(m.psnr && m.ssim && m.masked_psnr && m.masked_ssim && m.normal_mae_deg &&
-              m.masked_normal_mae_deg);
+  Metrics::visit(m, [](const char* name, const std::optional<double>& value) {
+    const bool is_lpips = std::string_view(name).starts_with("lpips");
+    EXPECT_NE(value.has_value(), is_lpips) << name;
+  });
   expect_agreement(c);
 }
 
@@ -76,6 +87,8 @@ TEST_F(MetricsOnDevice, AgreeOnWhatIsNotANumber) {
   c.colour[5] = c.normal[5] = c.true_colour[100] = c.true_normal[100] = nan;
   c.colour[70] = c.normal[71] = c.true_colour[140] = c.true_normal[200] = infinity;
   c.colour[72] = -infinity;
+  c.depth[5] = c.alpha[6] = c.true_depth[7] = nan;
+  c.depth[8] = c.alpha[9] = c.true_depth[10] = infinity;
   c.normal[300] = 1e30F;  // whose square a double has
   expect_agreement(c);
 }

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "eval/report.h"
+
+// Figures as metrics.json and the report's page have them: one that cannot be had is null.
+namespace traceflow::eval {
+
+// The value, or null.
+nlohmann::ordered_json figure_json(const std::optional<double>& value);
+
+// Adds every figure to an object by its name.
+void put_figures(const Metrics& metrics, nlohmann::ordered_json& json);
+
+// {"mean", "objects"}; null where the capture has no truth of the motion.
+nlohmann::ordered_json motion_json(const std::optional<MotionReport>& motion);
+
+}  // namespace traceflow::eval
