@@ -1,6 +1,6 @@
 import { mkdir, readFile, writeFile } from 'node:fs/promises';
 import { dirname } from 'node:path';
-import type { Figures, ReportData } from '../src/report/data.ts';
+import type { Figures, MotionFigures, ObjectMotion, ReportData } from '../src/report/data.ts';
 import { png } from './png.ts';
 import { captured_cameras } from './scene.ts';
 import { render } from './tracer.ts';
@@ -18,9 +18,30 @@ const figures = (i: number): Figures => ({
   lpips_published: null,
   masked_psnr: 16.3 + wave(i, 2),
   masked_ssim: 0.29 + 0.05 * wave(i, 3),
+  core_psnr: 19.1 + wave(i, 2),
   normal_mae_deg: i % 7 === 5 ? null : 31 + 2 * wave(i, 4),
   masked_normal_mae_deg: null,
+  masked_depth_error_median: 0.03 + 0.01 * wave(i, 5),
+  masked_depth_error_mean: 0.05 + 0.01 * wave(i, 5),
+  core_depth_error_median: 0.02 + 0.01 * wave(i, 6),
+  core_depth_error_mean: 0.03 + 0.01 * wave(i, 6),
+  outside_depth_error_median: 0.004 + 0.001 * wave(i, 7),
+  outside_depth_error_mean: 0.01 + 0.001 * wave(i, 7),
 });
+
+// A thing that moves steadily, and that surfels follow less and less.
+function object(id: number, drift: number): ObjectMotion {
+  const at = (time: number): MotionFigures => ({
+    moved: 0.3 * time,
+    missed: 0.3 * drift * time * time,
+    share: 1.8 * drift * time * time,
+    rotation_error_deg: 40 * drift * time,
+    scale: 1 + 0.2 * drift * time,
+    true_scale: 1,
+  });
+  const curve = Array.from({ length: 80 }, (_, i) => ({ time: i / 79, ...at(i / 79) }));
+  return { object: id, points: 120 * id, followed_points: 113 * id, ...at(0.56), curve };
+}
 
 const layers = ['photograph', 'rgb', 'difference', 'diffuse', 'specular', 'normal', 'depth'] as const;
 const [width, height] = [360, 202];
@@ -88,6 +109,7 @@ const data: ReportData = {
   render_fps: 14.2,
   surfels: { main: 20000, environment: 8443 },
   mean: { ...figures(0.4), psnr: 22.42 },
+  motion: { mean: object(1, 0.15), objects: [object(1, 0.1), object(2, 0.3)] },
   views: captured_cameras.test.map((view, i) => ({ id: view.id, time: view.time, ...figures(i) })),
   settings: [
     setting('schedule.iterations', '8000', '60000', '', 'Iterations of the whole training'),

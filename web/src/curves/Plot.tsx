@@ -51,11 +51,12 @@ export function Plot({ chart, aside, phases, height }: PlotProps) {
   useEffect(() => effect(() => void (repaint.value && plot.current?.redraw(false))), []);
 
   const at = index.value ?? chart.x.length - 1;
+  const place = (x: number): string => (chart.over === 'time' ? x.toFixed(3) : count(x));
   return (
     <figure class="plot" data-testid={`curve-${chart.id}`} data-points={chart.x.length}>
       <figcaption>
         <b>{chart.title}</b>
-        <span>{index.value !== null && chart.x[at] !== undefined ? `at ${count(chart.x[at])}` : ''}</span>
+        <span>{index.value !== null && chart.x[at] !== undefined ? `at ${place(chart.x[at])}` : ''}</span>
         {aside}
       </figcaption>
       <ul class="plot-values">
@@ -68,7 +69,7 @@ export function Plot({ chart, aside, phases, height }: PlotProps) {
         class="plot-box"
         style={{ height: `${tall}px` }}
         role="img"
-        aria-label={`${chart.title} over the iterations`}
+        aria-label={`${chart.title} over the ${chart.over ?? 'iterations'}`}
       />
     </figure>
   );
@@ -120,17 +121,20 @@ function options(
     cursor: {
       y: false,
       drag: { x: false, y: false },
-      sync: { key: 'curves', scales: ['x', null] },
+      sync: { key: `curves over ${chart.over ?? 'iterations'}`, scales: ['x', null] },
       points: { size: 6 },
     },
     scales: {
-      x: { time: false, range: (_, low, high) => across(newest.current.phases, low, high) },
+      x: {
+        time: false,
+        range: (_, low, high) => (chart.over === 'time' ? [0, 1] : across(newest.current.phases, low, high)),
+      },
       y: chart.log
         ? { distr: 3, range: (_, low, high) => on_log_scale(low, high) }
-        : { range: (_, low, high) => padded(chart.from_zero ? 0 : low, high, chart.from_zero ?? false) },
+        : { range: (_, low, high) => padded(chart.from_zero ? 0 : low, high, chart) },
     },
     axes: [
-      { ...common, size: 22, gap: 3, grid: { show: false }, values: (_, splits) => splits.map(short_iteration) },
+      { ...common, size: 22, gap: 3, grid: { show: false }, values: (_, splits) => splits.map(chart.over === 'time' ? String : short_iteration) },
       {
         ...common,
         size: 46,
@@ -158,7 +162,14 @@ function series_of_line(line: Line): uPlot.Series {
   const stroke = (): string => css_colour(`--series-${line.colour}`);
   if (line.hidden) return { stroke, paths: () => null, points: { show: false } };
   if (line.dots) return { stroke, paths: () => null, points: { show: true, size: 7, fill: stroke } };
-  return { stroke, width: line.colour === 1 ? 2 : 1.2, alpha: line.colour === 1 ? 1 : 0.85, spanGaps: true, points: { show: false } };
+  return {
+    stroke,
+    width: line.colour === 1 ? 2 : 1.2,
+    alpha: line.colour === 1 ? 1 : 0.85,
+    ...(line.dashed && { width: 1, dash: [4, 4] }),
+    spanGaps: true,
+    points: { show: false },
+  };
 }
 
 // Whole powers of ten, five at most: a term that starts near nothing must not press the others flat.
@@ -179,11 +190,11 @@ const across = (phases: Phase[], low: number, high: number): [number, number] =>
   Math.max(high, phases.at(-1)?.last ?? high, low + 1),
 ];
 
-function padded(low: number, high: number, from_zero: boolean): [number, number] {
+function padded(low: number, high: number, { from_zero, over }: Chart): [number, number] {
   if (!Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
   const room = (high - low) * 0.08 || Math.abs(high) * 0.1 || 1;
-  // Above it the names of the phases have room.
-  return [from_zero ? Math.min(low, 0) : low - room, high + 3 * room];
+  // Above the iterations the names of the phases have room.
+  return [from_zero ? Math.min(low, 0) : low - room, high + (over === 'time' ? 1 : 3) * room];
 }
 
 const short_iteration = (v: number): string => (v >= 1000 ? `${Math.round(v / 100) / 10}k` : String(v));

@@ -9,6 +9,7 @@ export interface Line {
   colour: number; // of the theme's series, from 1
   values: (number | null)[];
   dots?: boolean; // single points rather than a line
+  dashed?: boolean;
   hidden?: boolean; // there for the scale and the readout; `bars` draw it
 }
 
@@ -21,6 +22,7 @@ export interface Chart {
   axis?: (value: number) => string; // shorter, beside the axis
   log?: boolean;
   from_zero?: boolean;
+  over?: 'iterations' | 'time'; // what x is: iterations unless said, or times in [0, 1]
   bars?: Density;
   marks: number[]; // iterations of opacity resets
 }

@@ -6,6 +6,8 @@ import { Facts } from './Facts.tsx';
 import { present, written } from './figures.ts';
 import { FigureTable } from './FigureTable.tsx';
 import { Large, type Opened } from './Large.tsx';
+import { charts_over_time } from './over_time.ts';
+import { OverTime } from './OverTime.tsx';
 import { Settings } from './Settings.tsx';
 import { Times } from './Times.tsx';
 import { Compare } from './Compare.tsx';
@@ -20,6 +22,12 @@ export function Report({ data }: { data: ReportData }) {
       title: 'Figures of each view',
       body: <FigureTable data={data} open={open} />,
       there: data.views.length > 0,
+    },
+    {
+      id: 'over-time',
+      title: 'Over time',
+      body: <OverTime data={data} />,
+      there: data.motion !== null || charts_over_time(data).length > 0,
     },
     {
       id: 'curves',
@@ -55,7 +63,8 @@ export function Report({ data }: { data: ReportData }) {
 }
 
 function Header({ data }: { data: ReportData }) {
-  const figures = present(data).filter(({ key }) => data.mean[key] !== null);
+  const figures = present(data).filter(({ key, in_table_alone }) => data.mean[key] !== null && !in_table_alone);
+  const share = data.motion?.mean.share ?? null;
   return (
     <header class="head">
       <div class="head-line">
@@ -79,6 +88,12 @@ function Header({ data }: { data: ReportData }) {
             </dd>
           </div>
         ))}
+        {share !== null && (
+          <div>
+            <dt>Motion error</dt>
+            <dd>{share.toFixed(3)}</dd>
+          </div>
+        )}
       </dl>
     </header>
   );

@@ -9,8 +9,33 @@ export interface Figures {
   lpips_published: number | null;
   masked_psnr: number | null;
   masked_ssim: number | null;
+  core_psnr: number | null;
   normal_mae_deg: number | null;
   masked_normal_mae_deg: number | null;
+  // Shares of the true depth.
+  masked_depth_error_median: number | null;
+  masked_depth_error_mean: number | null;
+  core_depth_error_median: number | null;
+  core_depth_error_mean: number | null;
+  outside_depth_error_median: number | null;
+  outside_depth_error_mean: number | null;
+}
+
+// How far a moving thing is followed (src/eval/motion_error.h); lengths in the capture's units.
+export interface MotionFigures {
+  moved: number | null;
+  missed: number | null;
+  share: number | null; // 1: not followed
+  rotation_error_deg: number | null;
+  scale: number | null;
+  true_scale: number | null;
+}
+
+export interface ObjectMotion extends MotionFigures {
+  object: number;
+  points: number;
+  followed_points: number;
+  curve: ({ time: number } & MotionFigures)[]; // empty where the thing is not followed
 }
 
 export interface ReportData {
@@ -27,6 +52,7 @@ export interface ReportData {
   render_fps: number | null;
   surfels: { main: number; environment: number };
   mean: Figures;
+  motion: { mean: MotionFigures; objects: ObjectMotion[] } | null; // null without truth
   views: ({ id: string; time: number } & Figures)[];
   settings: { path: string; value: string; default: string; unit: string; help: string }[];
   phases: { name: string; first: number; last: number; seconds: number; steps: OpTime[] }[];

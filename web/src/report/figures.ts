@@ -7,7 +7,9 @@ export interface Kind {
   label: string;
   unit: string;
   digits: number;
+  factor?: number; // of what is written
   higher_is_better: boolean;
+  in_table_alone?: boolean; // not at the head of the page
 }
 
 const kinds: Kind[] = [
@@ -17,9 +19,21 @@ const kinds: Kind[] = [
   { key: 'lpips_published', label: 'LPIPS, as published', unit: '', digits: 4, higher_is_better: false },
   { key: 'masked_psnr', label: 'PSNR in the mask', unit: 'dB', digits: 2, higher_is_better: true },
   { key: 'masked_ssim', label: 'SSIM in the mask', unit: '', digits: 4, higher_is_better: true },
+  { key: 'core_psnr', label: 'PSNR in the core', unit: 'dB', digits: 2, higher_is_better: true },
   { key: 'normal_mae_deg', label: 'Normal error', unit: '°', digits: 1, higher_is_better: false },
   { key: 'masked_normal_mae_deg', label: 'Normal error in the mask', unit: '°', digits: 1, higher_is_better: false },
+  depth('masked_depth_error_median', 'Depth error in the mask', 'median'),
+  depth('core_depth_error_median', 'Depth error in the core', 'median'),
+  depth('outside_depth_error_median', 'Depth error outside', 'median'),
+  depth('masked_depth_error_mean', 'Depth error in the mask', 'mean'),
+  depth('core_depth_error_mean', 'Depth error in the core', 'mean'),
+  depth('outside_depth_error_mean', 'Depth error outside', 'mean'),
 ];
+
+function depth(key: Kind['key'], label: string, of: 'median' | 'mean'): Kind {
+  const kind: Kind = { key, label, unit: `%, ${of}`, digits: 2, factor: 100, higher_is_better: false };
+  return of === 'mean' ? { ...kind, in_table_alone: true } : kind;
+}
 
 export type View = ReportData['views'][number];
 
@@ -27,8 +41,8 @@ export type View = ReportData['views'][number];
 export const present = (data: ReportData): Kind[] =>
   kinds.filter(({ key }) => data.mean[key] !== null || data.views.some((view) => view[key] !== null));
 
-export const written = (value: number | null, { digits }: Kind): string =>
-  value === null ? '–' : value.toFixed(digits);
+export const written = (value: number | null, { digits, factor = 1 }: Kind): string =>
+  value === null ? '–' : (factor * value).toFixed(digits);
 
 // The best and the worst value among the views; null where they do not differ.
 export function ends(views: readonly View[], { key, higher_is_better }: Kind): { best: number; worst: number } | null {

@@ -4,7 +4,7 @@ import { fit, whole } from '../../src/math/fit.ts';
 import { pause_before } from '../../src/net/connection.ts';
 import { parse_picture } from '../../src/net/wire.ts';
 import { bytes, count, duration, figure, file_name, short_count, signed, title } from '../../src/parts/format.ts';
-import { ends, sorted, type Kind, type View } from '../../src/report/figures.ts';
+import { ends, sorted, written, type Kind, type View } from '../../src/report/figures.ts';
 
 function message(header: object, body: number[], claimed?: number): ArrayBuffer {
   const text = new TextEncoder().encode(JSON.stringify(header));
@@ -79,8 +79,21 @@ const view = (id: string, lpips: number | null): View => ({
   lpips_published: null,
   masked_psnr: null,
   masked_ssim: null,
+  core_psnr: null,
   normal_mae_deg: null,
   masked_normal_mae_deg: null,
+  masked_depth_error_median: null,
+  masked_depth_error_mean: null,
+  core_depth_error_median: null,
+  core_depth_error_mean: null,
+  outside_depth_error_median: null,
+  outside_depth_error_mean: null,
+});
+
+test('shares are written as percentages', () => {
+  assert.equal(written(0.01234, { ...kind, factor: 100 }), '1.23');
+  assert.equal(written(0.01234, kind), '0.01');
+  assert.equal(written(null, { ...kind, factor: 100 }), '–');
 });
 
 test('views are sorted with the unknown last', () => {
