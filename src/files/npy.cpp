@@ -243,8 +243,11 @@ Tensor<float> read_npz(const std::filesystem::path& path, const std::string& nam
   return NpyFile(path, name).read();
 }
 
-void write_npy(const std::filesystem::path& path, const Tensor<float>& array) {
-  std::string header = "{'descr': '<f4', 'fortran_order': False, 'shape': (";
+namespace {
+
+template <class T>
+void write_array(const std::filesystem::path& path, const std::string& type, const Tensor<T>& array) {
+  std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': (";
   for (int r = 0; r < array.shape().rank(); ++r)
     header += (r == 0 ? "" : ", ") + std::to_string(array.dim(r));
   header += array.shape().rank() == 1 ? ",), }" : "), }";
@@ -254,8 +257,18 @@ void write_npy(const std::filesystem::path& path, const Tensor<float>& array) {
   std::string text(magic);
   text += {'\x01', '\x00', static_cast<char>(header.size() & 0xff), static_cast<char>(header.size() >> 8)};
   text += header;
-  text.append(reinterpret_cast<const char*>(array.data()), static_cast<size_t>(array.size()) * sizeof(float));
+  text.append(reinterpret_cast<const char*>(array.data()), static_cast<size_t>(array.size()) * sizeof(T));
   write_atomically(path, text);
+}
+
+}  // namespace
+
+void write_npy(const std::filesystem::path& path, const Tensor<float>& array) {
+  write_array(path, "<f4", array);
+}
+
+void write_npy(const std::filesystem::path& path, const Tensor<int32_t>& array) {
+  write_array(path, "<i4", array);
 }
 
 }  // namespace traceflow

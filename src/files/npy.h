@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -16,8 +17,9 @@ Tensor<float> read_npy(InputFile file);
 Tensor<float> read_npy(const std::filesystem::path& path);
 // The array `name` of a .npz (zip, stored or deflated); an empty name takes the only one.
 Tensor<float> read_npz(const std::filesystem::path& path, const std::string& name = "");
-// float32, C order, format version 1.0. Written atomically.
+// float32 or int32, C order, format version 1.0. Written atomically.
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array);
+void write_npy(const std::filesystem::path& path, const Tensor<int32_t>& array);
 
 // An array left on the disk and read in slices, for those larger than memory should hold. Throws InputError
 // as read_npy does.

@@ -156,6 +156,17 @@ TEST(Evaluate, DepthErrorsAreThoseOfTheCapturesFiles) {
     EXPECT_NEAR(*view.metrics.masked_depth_error_mean, expected.at(view.id), 1e-5);
     EXPECT_TRUE(view.metrics.masked_depth_error_median && view.metrics.outside_depth_error_median);
   }
+  EXPECT_TRUE(report.motion);
+}
+
+TEST(Evaluate, WithoutTrueMotionThereIsNone) {
+  const TempFolder folder;
+  write_small_capture(folder / "capture");
+  std::filesystem::remove_all(folder / "capture/truth/motion");
+  const Capture capture = load_capture(folder / "capture", {});
+  const show::Subject subject{scene_of(capture), {}, {}, ""};
+  Report report;
+  evaluate(subject, capture, capture.test, nullptr, {}, report);
   EXPECT_FALSE(report.motion);
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "base/error.h"
@@ -58,6 +59,19 @@ TEST(Npy, written_header_is_numpys) {
   EXPECT_EQ(bytes[127], '\n');
   write_npy(folder / "b.npy", Tensor<float>({5}));
   EXPECT_NE(bytes_of(folder / "b.npy").find("'shape': (5,)"), std::string::npos);
+}
+
+TEST(Npy, integers_are_written_as_integers) {
+  const TempFolder folder;
+  Tensor<int32_t> array({3});
+  array[0] = 7;
+  array[1] = -2;
+  array[2] = 1 << 24;
+  write_npy(folder / "a.npy", array);
+  const std::string bytes = bytes_of(folder / "a.npy");
+  EXPECT_EQ(bytes.substr(10, 55), "{'descr': '<i4', 'fortran_order': False, 'shape': (3,),");
+  EXPECT_EQ(bytes.substr(128), raw<int32_t>({7, -2, 1 << 24}));
+  EXPECT_TRUE(std::ranges::equal(read_npy(folder / "a.npy").values(), array.values()));
 }
 
 TEST(Npy, every_type_widens_to_float) {

@@ -67,7 +67,7 @@ void record_geometry(const synth::Stage& stage, const Camera<double>& camera, in
       camera_ray(camera, static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5);
   const auto hit = synth::nearest_hit(stage, ray);
   if (!hit) return;
-  images.mask(row, column) = stage.bodies[static_cast<size_t>(hit->body)].material.is_specular() ? 1 : 0;
+  images.mask(row, column) = stage.bodies[static_cast<size_t>(hit->body)].is_masked ? 1 : 0;
   store3(&images.normal(row, column, 0), hit->normal);
   images.depth(row, column) = static_cast<float>(camera.point_in_camera(hit->point).z);
 }

@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
-
-#include "capture/synth/sampler.h"
 
 namespace traceflow::synth {
 
@@ -54,17 +51,29 @@ double distance_to(const Box& box, const Ray& ray, double nearest) {
   return leave > nearest ? leave : infinity;
 }
 
-SurfacePoint surface_of(const Sphere& sphere, const Vector& point) {
+template <class S>
+ShapeHit hit_of(const S& shape, const Ray& ray, double nearest) {
+  return {distance_to(shape, ray, nearest)};
+}
+ShapeHit hit_of(const std::shared_ptr<const Mesh>& mesh, const Ray& ray, double nearest) {
+  return mesh->hit(ray, nearest);
+}
+
+SurfacePoint surface_of(const Sphere& sphere, const Vector& point, int) {
   const Vector normal = point / sphere.radius;
   const double longitude = std::atan2(normal.y, normal.x) / (2 * std::numbers::pi);
   const double latitude = std::acos(std::clamp(normal.z, -1.0, 1.0)) / std::numbers::pi;
-  return {normal, {longitude, latitude}};
+  return {normal, {longitude, latitude}, point};
 }
 
-SurfacePoint surface_of(const Disk&, const Vector& point) { return {{0, 0, 1}, {point.x, point.y}}; }
-SurfacePoint surface_of(const Plane&, const Vector& point) { return {{0, 0, 1}, {point.x, point.y}}; }
+SurfacePoint surface_of(const Disk&, const Vector& point, int) {
+  return {{0, 0, 1}, {point.x, point.y}, point};
+}
+SurfacePoint surface_of(const Plane&, const Vector& point, int) {
+  return {{0, 0, 1}, {point.x, point.y}, point};
+}
 
-SurfacePoint surface_of(const Box& box, const Vector& point) {
+SurfacePoint surface_of(const Box& box, const Vector& point, int) {
   int face = 0;
   for (int axis = 1; axis < 3; ++axis) {
     if (std::abs(point[axis]) - box.half_size[axis] > std::abs(point[face]) - box.half_size[face])
@@ -72,75 +81,32 @@ SurfacePoint surface_of(const Box& box, const Vector& point) {
   }
   Vector normal(0);
   normal[face] = point[face] < 0 ? -1 : 1;
-  return {normal, {point[(face + 1) % 3], point[(face + 2) % 3]}};
+  return {normal, {point[(face + 1) % 3], point[(face + 2) % 3]}, point};
 }
 
-double lattice_value(int64_t x, int64_t y) {
-  return unit_from_bits(
-      mix_bits(static_cast<uint64_t>(x) * 0x9E3779B97F4A7C15ULL + static_cast<uint64_t>(y)));
-}
-
-// Value noise in [0, 1] on the unit lattice.
-double smooth_noise(double x, double y) {
-  const double floor_x = std::floor(x);
-  const double floor_y = std::floor(y);
-  const auto i = static_cast<int64_t>(floor_x);
-  const auto j = static_cast<int64_t>(floor_y);
-  const double fx = x - floor_x;
-  const double fy = y - floor_y;
-  const double wx = fx * fx * (3 - 2 * fx);
-  const double wy = fy * fy * (3 - 2 * fy);
-  return std::lerp(std::lerp(lattice_value(i, j), lattice_value(i + 1, j), wx),
-                   std::lerp(lattice_value(i, j + 1), lattice_value(i + 1, j + 1), wx), wy);
-}
-
-double grain_at(const Vec2<double>& p) {
-  return 0.65 * smooth_noise(p.x, p.y) + 0.35 * smooth_noise(2.7 * p.x + 17, 2.7 * p.y + 31);
+SurfacePoint surface_of(const std::shared_ptr<const Mesh>& mesh, const Vector& point, int triangle) {
+  const Vector rest = mesh->at_rest(triangle, point);
+  return {mesh->normal(triangle), {rest.x, rest.y}, rest};
 }
 
 double reach_of(const Sphere& sphere) { return sphere.radius; }
 double reach_of(const Disk& disk) { return disk.radius; }
 double reach_of(const Box& box) { return length(box.half_size); }
 double reach_of(const Plane&) { return infinity; }
-
-bool is_odd(double cell) { return std::fmod(cell, 2.0) != 0; }
-
-// Mortar lines a tenth of a brick's height wide, every second row shifted by half a brick.
-bool is_mortar(const Vec2<double>& p) {
-  const double row = std::floor(p.y);
-  const double x = p.x + (is_odd(row) ? 0.5 : 0.0);
-  return p.y - row < 0.12 || x - std::floor(x) < 0.06;
-}
-
-bool shows_second(Pattern pattern, const Vec2<double>& p) {
-  switch (pattern) {
-    case Pattern::plain:
-      return false;
-    case Pattern::checker:
-      return is_odd(std::floor(p.x) + std::floor(p.y));
-    case Pattern::stripes:
-      return is_odd(std::floor(p.x + p.y));
-    case Pattern::bricks:
-      return is_mortar(p);
-  }
-  return false;
-}
+double reach_of(const std::shared_ptr<const Mesh>& mesh) { return mesh->reach(); }
 
 }  // namespace
 
+ShapeHit hit_shape(const Shape& shape, const Ray& ray_in_body, double nearest) {
+  return std::visit([&](const auto& s) { return hit_of(s, ray_in_body, nearest); }, shape);
+}
+
 double hit_distance(const Shape& shape, const Ray& ray_in_body, double nearest) {
-  return std::visit([&](const auto& s) { return distance_to(s, ray_in_body, nearest); }, shape);
+  return hit_shape(shape, ray_in_body, nearest).distance;
 }
 
-SurfacePoint surface_at(const Shape& shape, const Vector& point_in_body) {
-  return std::visit([&](const auto& s) { return surface_of(s, point_in_body); }, shape);
-}
-
-Vector colour_at(const Texture& texture, const Vec2<double>& uv) {
-  const Vector colour =
-      shows_second(texture.pattern, uv * texture.frequency) ? texture.second : texture.first;
-  if (texture.grain == 0) return colour;
-  return colour * (1 - texture.grain * grain_at(uv * texture.grain_frequency));
+SurfacePoint surface_at(const Shape& shape, const Vector& point_in_body, int triangle) {
+  return std::visit([&](const auto& s) { return surface_of(s, point_in_body, triangle); }, shape);
 }
 
 Mat3<double> rotation_about(const Vector& axis, double angle) {
@@ -161,13 +127,23 @@ Body::Body(const Shape& of_shape, const Material& of_material, const Pose& at_po
       pose(at_pose),
       reach(std::visit([](const auto& s) { return reach_of(s); }, of_shape)) {}
 
+Vector point_in_world(const Body& body, const Vector& rest, int triangle) {
+  const auto* mesh = std::get_if<std::shared_ptr<const Mesh>>(&body.shape);
+  const Vector in_body = mesh == nullptr ? rest : (*mesh)->deformed(triangle, rest);
+  return body.pose.world_from_body * in_body + body.pose.position;
+}
+
 Stage AnimatedScene::at(double time) const {
   Stage stage;
   stage.light = light;
   stage.ambient = ambient;
   stage.bodies.reserve(actors.size());
-  for (const Actor& actor : actors)
-    stage.bodies.emplace_back(actor.shape, actor.material, actor.pose_at(time));
+  for (const Actor& actor : actors) {
+    Body& body = stage.bodies.emplace_back(actor.shape_at ? actor.shape_at(time) : actor.shape,
+                                           actor.material, actor.pose_at(time));
+    body.object = actor.object;
+    body.is_masked = actor.is_masked;
+  }
   return stage;
 }
 

@@ -1,27 +1,17 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
-#include <limits>
+#include <memory>
 #include <variant>
 #include <vector>
 
-#include "math/types.h"
+#include "capture/synth/mesh.h"
+#include "capture/synth/ray.h"
+#include "capture/synth/texture.h"
 
 // What a synthetic capture shows: shapes with materials, each moving as a function of time. Metres, world z
 // up.
 namespace traceflow::synth {
-
-using Vector = Vec3<double>;
-
-// How far a ray that misses goes.
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-// direction has unit length.
-struct Ray {
-  Vector origin;
-  Vector direction;
-};
 
 // Shapes in their own frame, centred at its origin.
 struct Sphere {
@@ -36,32 +26,25 @@ struct Box {
 };
 // The whole xy plane, normal +z: a wall.
 struct Plane {};
-using Shape = std::variant<Sphere, Disk, Box, Plane>;
+using Shape = std::variant<Sphere, Disk, Box, Plane, std::shared_ptr<const Mesh>>;
 
-// Distance of the first hit beyond `nearest`, in units of the ray's direction; infinite where the ray misses.
+// Where a ray meets a shape: distance in units of the ray's direction, infinite where it misses; the
+// triangle of a mesh, -1 on other shapes.
+using ShapeHit = MeshHit;
+// First hit beyond `nearest`.
+ShapeHit hit_shape(const Shape& shape, const Ray& ray_in_body, double nearest = 0);
 double hit_distance(const Shape& shape, const Ray& ray_in_body, double nearest = 0);
 
-// Outward normal and texture position of a point on the shape. uv is in metres on flat shapes, on spheres in
-// turns (longitude / 2π, latitude from the pole / π).
+// Outward normal and texture position of a point on the shape, and where the same point of its matter is at
+// rest: on a mesh before it was deformed, on other shapes the point itself. uv is in metres on flat shapes,
+// on spheres in turns (longitude / 2π, latitude from the pole / π), on meshes x and y at rest.
 struct SurfacePoint {
   Vector normal;
   Vec2<double> uv;
+  Vector rest;
 };
-SurfacePoint surface_at(const Shape& shape, const Vector& point_in_body);
-
-enum class Pattern { plain, checker, stripes, bricks };
-
-// Two colours in a pattern of `frequency` cells per unit of uv; `grain` darkens by smooth noise of up to that
-// share, so that no two places look alike.
-struct Texture {
-  Pattern pattern = Pattern::plain;
-  Vector first{0.5};
-  Vector second{0.5};
-  Vec2<double> frequency{1};
-  double grain = 0;
-  double grain_frequency = 12;
-};
-Vector colour_at(const Texture& texture, const Vec2<double>& uv);
+// triangle: as the hit says.
+SurfacePoint surface_at(const Shape& shape, const Vector& point_in_body, int triangle = -1);
 
 // A diffuse base under a mirror coat. The coat reflects the share `specular` at normal incidence, more at
 // grazing angles (Schlick), and the base gets the rest; roughness is the radius of the lobe around the mirror
@@ -90,7 +73,11 @@ struct Body {
   Material material;
   Pose pose;
   double reach;  // radius of the sphere around the pose's position that holds the body; infinite for planes
+  int object = -1;         // which moving thing it is part of; -1: it never moves
+  bool is_masked = false;  // whether the masks show it
 };
+// Where a point of a body's matter is: `rest` and `triangle` say which point, the body when.
+Vector point_in_world(const Body& body, const Vector& rest, int triangle);
 
 // The scene at one moment.
 struct Stage {
@@ -99,10 +86,15 @@ struct Stage {
   double ambient = 0;  // radiance that reaches every point from everywhere
 };
 
+// Bodies that move as one are one object. Objects are numbered 0, 1, ….
 struct Actor {
   Shape shape;
   Material material;
   std::function<Pose(double)> pose_at;  // of time in [0, 1]
+  int object = -1;
+  bool is_masked = false;
+  std::function<Shape(double)> shape_at =
+      nullptr;  // of what deforms, in place of `shape`; its triangles stay
 };
 
 // The camera's arc around a target. Azimuth is measured from -y towards +x.

@@ -9,4 +9,9 @@ namespace traceflow::synth {
 // middle.
 AnimatedScene make_scene(SynthScene scene);
 
+// A textured box and a mirroring kettle, held in the air, that turn by about 90° and come nearer.
+AnimatedScene tumble();
+// A textured pillar on the floor that bends and stretches.
+AnimatedScene soft();
+
 }  // namespace traceflow::synth

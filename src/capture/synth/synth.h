@@ -17,9 +17,12 @@
 namespace traceflow {
 
 // balls: a mirror ball and a glazed ball that slide and hop, a box that turns beside them. mirror: a round
-// mirror that turns and nods on its stand between moving boxes.
-enum class SynthScene { balls, mirror };
-constexpr std::array<std::string_view, 2> enum_names(SynthScene) { return {"balls", "mirror"}; }
+// mirror that turns and nods on its stand between moving boxes. tumble: a textured box and a mirroring
+// kettle, carried and turned. soft: a textured pillar that bends and stretches.
+enum class SynthScene { balls, mirror, tumble, soft };
+constexpr std::array<std::string_view, 4> enum_names(SynthScene) {
+  return {"balls", "mirror", "tumble", "soft"};
+}
 
 struct SynthOptions {
   SynthScene scene = SynthScene::balls;
@@ -34,7 +37,8 @@ struct SynthOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("scene", scene, "", "What is seen: balls or mirror.");
+    v.field("scene", scene, "",
+            "What is seen: balls, mirror, tumble (things turned by hand) or soft (one that bends).");
     v.field("frames", frames, "frames", "Times at which the left (training) camera takes a picture.");
     v.field("width", width, "pixels", "Width of the pictures.");
     v.field("height", height, "pixels", "Height of the pictures.");
@@ -61,10 +65,11 @@ struct SynthView {
 std::vector<SynthView> synth_views(const SynthOptions& options);
 
 // A view's pixels. colour = diffuse + specular, clipped to [0, 1]: diffuse is what the first surface sends
-// back itself, specular what it mirrors, each with its weight.
+// back itself, specular what it mirrors, each with its weight. Masks show the mirroring bodies of balls and
+// mirror, and the moving objects of tumble and soft.
 struct SynthImages {
   Tensor<float> colour, diffuse, specular;  // H×W×3
-  Tensor<uint8_t> mask;                     // H×W, 1 where the pixel's centre shows a specular body
+  Tensor<uint8_t> mask;                     // H×W, 1 where the pixel's centre shows what masks show
   Tensor<float> normal;                     // H×W×3, world axes, unit, at pixel centres
   Tensor<float> depth;                      // H×W, camera z at pixel centres
 };
@@ -77,6 +82,15 @@ Tensor<float> synth_normal_prior(const SynthOptions& options, const SynthView& v
 
 // Noisy points, P×3 in world, on the surfaces at time 0 that the left camera sees from somewhere on its way.
 Tensor<float> synth_points(const SynthOptions& options);
+
+// Where points of the moving objects are in world, at every time: points that the first training camera sees
+// at time 0, at most 600 of an object, on a grid that does not depend on the size of the pictures. Bodies
+// that move as one are one object; what never moves is left out.
+struct SynthMotion {
+  Tensor<float> points;    // T×N×3, entry i at the time of frame i
+  Tensor<int32_t> object;  // N, 0, 1, …
+};
+SynthMotion synth_motion(const SynthOptions& options);
 
 // How the capture's scene.json normalises the world, and its depth range in the normalised scene.
 SceneNormalisation synth_normalisation();

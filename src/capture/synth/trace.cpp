@@ -22,23 +22,26 @@ Ray in_body(const Pose& pose, const Ray& ray) {
   return {(ray.origin - pose.position) * pose.world_from_body, ray.direction * pose.world_from_body};
 }
 
-// Distance of the body along the ray where it is nearer than `farthest`; a larger number otherwise.
-double body_distance(const Body& body, const Ray& ray, double farthest) {
+// The body's hit along the ray where it is nearer than `farthest`; a larger distance otherwise.
+ShapeHit body_hit(const Body& body, const Ray& ray, double farthest) {
   if (std::holds_alternative<Plane>(body.shape)) {
     const Vector& normal = body.pose.world_from_body[2];
     const double t = dot(normal, body.pose.position - ray.origin) / dot(normal, ray.direction);
-    return t > 0 ? t : infinity;
+    return {t > 0 ? t : infinity};
   }
-  return can_reach(body, ray, farthest) ? hit_distance(body.shape, in_body(body.pose, ray)) : infinity;
+  return can_reach(body, ray, farthest) ? hit_shape(body.shape, in_body(body.pose, ray)) : ShapeHit{};
 }
 
-Hit describe(const Stage& stage, const Ray& ray, int index, double distance) {
+Hit describe(const Stage& stage, const Ray& ray, int index, const ShapeHit& found) {
   const Body& body = stage.bodies[static_cast<size_t>(index)];
   const Ray local = in_body(body.pose, ray);
-  const SurfacePoint surface = surface_at(body.shape, local.origin + distance * local.direction);
+  const double distance = found.distance;
+  const SurfacePoint surface =
+      surface_at(body.shape, local.origin + distance * local.direction, found.triangle);
   Vector normal = body.pose.world_from_body * surface.normal;
   if (dot(normal, ray.direction) > 0) normal = -normal;
-  return {distance, index, ray.origin + distance * ray.direction, normal, surface.uv};
+  return {distance,     index,         ray.origin + distance * ray.direction, normal, surface.uv,
+          surface.rest, found.triangle};
 }
 
 // Two unit vectors that complete a unit vector to a right-handed frame (Duff et al. 2017).
@@ -79,18 +82,18 @@ Vector direct_light(const Stage& stage, const Hit& hit, const Vec2<double>& squa
 Vector diffuse_light(const Stage& stage, const Hit& hit, const Material& material, Sampler& sampler) {
   Vector light(stage.ambient);
   if (stage.light >= 0) light += direct_light(stage, hit, sampler.next());
-  return colour_at(material.albedo, hit.uv) * light;
+  return colour_at(material.albedo, hit.uv, hit.rest) * light;
 }
 
 }  // namespace
 
 std::optional<Hit> nearest_hit(const Stage& stage, const Ray& ray) {
-  double best = infinity;
+  ShapeHit best;
   int best_body = -1;
   for (size_t i = 0; i < stage.bodies.size(); ++i) {
-    const double t = body_distance(stage.bodies[i], ray, best);
-    if (t < best) {
-      best = t;
+    const ShapeHit hit = body_hit(stage.bodies[i], ray, best.distance);
+    if (hit.distance < best.distance) {
+      best = hit;
       best_body = static_cast<int>(i);
     }
   }
@@ -104,7 +107,7 @@ bool is_shadowed(const Stage& stage, const Vector& point, const Vector& light_po
   for (size_t i = 0; i < stage.bodies.size(); ++i) {
     const Body& body = stage.bodies[i];
     if (static_cast<int>(i) == stage.light || std::holds_alternative<Plane>(body.shape)) continue;
-    if (body_distance(body, ray, distance) < distance) return true;
+    if (body_hit(body, ray, distance).distance < distance) return true;
   }
   return false;
 }

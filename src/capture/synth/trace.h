@@ -17,6 +17,8 @@ struct Hit {
   Vector point;
   Vector normal;  // unit, turned towards where the ray came from
   Vec2<double> uv;
+  Vector rest;  // the point of the body's matter, as point_in_world takes it
+  int triangle;
 };
 
 // The nearest surface along the ray, if any.

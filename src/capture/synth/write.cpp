@@ -35,7 +35,7 @@ void claim_folder(const fs::path& folder) {
   fs::remove(folder / "dataset.json");
   for (const char* name : subfolders) fs::remove_all(folder / name);
   for (const char* name : {"rgb/1x", "camera", "mask/1x", "normal/1x", "truth/normal", "truth/depth",
-                           "truth/diffuse", "truth/specular"}) {
+                           "truth/diffuse", "truth/specular", "truth/motion"}) {
     fs::create_directories(folder / name);
   }
 }
@@ -110,6 +110,9 @@ void write_synthetic_capture(const SynthOptions& options, const fs::path& folder
   const std::vector<SynthView> views = synth_views(options);
   for (const SynthView& view : views) write_view(options, view, folder);
   write_npy(folder / "points.npy", synth_points(options));
+  const SynthMotion motion = synth_motion(options);
+  write_npy(folder / "truth/motion/points.npy", motion.points);
+  write_npy(folder / "truth/motion/object.npy", motion.object);
   write_nerfies_layout(folder, layout_of(views), {synth_normalisation(), synth_near, synth_far});
 }
 

@@ -156,6 +156,27 @@ TEST(SynthTextures, GrainOnlyDarkensAndStaysWithinItsShare) {
   EXPECT_GT(most - least, 0.1);
 }
 
+TEST(SynthTextures, PatchesNeverRepeatAndFollowTheRestPoint) {
+  Texture patches{Pattern::patches, Vector(0.1), Vector(0.9), Vec2<double>(20)};
+  patches.grain = 0;
+  Random random(5);
+  int repeated = 0;
+  int near = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const Vector p = random_place(random, 1);
+    const Vector colour = colour_at(patches, {0, 0}, p);
+    EXPECT_EQ(colour, colour_at(patches, {7, 3}, p)) << "uv plays no part";
+    for (int axis = 0; axis < 3; ++axis) EXPECT_TRUE(colour[axis] >= 0.1 && colour[axis] <= 0.9);
+    Vector moved = p;
+    moved[i % 3] += random.below(2) == 0 ? 0.5 : -1.0;  // whole periods of the lattice
+    repeated += colour == colour_at(patches, {0, 0}, moved) ? 1 : 0;
+    near += colour == colour_at(patches, {0, 0}, p + 0.002 * random_direction(random)) ? 1 : 0;
+  }
+  EXPECT_EQ(repeated, 0);
+  EXPECT_GT(near, 850) << "patches are whole, not noise";
+  EXPECT_LT(near, 1000);
+}
+
 TEST(SynthPoses, RotationTurnsRightHanded) {
   const Mat3<double> quarter = rotation_about({0, 0, 1}, std::numbers::pi / 2);
   EXPECT_NEAR(length(quarter * Vector(1, 0, 0) - Vector(0, 1, 0)), 0, 1e-15);
@@ -175,7 +196,11 @@ TEST_P(NamedScenes, MoveSmoothlyAndRigidly) {
       const Pose& b = next.bodies[i].pose;
       EXPECT_NEAR(glm::determinant(a.world_from_body), 1, 1e-12);
       EXPECT_LT(length(b.position - a.position), 0.01) << "body " << i << " jumps at step " << step;
-      moves = moves || a.position != b.position;
+      const bool deforms = now.bodies[i].reach != next.bodies[i].reach;
+      if (deforms) {
+        EXPECT_LT(std::abs(next.bodies[i].reach - now.bodies[i].reach), 0.01) << "body " << i;
+      }
+      moves = moves || deforms || a.position != b.position;
     }
   }
   EXPECT_TRUE(moves);
@@ -201,7 +226,9 @@ TEST_P(NamedScenes, BodiesKeepOutOfEachOtherAndInTheRoom) {
       }
       for (size_t j = i + 1; core > 0 && j < stage.bodies.size(); ++j) {
         const double other = core_radius(stage.bodies[j].shape);
-        if (other > 0) {
+        const int object = stage.bodies[i].object;
+        const bool is_same_object = object >= 0 && object == stage.bodies[j].object;
+        if (other > 0 && !is_same_object) {
           EXPECT_GT(length(stage.bodies[j].pose.position - p), core + other) << i << " and " << j;
         }
       }
@@ -209,7 +236,9 @@ TEST_P(NamedScenes, BodiesKeepOutOfEachOtherAndInTheRoom) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, NamedScenes, testing::Values(SynthScene::balls, SynthScene::mirror));
+INSTANTIATE_TEST_SUITE_P(All, NamedScenes,
+                         testing::Values(SynthScene::balls, SynthScene::mirror, SynthScene::tumble,
+                                         SynthScene::soft));
 
 TEST(SynthSampler, EverySampleOfAPixelGetsAnotherPointAndTheyFillTheSquare) {
   constexpr uint32_t count = 64;

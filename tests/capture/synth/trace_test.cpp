@@ -161,7 +161,8 @@ TEST(SynthTrace, FacingMirrorsEnd) {
 }
 
 TEST(SynthTrace, NamedScenesSendBackNoMoreThanTheyReceive) {
-  for (const SynthScene name : {SynthScene::balls, SynthScene::mirror}) {
+  for (const SynthScene name :
+       {SynthScene::balls, SynthScene::mirror, SynthScene::tumble, SynthScene::soft}) {
     Stage stage = make_scene(name).at(0.3);
     for (Body& body : stage.bodies) body.material.emission = Vector(0);
     stage.light = -1;

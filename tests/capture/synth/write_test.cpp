@@ -84,6 +84,22 @@ TEST(SynthWrite, PicturesAreTheOnesInMemory) {
   }
 }
 
+TEST(SynthWrite, MotionIsTheOneInMemory) {
+  const TempFolder temp;
+  SynthOptions options = tiny_options();
+  options.scene = SynthScene::tumble;
+  write_synthetic_capture(options, temp / "capture");
+  const SynthMotion motion = synth_motion(options);
+  const Tensor<float> points = read_npy(temp / "capture/truth/motion/points.npy");
+  const Tensor<float> object = read_npy(temp / "capture/truth/motion/object.npy");
+  ASSERT_EQ(points.shape(), motion.points.shape());
+  ASSERT_EQ(points.dim(0), options.frames);
+  ASSERT_EQ(object.shape(), Shape({points.dim(1)}));
+  EXPECT_TRUE(std::ranges::equal(points.values(), motion.points.values()));
+  EXPECT_TRUE(std::ranges::equal(object.values(), motion.object.values()));
+  EXPECT_NE(bytes_of(temp / "capture/truth/motion/object.npy").find("<i4"), std::string::npos);
+}
+
 TEST(SynthWrite, CameraFileHoldsTheCamera) {
   const TempFolder temp;
   write_synthetic_capture(tiny_options(), temp / "capture");

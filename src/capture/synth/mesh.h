@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "capture/synth/ray.h"
+
+// A surface of triangles that was deformed: where a ray meets it, and which point of its matter that is.
+namespace traceflow::synth {
+
+struct MeshHit {
+  double distance = infinity;  // in units of the ray's direction
+  int triangle = -1;           // -1: no hit
+};
+
+class Mesh {
+ public:
+  // Three indices of vertices, counter-clockwise from outside.
+  using Triangle = std::array<int32_t, 3>;
+
+  // rest, deformed: the same vertices at rest and as they are now, metres, finite. A triangle whose vertices
+  // lie in one line is never hit.
+  Mesh(std::vector<Triangle> triangles, std::vector<Vector> rest, std::vector<Vector> deformed);
+
+  // First triangle that the ray meets beyond `nearest`, from either side; triangles include their borders.
+  MeshHit hit(const Ray& ray, double nearest = 0) const;
+  // The triangle's own unit normal, outward: flat, so that it is exactly the normal of the depth.
+  Vector normal(int triangle) const;
+  // A point of a triangle, from the deformed surface to the one at rest and back: it keeps its barycentric
+  // coordinates.
+  Vector at_rest(int triangle, const Vector& deformed_point) const;
+  Vector deformed(int triangle, const Vector& rest_point) const;
+  // Radius of the sphere around the origin that holds the deformed surface.
+  double reach() const { return reach_; }
+
+ private:
+  // A box around the triangles order_[first … first + count); a box with count 0 holds the next node and
+  // node `first` instead.
+  struct Node {
+    Vector low;
+    Vector high;
+    int32_t first;
+    int32_t count;
+  };
+  using Corners = std::array<Vector, 3>;
+
+  Corners corners(const std::vector<Vector>& vertices, int triangle) const;
+  void build(int32_t first, int32_t last, const std::vector<Vector>& centres);
+
+  std::vector<Triangle> triangles_;
+  std::vector<Vector> rest_;
+  std::vector<Vector> deformed_;
+  std::vector<int32_t> order_;
+  std::vector<Node> nodes_;
+  double reach_ = 0;
+};
+
+}  // namespace traceflow::synth
