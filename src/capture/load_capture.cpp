@@ -87,9 +87,13 @@ class Assembly {
     if (found_.train.empty()) {
       const auto missing = std::find_if(capture_.warnings.begin(), capture_.warnings.end(),
                                         [](const Finding& f) { return f.kind.starts_with("missing-"); });
+      if (missing == capture_.warnings.end()) {
+        throw InputError(capture_.folder.string(), "training views",
+                         "none, and " + std::to_string(found_.test.size()) + " test views", "at least one",
+                         "--test-every 0 trains on all views where the capture does not split them");
+      }
       throw InputError(capture_.folder.string(), "training views", "none that is whole",
-                       "an image, a camera and a time each",
-                       missing == capture_.warnings.end() ? "" : "see what is missing: " + missing->text);
+                       "an image, a camera and a time each", "see what is missing: " + missing->text);
     }
     stretch_times();
     capture_.train = make_split(found_.train);
@@ -259,13 +263,9 @@ class Assembly {
     const int64_t step = std::max<int64_t>(1, capture_.points.dim(0) / 1000);
     int64_t seen = 0, count = 0;
     for (int64_t i = 0; i < capture_.points.dim(0); i += step, ++count) {
-      seen += std::any_of(capture_.train.begin(), capture_.train.end(), [&](const View& view) {
-        const Vec3<float> x = view.camera.point_in_camera(load3<float>(capture_.points.row(i)));
-        if (!(x.z > 0)) return false;
-        const Vec2<float> at = view.camera.project(x);
-        return at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(view.camera.width) &&
-               at.y < static_cast<float>(view.camera.height);
-      });
+      const Vec3<float> point = load3<float>(capture_.points.row(i));
+      seen += std::any_of(capture_.train.begin(), capture_.train.end(),
+                          [&](const View& view) { return view.camera.sees(point); });
     }
     return static_cast<double>(seen) / static_cast<double>(count);
   }

@@ -28,6 +28,34 @@ std::string common_folder(const std::map<std::string, ZipMember>& members) {
   return all ? folder : "";
 }
 
+// Where a link leads that leads nowhere: what it names is not there, or is the link itself.
+enum class DeadEnd { none, missing, loop };
+
+// none for all else, also for what cannot be looked at.
+DeadEnd dead_end(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_symlink(path, error)) return DeadEnd::none;
+  const fs::file_status target = fs::status(path, error);
+  if (error == std::errc::too_many_symbolic_link_levels) return DeadEnd::loop;
+  return target.type() == fs::file_type::not_found ? DeadEnd::missing : DeadEnd::none;
+}
+
+// The first link on the way to a file of a folder that leads nowhere, in words, if there is one.
+std::optional<std::string> link_to_nowhere(const fs::path& folder, const std::string& inside) {
+  fs::path at;
+  for (const fs::path& part : fs::path(inside)) {
+    at /= part;
+    std::error_code error;
+    if (!fs::exists(fs::symlink_status(folder / at, error))) return std::nullopt;
+    const DeadEnd end = dead_end(folder / at);
+    if (end == DeadEnd::none) continue;
+    const fs::path target = fs::read_symlink(folder / at, error);
+    return "the link " + at.generic_string() + " to " + target.string() +
+           (end == DeadEnd::loop ? ", which leads back to itself" : ", which is not there");
+  }
+  return std::nullopt;
+}
+
 // What a Mac adds to an archive that it makes.
 bool is_clutter(const std::string& path) { return path.starts_with("__MACOSX/") || path == ".DS_Store"; }
 
@@ -52,7 +80,11 @@ std::shared_ptr<const FileTree> FileTree::open(const fs::path& path) {
   } else if (fs::is_regular_file(path, error)) {
     tree->read_archive();
   } else {
-    throw InputError(path.string(), "", error && fs::exists(path) ? error.message() : "nothing",
+    const std::optional<std::string> link = link_to_nowhere("", path.string());
+    throw InputError(path.string(), "",
+                     link                        ? *link
+                     : error && fs::exists(path) ? error.message()
+                                                 : "nothing",
                      "a folder or a zip archive");
   }
   return tree;
@@ -77,12 +109,18 @@ void FileTree::read_archive() {
   for (auto& [name, member] : members) members_.emplace(name.substr(top), std::move(member));
 }
 
+template <class F>
+bool FileTree::has_entry(const std::string& inside, F&& is_wanted) const {
+  std::error_code error;
+  const fs::file_status status = fs::status(canonical_ / inside, error);
+  return is_wanted(status) || (!fs::exists(status) && link_to_nowhere(canonical_, inside).has_value());
+}
+
 bool FileTree::has(const std::string& file) const {
   const std::optional<std::string> inside = path_in_tree(file);
   if (!inside) return false;
   if (archive_) return members_.contains(*inside);
-  std::error_code error;
-  return fs::is_regular_file(path_ / *inside, error);
+  return has_entry(*inside, [](const fs::file_status& status) { return fs::is_regular_file(status); });
 }
 
 bool FileTree::has_folder(const std::string& folder) const {
@@ -92,9 +130,7 @@ bool FileTree::has_folder(const std::string& folder) const {
     const auto next = members_.lower_bound(with_slash(*inside));
     return next != members_.end() && next->first.starts_with(with_slash(*inside));
   }
-  std::error_code error;
-  const fs::path target = follow(*inside, error);
-  return lies_inside(target) && fs::is_directory(target, error);
+  return has_entry(*inside, [](const fs::file_status& status) { return fs::is_directory(status); });
 }
 
 std::vector<std::string> FileTree::names_in(const std::string& folder, bool folders) const {
@@ -111,14 +147,12 @@ std::vector<std::string> FileTree::names_in(const std::string& folder, bool fold
     }
   } else {
     std::error_code error;
-    const fs::path target = follow(*inside, error);
-    if (!lies_inside(target)) return {};
-    for (const fs::directory_entry& entry : fs::directory_iterator(target, error)) {
+    for (const fs::directory_entry& entry : fs::directory_iterator(canonical_ / *inside, error)) {
       std::error_code unreadable;
-      const bool matches = folders ? entry.is_directory(unreadable) : entry.is_regular_file(unreadable);
-      const bool leads_out = matches && folders && entry.is_symlink(unreadable) &&
-                             !lies_inside(fs::canonical(entry.path(), unreadable));
-      if (matches && !leads_out) names.insert(entry.path().filename().string());
+      const fs::file_status status = entry.status(unreadable);
+      const bool matches = folders ? fs::is_directory(status) : fs::is_regular_file(status);
+      if (matches || (!fs::exists(status) && dead_end(entry.path()) != DeadEnd::none))
+        names.insert(entry.path().filename().string());
     }
   }
   return {names.begin(), names.end()};
@@ -141,30 +175,11 @@ InputFile FileTree::open_file(const std::string& file) const {
     if (member.deflated) return inflate_to_scratch(*archive_, member).renamed(name_of(*inside));
     return archive_->part(member.offset, member.size, name_of(*inside));
   }
-  std::error_code error;
-  const fs::path target = follow(*inside, error);
-  if (error) throw InputError(name_of(*inside), "", error.message(), "a readable file");
-  if (!lies_inside(target)) {
-    throw InputError(name_of(*inside), "", "a link out of the folder, to " + target.string(),
-                     "files inside it", "copy the file there");
+  if (const auto link = link_to_nowhere(canonical_, *inside)) {
+    throw InputError(name_of(*inside), "", *link, "a readable file",
+                     "make the link again, or put the files themselves there");
   }
-  return InputFile::below(canonical_, target.lexically_relative(canonical_), name_of(*inside));
-}
-
-fs::path FileTree::follow(const std::string& inside, std::error_code& error) const {
-  fs::path at = canonical_;
-  for (const fs::path& part : fs::path(inside)) {
-    at /= part;
-    if (fs::is_symlink(at, error)) return fs::canonical(canonical_ / inside, error);
-  }
-  // What is not there says so when it is opened.
-  error.clear();
-  return at;
-}
-
-bool FileTree::lies_inside(const fs::path& target) const {
-  return std::mismatch(canonical_.begin(), canonical_.end(), target.begin(), target.end()).first ==
-         canonical_.end();
+  return {canonical_ / *inside, name_of(*inside)};
 }
 
 }  // namespace traceflow

@@ -14,9 +14,10 @@
 namespace traceflow {
 
 // A folder that is only read, or a zip archive of one, its files named by paths from its top: "rgb/1x/a.png".
-// No path leads out: neither "..", nor an absolute one, nor a link. What lies behind a link that leads out
-// is not listed, and a file there that is asked for by its name is refused when it is opened, rather than
-// passed over. Safe to use from several threads.
+// No path leads out by its letters: neither ".." nor an absolute one. Links in a folder are followed wherever
+// they lead, since people link their images; an archive has none. A link that leads nowhere counts as
+// what is asked for, so that whoever needs it is told where it leads when it is opened. Safe to use from
+// several threads.
 class FileTree {
  public:
   // Where all of an archive lies in one folder, that folder is the top. Throws InputError for what is neither
@@ -25,16 +26,14 @@ class FileTree {
 
   // Of the folder or archive, as it was given.
   const std::filesystem::path& path() const { return path_; }
-  // Whether there is such a regular file, perhaps by a link that leads out. False for paths that lead out by
-  // their letters.
+  // Whether there is such a regular file. False for paths that lead out.
   bool has(const std::string& file) const;
-  // Whether there is such a folder. False for one that a link leads out to.
   bool has_folder(const std::string& folder) const;
-  // Names of what lies in a folder ("" is the top), sorted; empty where has_folder says that there is none. A
-  // file that is a link out is among them: its name lies inside.
+  // Names of what lies in a folder ("" is the top), sorted; empty where there is no such folder. A link that
+  // leads nowhere is among both.
   std::vector<std::string> files_in(const std::string& folder) const;
   std::vector<std::string> folders_in(const std::string& folder) const;
-  // Throws InputError where there is no such file, or where a link leads out of the folder.
+  // Throws InputError where there is no such file.
   InputFile open_file(const std::string& file) const;
   // How errors call it.
   std::string name_of(const std::string& file) const { return (path_ / file).string(); }
@@ -43,11 +42,9 @@ class FileTree {
   explicit FileTree(std::filesystem::path path) : path_(std::move(path)) {}
   void read_archive();
   std::vector<std::string> names_in(const std::string& folder, bool folders) const;
-  // Where a path of a folder leads when its links are followed, perhaps out of it; empty, with the error,
-  // where they lead to nothing. Without a link that is the path itself, and nothing above the folder is
-  // looked at.
-  std::filesystem::path follow(const std::string& inside, std::error_code& error) const;
-  bool lies_inside(const std::filesystem::path& target) const;
+  // Whether there is what `is_wanted` of its status says, or a link on the way there that leads nowhere.
+  template <class F>
+  bool has_entry(const std::string& inside, F&& is_wanted) const;
 
   std::filesystem::path path_;
   std::filesystem::path canonical_;  // of a folder

@@ -10,7 +10,6 @@
 #include <system_error>
 #include <utility>
 
-#include "base/descriptor.h"
 #include "base/error.h"
 
 namespace traceflow {
@@ -23,24 +22,12 @@ std::string reason() { return std::generic_category().message(errno); }
 // Without waiting for somebody to write, should it be a pipe.
 constexpr int to_read = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
 
-int open_below(const std::filesystem::path& folder, const std::filesystem::path& file) {
-  constexpr int to_pass = O_PATH | O_DIRECTORY | O_CLOEXEC;
-  Descriptor at(::open(folder.c_str(), to_pass));
-  for (const std::filesystem::path& part : file.parent_path()) {
-    if (!at) return -1;
-    at = Descriptor(::openat(at.number(), part.c_str(), to_pass | O_NOFOLLOW));
-  }
-  return at ? ::openat(at.number(), file.filename().c_str(), to_read | O_NOFOLLOW) : -1;
-}
-
 }  // namespace
 
-InputFile::InputFile(const std::filesystem::path& path) : InputFile(path, ::open(path.c_str(), to_read)) {}
+InputFile::InputFile(const std::filesystem::path& path) : InputFile(path, path) {}
 
-InputFile InputFile::below(const std::filesystem::path& folder, const std::filesystem::path& file,
-                           std::filesystem::path name) {
-  return {std::move(name), open_below(folder, file)};
-}
+InputFile::InputFile(const std::filesystem::path& path, std::filesystem::path name)
+    : InputFile(std::move(name), ::open(path.c_str(), to_read)) {}
 
 InputFile::InputFile(std::filesystem::path path, int descriptor)
     : path_(std::move(path)), descriptor_(descriptor) {

@@ -22,10 +22,8 @@ class UnreadableFile : public InputError {
 class InputFile {
  public:
   explicit InputFile(const std::filesystem::path& path);
-  // The file of a folder at a path that has no links: one that was put there since is not followed. Errors
-  // call it `name`.
-  static InputFile below(const std::filesystem::path& folder, const std::filesystem::path& file,
-                         std::filesystem::path name);
+  // The file at `path`, which errors call `name`.
+  InputFile(const std::filesystem::path& path, std::filesystem::path name);
   // A nameless file in the machine's temporary folder, gone when closed; errors name `origin`.
   static InputFile scratch(const std::filesystem::path& origin);
   // `size` bytes of this file from `offset`, which it must have, as a file of their own called `name`.

@@ -8,13 +8,7 @@ namespace traceflow {
 namespace {
 
 int64_t views_that_see(const std::vector<View>& views, const Vec3<float>& point) {
-  return std::count_if(views.begin(), views.end(), [&](const View& view) {
-    const Vec3<float> x = view.camera.point_in_camera(point);
-    if (!(x.z > 0)) return false;
-    const Vec2<float> at = view.camera.project(x);
-    return at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(view.camera.width) &&
-           at.y < static_cast<float>(view.camera.height);
-  });
+  return std::count_if(views.begin(), views.end(), [&](const View& view) { return view.camera.sees(point); });
 }
 
 Vec3<float> point_before_some_camera(const std::vector<View>& views, float extent, Random& random) {

@@ -102,5 +102,33 @@ TEST(Archive, OfDyCheckIsReadAsItsFolder) {
   expect_archive_is_the_folder(fake, "dycheck", 3, 3);
 }
 
+// People keep their photographs elsewhere.
+TEST(Links, OfImageFoldersAndFilesAreReadAsWhatTheyLeadTo) {
+  namespace fs = std::filesystem;
+  NerfDsCapture nerf_ds;
+  for (const auto& [id, camera] : nerf_ds.cameras)
+    nerf_ds.write_image("mask/1x/" + id + ".png.png", nerf_ds.image(3));
+  nerf_ds.save();
+  ColmapCapture colmap;
+  colmap.save();
+  NgpCapture transforms;
+  transforms.save();
+  for (const FakeCapture* fake : {static_cast<FakeCapture*>(&nerf_ds), static_cast<FakeCapture*>(&colmap),
+                                  static_cast<FakeCapture*>(&transforms)}) {
+    const Capture own = load_capture(fake->path(), {});
+    const TempFolder elsewhere;
+    fs::create_directory(elsewhere / "linked");
+    for (const fs::directory_entry& entry : fs::directory_iterator(fake->path()))
+      fs::create_symlink(entry.path(), elsewhere / "linked" / entry.path().filename());
+    const Capture linked = load_capture(elsewhere / "linked", {});
+    EXPECT_EQ(own.format, linked.format);
+    EXPECT_EQ(own.has_masks, linked.has_masks);
+    expect_same_views(own, own.train, linked, linked.train);
+    expect_same_views(own, own.test, linked, linked.test);
+    expect_same(own.points, linked.points, "points");
+    EXPECT_EQ(own.warnings.size(), linked.warnings.size());
+  }
+}
+
 }  // namespace
 }  // namespace traceflow

@@ -62,6 +62,37 @@ TEST(DyCheckCapture, transparent_pixels_are_not_known) {
   EXPECT_EQ(all->colour(2, 5, 0), 1);
 }
 
+TEST(NoTrainingViews, is_said_with_the_field_that_should_name_them) {
+  NerfDsCapture nerf_ds;
+  nerf_ds.dataset["train_ids"] = Json::array();
+  nerf_ds.save();
+  EXPECT_EQ(refusal(nerf_ds.path()),
+            (nerf_ds.path() / "dataset.json").string() +
+                ": train_ids: found an empty list, expected the ids of the views to train on; list them, or "
+                "take train_ids and val_ids away, and ids is split");
+  nerf_ds.dataset.erase("train_ids");
+  nerf_ds.dataset.erase("val_ids");
+  nerf_ds.save();
+  EXPECT_EQ(load_capture(nerf_ds.path(), {}).format, "hypernerf-interp");
+
+  FakeCapture dycheck;
+  dycheck.scene = nerf_ds.scene;
+  dycheck.add_view("0_00000", 0, 0, false);
+  dycheck.write_text("splits/train.json", R"({"frame_names": [], "time_ids": []})");
+  dycheck.save();
+  EXPECT_EQ(refusal(dycheck.path()),
+            (dycheck.path() / "splits/train.json").string() +
+                ": frame_names: found an empty list, expected the frames to train on; list them");
+
+  // The first of every eight tests.
+  ColmapCapture colmap(1);
+  colmap.save();
+  EXPECT_EQ(refusal(colmap.path()),
+            colmap.path().string() +
+                ": training views: found none, and 1 test views, expected at least one; --test-every 0 "
+                "trains on all views where the capture does not split them");
+}
+
 TEST(DyCheckCapture, splits_give_views_and_times) {
   FakeCapture fake;
   fake.scene = {{"scale", 0.5}, {"center", {0.0, 0.0, 1.0}}, {"near", 0.1}, {"far", 2.0}};

@@ -405,7 +405,7 @@ TEST(NgpCaptureHostile, each_is_refused_by_name) {
   const std::pair<std::function<void(Json&)>, const char*> cases[] = {
       {[](Json& j) { j.erase("frames"); }, "transforms.json: frames: found nothing"},
       {[](Json& j) { j["frames"] = 3; }, "transforms.json: frames: found 3, expected a list"},
-      {[](Json& j) { j["frames"] = Json::array(); }, "transforms.json: frames: found none of 0 images"},
+      {[](Json& j) { j["frames"] = Json::array(); }, "transforms.json: frames: found an empty list"},
       {[](Json& j) { j["frames"][1].erase("file_path"); }, "frames[1].file_path: found nothing"},
       {[](Json& j) { j["frames"][1]["file_path"] = 7; }, "frames[1].file_path: found 7, expected a string"},
       {[](Json& j) { j["frames"][1].erase("transform_matrix"); },

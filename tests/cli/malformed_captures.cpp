@@ -29,6 +29,9 @@ MalformedKind malformed_json() {
         "capture/metadata.json: found [], expected an object"},
        {"no views", inspect_capture, put(dataset, "{}"),
         "capture/dataset.json: found no ids, expected train_ids and val_ids, or ids"},
+       {"no views to train on", inspect_capture, set(dataset, "/train_ids", Json::array()),
+        "capture/dataset.json: train_ids: found an empty list, expected the ids of the views to train on; "
+        "list them, or take train_ids and val_ids away, and ids is split"},
        {"ids that are no list", inspect_capture, set(dataset, "/train_ids", "all"),
         "capture/dataset.json: train_ids: found \"all\", expected a list"},
        {"an id that leads out of the folder", inspect_capture,
@@ -123,15 +126,22 @@ MalformedKind malformed_folders() {
         "cameras.json: found a file that is no zip archive, expected a whole zip archive, stored or "
         "deflated; pack or "
         "save it again"},
-       {"a link out of the capture", inspect_capture, remove("capture/points.npy"),
-        "capture/points.npy: found a link out of the folder, to rays.npy, expected files inside it; copy the "
-        "file there",
+       {"a link to what is not there", inspect_capture, remove("capture/points.npy"),
+        "capture/points.npy: found the link points.npy to ../disk/points.npy, which is not there, expected a "
+        "readable file; make the link again, or put the files themselves there",
         [](const fs::path& folder) {
-          fs::create_symlink(folder / "rays.npy", folder / "capture/points.npy");
+          fs::create_symlink("../disk/points.npy", folder / "capture/points.npy");
         }},
+       {"a link to a folder of images that is not there", inspect_capture,
+        [](Files& files) {
+          std::erase_if(files, [](const auto& file) { return file.first.starts_with("capture/rgb/"); });
+        },
+        "capture/rgb/1x/a.png: found the link rgb to ../disk/rgb, which is not there, expected a readable "
+        "file; make the link again, or put the files themselves there",
+        [](const fs::path& folder) { fs::create_symlink("../disk/rgb", folder / "capture/rgb"); }},
        {"a link to itself", inspect_capture, remove(dataset),
-        "capture: dataset.json: found no such file, expected a capture in the NeRF-DS, Nerfies or HyperNeRF "
-        "layout; see docs/captures.md",
+        "capture/dataset.json: found the link dataset.json to dataset.json, which leads back to itself, "
+        "expected a readable file; make the link again, or put the files themselves there",
         [](const fs::path& folder) { fs::create_symlink("dataset.json", folder / dataset); }},
        {"a folder in the place of a file", inspect_capture, remove(dataset),
         "capture: dataset.json: found no such file, expected a capture in the NeRF-DS, Nerfies or HyperNeRF "

@@ -62,6 +62,9 @@ MalformedKind malformed_colmap() {
           files[images + ".txt"] = "1 1 0 0 0 0 0 1 1 a\x1b[2J.png\n";
         },
         "colmap/sparse/0/images.txt: image names: found \"a?[2J.png\", expected names that can name a file"},
+       {"a model without images", inspect_colmap, put(images + ".txt", "# no image\n"),
+        "colmap/sparse/0/images.txt: found no images, expected those that COLMAP registered; run COLMAP's "
+        "mapper again, or copy the whole model"},
        {"no image of the model there", inspect_colmap,
         put(images + ".txt", "1 1 0 0 0 0 0 1 1 ../../passwd\n"),
         "colmap: images: found none of the 1 photographs that sparse/0/images.txt names, expected them in "
@@ -92,6 +95,16 @@ MalformedKind malformed_transforms() {
       "transforms.json",
       {{"no frames", inspect_transforms, unset(transforms, "/frames"),
         "transforms/transforms.json: frames: found nothing, expected a value"},
+       {"an empty list of frames", inspect_transforms, set(transforms, "/frames", nlohmann::json::array()),
+        "transforms/transforms.json: frames: found an empty list, expected the frames to train on; list "
+        "them"},
+       {"no frame to train on", inspect_transforms,
+        [](Files& files) {
+          set(transforms, "/train_filenames", nlohmann::json::array())(files);
+          set(transforms, "/test_filenames", nlohmann::json::array({"a.png"}))(files);
+        },
+        "transforms/transforms.json: train_filenames: found an empty list, expected the file_path of the "
+        "frames to train on; list them, or take train_filenames, test_filenames and val_filenames away"},
        {"a frame without a file", inspect_transforms, unset(transforms, frame + "/file_path"),
         "transforms/transforms.json: frames[0].file_path: found nothing, expected a value"},
        {"a frame without a pose", inspect_transforms, unset(transforms, frame + "/transform_matrix"),

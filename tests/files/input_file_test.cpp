@@ -48,22 +48,13 @@ TEST(InputFile, AScratchFileIsNotHandedOnToOtherPrograms) {
   EXPECT_EQ(scratch.size(), 5);
 }
 
-// As one that comes between the look at a path and the opening would have to be.
-TEST(InputFileHostile, BelowAFolderNoLinkIsFollowed) {
-  namespace fs = std::filesystem;
+TEST(InputFile, ErrorsCallItByTheNameThatItWasGiven) {
   const TempFolder folder;
-  fs::create_directories(folder / "tree/sub");
-  fs::create_directory(folder / "room");
-  for (const char* name : {"tree/sub/a", "room/a"}) std::ofstream(folder / name) << "text";
-  fs::create_symlink(folder / "room/a", folder / "tree/sub/link");
-  fs::create_directory_symlink(folder / "room", folder / "tree/other");
-  fs::create_directory_symlink("tree", folder / "alias");
-  const InputFile file = InputFile::below(folder / "alias", "sub/a", "name");
+  std::ofstream(folder / "a") << "text";
+  const InputFile file(folder / "a", "name");
   EXPECT_EQ(file.size(), 4);
   EXPECT_EQ(file.path(), "name");
-  for (const char* path : {"sub/link", "other/a"})
-    EXPECT_THROW(InputFile::below(folder / "alias", path, "name"), UnreadableFile) << path;
-  EXPECT_EQ(refusal_of([&] { InputFile::below(folder / "alias", "none/a", "name"); }),
+  EXPECT_EQ(refusal_of([&] { InputFile(folder / "none", "name"); }),
             "name: found No such file or directory, expected a readable file");
 }
 

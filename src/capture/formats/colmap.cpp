@@ -81,6 +81,10 @@ class ColmapReader {
       root = std::find_if(image_folders.begin(), image_folders.end(),
                           [&](const char* folder) { return !stored_scales(is_stored_in(folder)).empty(); });
     }
+    if (names_.empty()) {
+      throw InputError(tree_->name_of(model_.images_file), "", "no images", "those that COLMAP registered",
+                       "run COLMAP's mapper again, or copy the whole model");
+    }
     if (root == image_folders.end()) {
       throw InputError(tree_->path().string(), "images",
                        "none of the " + std::to_string(names_.size()) + " photographs that " +

@@ -47,6 +47,10 @@ NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<Finding>& wa
   layout.transparent_is_unknown = true;
   std::set<std::string> seen;
   layout.train_ids = read_split(tree, train_split, layout, seen);
+  if (layout.train_ids.empty()) {
+    const JsonFile split(tree.open_file(train_split));
+    split["frame_names"].fail("an empty list", "the frames to train on", "list them");
+  }
   if (tree.has(test_split)) {
     layout.test_ids = read_split(tree, test_split, layout, seen);
   } else {

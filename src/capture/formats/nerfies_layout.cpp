@@ -53,6 +53,13 @@ void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
   if (layout.all_ids.empty() && layout.train_ids.empty()) {
     dataset.fail("no ids", "train_ids and val_ids, or ids");
   }
+  // Else the views that test would be trained on.
+  if (layout.train_ids.empty() && dataset.has("train_ids")) {
+    dataset["train_ids"].fail("an empty list", "the ids of the views to train on",
+                              layout.all_ids.empty()
+                                  ? "list them"
+                                  : "list them, or take train_ids and val_ids away, and ids is split");
+  }
   if (layout.train_ids.empty() || layout.test_ids.empty()) {
     layout.format = "hypernerf-interp";
     split_for_interpolation(layout);

@@ -99,7 +99,9 @@ class TransformsReader {
     found_.background = Background::white;
     found_.format = "nerf-synthetic";
     origin_ = train_file;
-    take_split(file_called(train_file), false);
+    TransformsFile train = file_called(train_file);
+    refuse_no_frames(train);
+    take_split(std::move(train), false);
     const char* other = tree_->has(test_file) ? test_file : tree_->has(val_file) ? val_file : nullptr;
     if (other == nullptr) {
       warn("transforms_test.json is missing: there is nothing to evaluate on", "no-test", Severity::notice);
@@ -111,11 +113,23 @@ class TransformsReader {
   void read_whole_file() {
     origin_ = whole_file;
     TransformsFile file = file_called(whole_file);
+    refuse_no_frames(file);
     found_.format = file.is_nerfstudio ? "nerfstudio" : "instant-ngp";
     std::stable_sort(file.frames.begin(), file.frames.end(),
                      [](const auto& a, const auto& b) { return natural_less(a.path, b.path); });
     const std::set<std::string> train(file.train.begin(), file.train.end()),
         test(file.test.begin(), file.test.end());
+    const bool trains = std::any_of(file.frames.begin(), file.frames.end(),
+                                    [&](const auto& f) { return train.contains(f.path); });
+    if (!trains && !(train.empty() && test.empty())) {
+      const JsonFile& json = *file.json;
+      constexpr const char* expected = "the file_path of the frames to train on";
+      constexpr const char* remedy =
+          "list them, or take train_filenames, test_filenames and val_filenames away";
+      if (json.has("train_filenames"))
+        json["train_filenames"].fail(train.empty() ? "an empty list" : "no frame of the file", expected,
+                                     remedy);
+    }
     if (!train.empty()) {
       const auto in_no_split = std::stable_partition(
           file.frames.begin(), file.frames.end(),
@@ -130,6 +144,11 @@ class TransformsReader {
       for (TransformsFrame& frame : file.frames) frame.is_test = !train.contains(frame.path);
     }
     take(std::move(file));
+  }
+
+  static void refuse_no_frames(const TransformsFile& file) {
+    if (!file.frames.empty()) return;
+    (*file.json)["frames"].fail("an empty list", "the frames to train on", "list them");
   }
 
   void take_split(TransformsFile file, bool is_test) {
