@@ -17,6 +17,13 @@ cudaStream_t stream() {
 }
 
 void check(cudaError_t result, const char* what) {
+  // Also of what a library's kernel takes when it runs for the first time.
+  if (result == cudaErrorMemoryAllocation) {
+    cudaGetLastError();  // forgets it
+    size_t free = 0, total = 0;
+    cudaMemGetInfo(&free, &total);
+    throw memory::OutOfMemory(0, free);
+  }
   require(result == cudaSuccess, what, result == cudaSuccess ? "" : cudaGetErrorString(result));
 }
 
@@ -82,8 +89,7 @@ void* allocate(size_t bytes) {
   if (result == cudaErrorMemoryAllocation && pool() != nullptr) {
     // What the pool holds in pieces that are too small goes back before the last try.
     cudaGetLastError();
-    synchronise();
-    check(cudaMemPoolTrimTo(pool(), 0), "a pool of memory on the CUDA device");
+    trim_pool();
     result = take(&memory, bytes);
   }
   if (result == cudaErrorMemoryAllocation) {
@@ -112,6 +118,11 @@ void copy(Device to_device, void* to, Device from_device, const void* from, size
 
 void zero(void* memory, size_t bytes) {
   check(cudaMemsetAsync(memory, 0, bytes, stream()), "zeros on the CUDA device");
+}
+
+void trim_pool() {
+  synchronise();
+  if (pool() != nullptr) check(cudaMemPoolTrimTo(pool(), 0), "a pool of memory on the CUDA device");
 }
 
 void synchronise() { check(cudaStreamSynchronize(stream()), "work on the CUDA device"); }

@@ -37,8 +37,9 @@ Account account;
 }  // namespace
 
 OutOfMemory::OutOfMemory(size_t wanted, size_t available)
-    : text_("out of device memory: " + std::to_string(wanted >> 20) + " MiB wanted, " +
-            std::to_string(available >> 20) + " MiB free") {}
+    : text_("out of device memory: " +
+            (wanted > 0 ? std::to_string(wanted >> 20) + " MiB wanted" : "the driver found none for itself") +
+            ", " + std::to_string(available >> 20) + " MiB free") {}
 
 void* allocate(Device device, size_t bytes) {
   if (device == Device::cpu) return ::operator new(bytes, alignment);

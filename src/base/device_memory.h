@@ -11,7 +11,7 @@
 // the order in which it is called; what is read back has been waited for.
 namespace traceflow::memory {
 
-// A device that has no memory left: how much was asked for and how much is there.
+// A device that has no memory left: how much was asked for (0: the driver asked) and how much is there.
 class OutOfMemory : public std::bad_alloc {
  public:
   OutOfMemory(size_t wanted, size_t available);

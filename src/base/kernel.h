@@ -26,20 +26,37 @@ struct Grid {
   int threads;  // a block
 };
 
+// Gives the driver back what the pool holds and no tensor stands in. Waits for all work.
+void trim_pool();
+
+// Starts a kernel. start: tries to, and says whether the driver had memory for it, which it takes when it
+// loads a kernel's code or makes room for its stacks. As for a tensor, what the pool holds goes back before
+// the last try; then throws OutOfMemory.
+template <class Start>
+void start_kernel(const Start& start) {
+  if (start()) return;
+  trim_pool();
+  if (!start()) throw memory::OutOfMemory(0, facts().free_bytes);
+}
+
 #if defined(__CUDACC__)
 
 // The stream that all work is put on.
 cudaStream_t stream();
-// Throws InternalError where a call or a launch was refused.
+// Throws OutOfMemory where a call found no memory, InternalError where it was refused otherwise.
 void check(cudaError_t result, const char* what);
 
 template <class... Parameters, class... Arguments>
 void launch(const char* name, Grid grid, void (*kernel)(Parameters...), const Arguments&... arguments) {
   if (grid.blocks == 0) return;
   const profile::Scope scope(name);
-  kernel<<<static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads), 0, stream()>>>(
-      static_cast<Parameters>(arguments)...);
-  check(cudaGetLastError(), name);
+  start_kernel([&] {
+    kernel<<<static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads), 0, stream()>>>(
+        static_cast<Parameters>(arguments)...);
+    const cudaError_t result = cudaGetLastError();
+    if (result != cudaErrorMemoryAllocation) check(result, name);
+    return result == cudaSuccess;
+  });
   if (profile::is_on()) synchronise();
 }
 
@@ -49,8 +66,10 @@ template <class... Parameters, class... Arguments>
 void launch(const char* name, Grid grid, void (*kernel)(Parameters...), const Arguments&... arguments) {
   const profile::Scope scope(name);
   (emulation::require_no_host_tensors(name, arguments), ...);
-  emulation::launch(name, static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads),
-                    [&] { kernel(static_cast<Parameters>(arguments)...); });
+  start_kernel([&] {
+    return emulation::launch(name, static_cast<unsigned>(grid.blocks), static_cast<unsigned>(grid.threads),
+                             [&] { kernel(static_cast<Parameters>(arguments)...); });
+  });
 }
 
 #endif

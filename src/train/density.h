@@ -14,7 +14,7 @@ namespace traceflow {
 // How large a scene is, in its own units.
 struct SceneSize {
   float extent;  // of the cameras (method §7.6)
-  float cloud;   // radius of the points that the set began with
+  float cloud;   // radius of the capture's points
 };
 
 // What a set is held to at one density control.

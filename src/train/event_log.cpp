@@ -42,7 +42,9 @@ Json to_json(const events::Started& e) {
           {"surfels", to_json(e.surfels)},
           {"forecast_bytes", e.forecast_bytes},
           {"version", e.version},
-          {"machine", to_json(e.machine)}};
+          {"machine", to_json(e.machine)},
+          {"points", e.points},
+          {"points_in_view", e.points_in_view}};
 }
 
 Json to_json(const events::Step& e) {

@@ -40,6 +40,9 @@ struct Started {
   int64_t forecast_bytes = 0;  // memory that the run takes at most, by its shapes
   std::string version;         // of the program
   Machine machine;
+  // The capture's finite points, and those that some training view sees: main surfels started at these, or
+  // at random where there are none.
+  int64_t points = 0, points_in_view = 0;
 };
 
 // One iteration is done.

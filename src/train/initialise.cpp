@@ -232,22 +232,27 @@ float cloud_radius(const Tensor<float>& points) {
   return pick(values, (count - 1) * 9 / 10);
 }
 
-Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
+InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
   const int64_t limit = std::min(options.initial.max_points, options.density.max_surfels);
+  // What no photograph shows teaches a main surfel nothing, and a mirror may still show it.
   Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
-  if (points.dim(0) == 0) {
+  Tensor<float> seen =
+      points_in_view(points, capture.train, options.render.raster_options(capture.extent).near_plane);
+  InitialScene made{{}, points.dim(0), seen.dim(0)};
+  if (seen.dim(0) == 0) {
     constexpr int64_t random_points = 100000;
-    points = points_in_common_view(capture.train, capture.extent, std::min(limit, random_points), random);
+    seen = points_in_common_view(capture.train, capture.extent, std::min(limit, random_points), random);
+    points = seen;
   }
   if (points.dim(0) == 0) {
     throw InputError(capture.folder.string(), "points", "none, and no place that several views see",
                      "points to start from", "add points.npy (P×3, capture units)");
   }
-  Scene scene;
+  Scene& scene = made.scene;
   scene.specular = options.specular;
   scene.normalisation = capture.normalisation;
   scene.extent = capture.extent;
-  scene.main = surfels_at_points(thinned(points, limit, random), options.initial, random);
+  scene.main = surfels_at_points(thinned(seen, limit, random), options.initial, random);
   // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
   // mirrors grew into one before the camera, which can show any scene.
   const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks && !capture.masks_are_estimated;
@@ -279,7 +284,7 @@ Scene initial_scene(const Capture& capture, const TrainOptions& options, Random&
       scene.environment_map->field = make_field(options.deform.environment_network, 3, random);
     }
   }
-  return scene;
+  return made;
 }
 
 }  // namespace traceflow

@@ -7,10 +7,18 @@
 
 namespace traceflow {
 
-// The scene that training starts from (method §7.8): main surfels at the capture's points, or, where it has
-// none, at random ones in the views' common sight; environment surfels (or a map) around them, fields at
-// zero. No set starts larger than its max_surfels. Throws InputError when there is no such place either.
-Scene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
+// A scene and what of the capture it was made of.
+struct InitialScene {
+  Scene scene;
+  int64_t points = 0;          // of the capture, finite
+  int64_t points_in_view = 0;  // that some training view sees
+};
+
+// The scene that training starts from (method §7.8): main surfels at those of the capture's points that some
+// training view sees, or, where there are none, at random ones in the views' common sight; environment
+// surfels (or a map) around all of the points, fields at zero. No set starts larger than its max_surfels.
+// Throws InputError when there is no such place either.
+InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
 // Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);

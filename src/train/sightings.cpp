@@ -96,6 +96,27 @@ void fill_unseen(const Surfels& s, Sightings& sightings) {
 
 }  // namespace
 
+// In sides of the image.
+constexpr float view_margin = 0.1F;
+
+Tensor<float> points_in_view(const Tensor<float>& points, const std::vector<View>& views, float near_plane) {
+  std::vector<uint8_t> is_seen(static_cast<size_t>(points.dim(0)));
+  parallel_for("initialise: points in view", points.dim(0), [&](int64_t i) {
+    const Vec3<float> point = load3<float>(points.row(i));
+    is_seen[static_cast<size_t>(i)] = std::any_of(views.begin(), views.end(), [&](const View& view) {
+      const Camera<float>& camera = view.camera;
+      return camera.sees(point, near_plane,
+                         view_margin * static_cast<float>(std::max(camera.width, camera.height)));
+    });
+  });
+  Tensor<float> seen({std::count(is_seen.begin(), is_seen.end(), uint8_t{1}), 3});
+  int64_t taken = 0;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    if (is_seen[static_cast<size_t>(i)] != 0) std::copy_n(points.row(i), 3, seen.row(taken++));
+  }
+  return seen;
+}
+
 std::vector<Photograph> earliest_photographs(const Capture& capture) {
   std::vector<const View*> views;
   for (const View& view : capture.train) views.push_back(&view);

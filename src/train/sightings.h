@@ -19,6 +19,12 @@ struct Sightings {
   std::vector<uint8_t> any;  // 0 where nothing is known, which is only when no surfel is seen at all
 };
 
+// Those of the points (P×3, scene) that some view sees at whatever time, in their order: what falls into its
+// image, or beside it by at most a tenth of its longer side, and more than near_plane before its camera.
+// Nothing is asked of what stands before them. The margin is what a camera beside those of training sees more
+// than they: without it, its pictures end in holes.
+Tensor<float> points_in_view(const Tensor<float>& points, const std::vector<View>& views, float near_plane);
+
 // A training view with its pixels.
 struct Photograph {
   Camera<float> camera;

@@ -28,9 +28,6 @@ constexpr int bond_stride = 4;
 // (docs/results.md).
 constexpr float slower_fields = 0.25F;
 
-constexpr const char* when_there_is_room =
-    "; --resume goes on when there is room, or with a lower --memory-budget";
-
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -134,11 +131,11 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       random_(seeded(options.seed)),
       memory_(plan_memory({options_, device, largest_view(capture_)})),
       targets_(device, memory_.image_bytes),
-      scene_(scene_on(device, initial_scene(capture_, within(options, memory_.caps), random_))),
+      scene_(scene_on(device, begin(initial_scene(capture_, within(options, memory_.caps), random_)))),
       optimiser_(scene_),
       main_density_("main", options.density, scene_.main.count(), device),
       environment_density_("environment", options.environment_density, scene_.environment.count(), device),
-      cloud_radius_(cloud_radius(capture_.points)),
+      cloud_radius_(points_in_view_ > 0 ? cloud_radius(capture_.points) : cloud_radius({})),
       environment_radius_(half_diagonal(scene_.environment.position.on(Device::cpu))),
       views_(static_cast<int64_t>(capture_.train.size())),
       health_(options.non_finite, options.collapse_decibels),
@@ -147,6 +144,12 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       before_step_{random_, views_, -1} {
   density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
+}
+
+Scene Trainer::begin(InitialScene made) {
+  points_ = made.points;
+  points_in_view_ = made.points_in_view;
+  return std::move(made.scene);
 }
 
 FrameRequest Trainer::request_for(const View& view) {
@@ -207,8 +210,9 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
-  // Nothing has changed up to here, and nothing behind this asks for memory: an iteration that finds none
-  // before its end is as if it had not begun.
+  // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.
+  // Nothing behind this asks for memory, but the driver may, to start a kernel.
+  torn_ = true;
   optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
   if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
   if (trainable.environment && scene_.environment.count() > 0) {
@@ -216,6 +220,7 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   }
   parallel_for(device_, "train: follow the reach", 1,
                FollowReach{frame.reach.data(), scene_.main_reach.data()});
+  torn_ = false;
 }
 
 void Trainer::add_rigidity(const Frame& frame) {
@@ -302,8 +307,12 @@ void Trainer::tell_start() {
   stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations,
                                std::string(name_of(device_)), thread_count(),
                                static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes,
-                               version(), this_machine(device_)});
+                               version(), this_machine(device_), points_, points_in_view_});
   for (const Finding& found : capture_.warnings) warn(found.text);
+  if (iteration_ == 0 && points_ > 0 && points_in_view_ == 0) {
+    warn("no training view sees any of the " + std::to_string(points_) +
+         " points: surfels start at random; are the points in the capture's own coordinates?");
+  }
   if (memory_.caps.lowered) {
     warn("the memory budget holds " + std::to_string(memory_.caps.main) + " main and " +
          std::to_string(memory_.caps.environment) + " environment surfels at most");
@@ -344,6 +353,15 @@ std::string Trainer::against_collapse() const {
          " --set rates.field_end=" + number_text(slower_fields * rates.field_end);
 }
 
+std::string Trainer::when_there_is_room() const {
+  if (!torn_) return "; --resume goes on when there is room, or with a lower --memory-budget";
+  const std::string lost = ", in the middle of a change that is not saved; ";
+  return lost + (standing_ == Standing::none
+                     ? "begin again when there is room, or with a lower --memory-budget"
+                     : "--resume goes on from the checkpoint before when there is room, or with a lower "
+                       "--memory-budget");
+}
+
 Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
   try {
     tell_start();
@@ -354,9 +372,9 @@ Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
         save_on_the_way();
     }
   } catch (const memory::OutOfMemory& error) {
-    return {events::Ending::out_of_memory, std::string(error.what()) + when_there_is_room};
+    return {events::Ending::out_of_memory, error.what() + when_there_is_room()};
   } catch (const std::bad_alloc&) {
-    return {events::Ending::out_of_memory, std::string("out of memory") + when_there_is_room};
+    return {events::Ending::out_of_memory, "out of memory" + when_there_is_room()};
   } catch (const NotSaved&) {
     throw;
   } catch (const InputError& error) {
@@ -369,6 +387,7 @@ Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
 events::Finished Trainer::run(const std::atomic<bool>& stop) {
   const End end = iterate(stop);
   if (end.ending == events::Ending::out_of_memory || end.ending == events::Ending::no_input) step_back();
+  if (torn_) return finish(end.ending, end.reason);
   // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
   // still good.
   if (end.ending != events::Ending::diverged || health_.sound() || standing_ == Standing::none)

@@ -13,6 +13,7 @@
 #include "train/density.h"
 #include "train/events.h"
 #include "train/health.h"
+#include "train/initialise.h"
 #include "train/memory.h"
 #include "train/objective.h"
 #include "train/optimiser.h"
@@ -52,9 +53,9 @@ class Trainer {
   void resume();
 
   // Trains to the last iteration, until `stop` is set, until memory runs out or until a photograph can no
-  // longer be read; saves in every case. A save on the way that the disk refuses is a warning, and tried
-  // again at the next; throws InputError when the first or the last one is
-  // refused.
+  // longer be read; saves in every case but one: where the driver has no memory to start a kernel amid a
+  // change of the scene, the checkpoint before stands. A save on the way that the disk refuses is a warning,
+  // and tried again at the next; throws InputError when the first or the last one is refused.
   events::Finished run(const std::atomic<bool>& stop);
 
   // One iteration of the loop, without saving; returns the loss.
@@ -73,6 +74,8 @@ class Trainer {
   int iteration() const { return iteration_; }
 
  private:
+  // Takes over what is told of the scene that the run starts from.
+  Scene begin(InitialScene made);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();
   FrameRequest request_for(const View& view);
@@ -95,6 +98,8 @@ class Trainer {
   End iterate(const std::atomic<bool>& stop);
   // One of them, with what is told of it; what is wrong with its numbers, or nothing.
   std::string tell_iteration();
+  // What to do about memory that ran out.
+  std::string when_there_is_room() const;
   // What to try where the fields made the scene fly apart.
   std::string against_collapse() const;
   // Throw NotSaved where save() fails, the second only where no checkpoint stands.
@@ -126,6 +131,7 @@ class Trainer {
   Random random_;
   MemoryPlan memory_;
   Targets targets_;
+  int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
@@ -144,6 +150,8 @@ class Trainer {
   StepMeter meter_;
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
   Draws before_step_;
+  // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
+  bool torn_ = false;
   std::atomic<bool> stop_soon_{false};
   int iteration_ = 0;   // done so far
   double seconds_ = 0;  // of steps and saves, earlier sessions included; listeners may take their time

@@ -95,6 +95,34 @@ TEST(Progress, RedrawsOneLineOnATerminalAndClearsItForOthers) {
   EXPECT_THAT(out.str(), testing::EndsWith("\nphase specular from iteration 4\n"));
 }
 
+TEST(Progress, TellsWhichPointsMainSurfelsStartAt) {
+  events::Started start{"plate", "runs/plate", 0, 1000, "cpu", 2, 1, {500, 0}, 5 << 20, "1.0", {}, 900, 600};
+  std::ostringstream some, all, resumed;
+  Progress(some, 0)(start);
+  EXPECT_THAT(some.str(),
+              HasSubstr("\nmain surfels start at the 600 of 900 points that training views see\n"));
+  start.points_in_view = 900;
+  Progress(all, 0)(start);
+  start.points_in_view = 600;
+  start.iteration = 100;
+  Progress(resumed, 0)(start);
+  EXPECT_EQ(lines_in(all.str()), 1);
+  EXPECT_EQ(lines_in(resumed.str()), 1);
+}
+
+TEST(Progress, OfAQuietRunWarningsAloneAreShown) {
+  std::ostringstream out;
+  const events::Listener quiet = warnings_alone(out);
+  quiet(events::Started{"plate", "runs/plate", 0, 1000, "cpu", 2, 1, {500, 0}, 5 << 20, "1.0", {}});
+  quiet(events::Warning{0, "masks are missing"});
+  quiet(events::PhaseEntered{0, "diffuse"});
+  for (int64_t i = 1; i <= 1000; ++i) quiet(step_at(i, 0.1 * static_cast<double>(i)));
+  quiet(events::Warning{1000, "iteration 1000 is not saved"});
+  quiet(events::Saved{1000, "runs/plate/state.safetensors", 0.1});
+  quiet(events::Finished{events::Ending::completed, 1000, 61, 12.25, {500, 40}, ""});
+  EXPECT_EQ(out.str(), "warning: masks are missing\nwarning: iteration 1000 is not saved\n");
+}
+
 TEST(Progress, TellsHowARunBeginsAndEnds) {
   std::ostringstream out;
   Progress progress(out, 0);

@@ -88,6 +88,9 @@ class Region {
   int depth_ = 0;
 };
 
+// Kernels come from one thread, as on a device all are put on one stream.
+int64_t started = 0, refuse_from = 0, refusals_left = 0, trimmed = 0;
+
 Region& region() {
   static Region* const the_region = new Region;  // outlives every static tensor
   return *the_region;
@@ -102,9 +105,22 @@ bool on_device(const void* address) { return region().holds(address); }
 size_t allocated_bytes() { return region().allocated(); }
 void limit_bytes(size_t limit) { region().limit(limit); }
 
-void launch(const char* kernel, unsigned blocks, unsigned threads, const std::function<void()>& thread) {
+int64_t launches() { return started; }
+void refuse_launches(int64_t after, int64_t times) {
+  refuse_from = started + after;
+  refusals_left = times;
+}
+int64_t trims() { return trimmed; }
+
+bool launch(const char* kernel, unsigned blocks, unsigned threads, const std::function<void()>& thread) {
+  if (refusals_left > 0 && started >= refuse_from) {
+    --refusals_left;
+    return false;
+  }
+  ++started;
   const DeviceAccess access;
   run_grid(kernel, {blocks, 1, 1}, {threads, 1, 1}, thread);
+  return true;
 }
 
 }  // namespace traceflow::emulation
@@ -126,5 +142,6 @@ void zero(void* memory, size_t bytes) {
   std::memset(memory, 0, bytes);
 }
 void synchronise() {}
+void trim_pool() { ++emulation::trimmed; }
 
 }  // namespace traceflow::cuda

@@ -29,8 +29,9 @@ struct ThreadState {
 const ThreadState& current();
 
 void run_grid(const char* kernel, Size3 grid, Size3 block, const std::function<void()>& thread);
-// The same on a line of blocks, with the device's memory open to it.
-void launch(const char* kernel, unsigned blocks, unsigned threads, const std::function<void()>& thread);
+// The same on a line of blocks, with the device's memory open to it. False, and nothing is run, where
+// refuse_launches says so.
+bool launch(const char* kernel, unsigned blocks, unsigned threads, const std::function<void()>& thread);
 
 void require_no_host_tensors(const char* kernel, const void* argument, size_t bytes);
 // Ends the program where a kernel's argument holds the address of a tensor on the host

@@ -78,7 +78,9 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
                         {100, 20},
                         5 << 20,
                         "1.2.3",
-                        {"chip", 4, 8192, "Linux", ""}});
+                        {"chip", 4, 8192, "Linux", ""},
+                        90,
+                        60});
     log(full);
     log(events::DensityChanged{8, "main", 1, 2, 3, 4, true, false, 96});
     log(events::PhaseEntered{9, "joint"});
@@ -93,7 +95,7 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   EXPECT_EQ(written[0], json::parse(R"({"event":"started","capture":"plate","run":"runs/plate","iteration":0,
       "iterations":10,"device":"cpu","threads":2,"seed":42,"surfels":{"main":100,"environment":20},
       "forecast_bytes":5242880,"version":"1.2.3","machine":{"processor":"chip","threads":4,"memory_bytes":8192,
-      "system":"Linux","gpu":""}})"));
+      "system":"Linux","gpu":""},"points":90,"points_in_view":60})"));
   EXPECT_EQ(written[1],
             json::parse(R"({"event":"step","iteration":7,"iterations":10,"phase":"specular","loss":0.5,
       "terms":{"l1":0.25,"ssim":1.5},"psnr":21.5,"seconds":3.0,"rate":2.5,"surfels":{"main":100,"environment":20},"memory_bytes":1048576})"));

@@ -2,11 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <set>
 
+#include "base/parallel.h"
 #include "math/rotation.h"
 #include "scene/neighbours.h"
 #include "small_run.h"
@@ -82,7 +84,7 @@ TEST(Initialise, MasksOfTheObjectSayWhatMirrorsAndEstimatedOnesDoNot) {
   options.initial.tint_outside_mask = 0.01F;
   const auto tints = [&] {
     Random random(1);
-    const Scene scene = initial_scene(load_capture(folder / "capture", {}), options, random);
+    const Scene scene = initial_scene(load_capture(folder / "capture", {}), options, random).scene;
     std::set<int> percent;
     for (const float logit : scene.main.tint_logit.values())
       percent.insert(static_cast<int>(std::lround(100 / (1 + std::exp(-logit)))));
@@ -91,6 +93,79 @@ TEST(Initialise, MasksOfTheObjectSayWhatMirrorsAndEstimatedOnesDoNot) {
   EXPECT_EQ(tints(), (std::set<int>{1, 80}));
   fs::rename(folder / "capture/mask", folder / "capture/motion_mask");
   EXPECT_EQ(tints(), std::set<int>{20});
+}
+
+// Points behind every camera, and farther out than all others.
+Tensor<float> unseen_points(const Capture& capture, int64_t count) {
+  const Camera<float>& camera = capture.train.front().camera;
+  Tensor<float> points({count, 3});
+  for (int64_t i = 0; i < count; ++i) {
+    const auto step = static_cast<float>(i);
+    const Vec3<float> behind(0.01F * step, 0.02F * step, -20 - 0.03F * step);
+    store3(points.row(i), camera.position + behind * camera.camera_from_world);
+    for (const View& view : capture.train) EXPECT_FALSE(view.camera.sees(load3<float>(points.row(i))));
+  }
+  return points;
+}
+
+std::set<std::array<float, 3>> places(const Tensor<float>& points) {
+  std::set<std::array<float, 3>> result;
+  for (int64_t i = 0; i < points.dim(0); ++i) result.insert({points(i, 0), points(i, 1), points(i, 2)});
+  return result;
+}
+
+TEST(Initialise, PointsThatNoViewSeesStartNoMainSurfelsButMayBeSurroundings) {
+  TrainOptions options = small_run(1);
+  options.initial.environment_points = 100000;
+  options.environment_density.max_surfels = 100000;
+  Capture capture = load_capture(capture_folder(), {});
+  const Tensor<float> own = capture.points;
+  const Tensor<float> unseen = unseen_points(capture, 50);
+  Tensor<float> all({own.dim(0) + 50, 3});
+  std::copy_n(unseen.data(), unseen.size(), all.data());
+  std::copy_n(own.data(), own.size(), all.row(50));
+  capture.points = all;
+  Random random(1);
+  const InitialScene made = initial_scene(capture, options, random);
+
+  std::set<std::array<float, 3>> expected;
+  for (const auto& x : places(own)) {
+    const Vec3<float> point(x[0], x[1], x[2]);
+    if (std::any_of(capture.train.begin(), capture.train.end(),
+                    [&](const View& view) { return view.camera.sees(point); }))
+      expected.insert(x);
+  }
+  EXPECT_EQ(places(made.scene.main.position), expected);
+  EXPECT_EQ(made.points, all.dim(0));
+  EXPECT_EQ(made.points_in_view, made.scene.main.count());
+  const auto surroundings = places(made.scene.environment.position);
+  int64_t taken = 0;
+  for (const auto& x : places(unseen)) taken += surroundings.contains(x) ? 1 : 0;
+  EXPECT_EQ(taken, 50);
+}
+
+TEST(Initialise, WhereNoViewSeesAnyPointSurfelsStartAsWithoutPoints) {
+  const TrainOptions options = small_run(1);
+  Capture capture = load_capture(capture_folder(), {});
+  capture.points = unseen_points(capture, 50);
+  Random random(1), same(1);
+  const InitialScene made = initial_scene(capture, options, random);
+  EXPECT_EQ(made.points, 50);
+  EXPECT_EQ(made.points_in_view, 0);
+  capture.points = {};
+  EXPECT_EQ(scene_bytes(made.scene), scene_bytes(initial_scene(capture, options, same).scene));
+}
+
+TEST(Initialise, TheSameSeedGivesTheSameSceneAtAnyNumberOfThreads) {
+  Capture capture = load_capture(capture_folder(), {});
+  std::set<std::string> scenes;
+  for (const int threads : {1, 3}) {
+    set_threads(threads);
+    Random random(1);
+    scenes.insert(scene_bytes(initial_scene(capture, small_run(1), random).scene));
+  }
+  set_threads(0);
+  EXPECT_EQ(scenes.size(), 1U);
 }
 
 TEST(Initialise, TheEnvironmentFillsItsBoxEvenly) {

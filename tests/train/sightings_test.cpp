@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+
+#include "math/rotation.h"
 #include "train/initialise.h"
 
 namespace traceflow {
@@ -101,6 +105,51 @@ TEST_F(SlabBeforeAWall, ASlantedPlaneDoesNotHideItself) {
 TEST_F(SlabBeforeAWall, WithoutPhotographsNothingIsKnown) {
   const Sightings s = look_at(surfels_, {});
   EXPECT_EQ(s.any, std::vector<uint8_t>(points_.size(), 0));
+}
+
+// Against the planes of each view's pyramid, a tenth of the image wider all around, of which nothing is projected.
+TEST(PointsInView, AreThoseInsideSomePyramid) {
+  constexpr float near_plane = 0.3F;
+  Random random(5);
+  std::vector<View> views(3);
+  for (View& view : views) {
+    Camera<float>& camera = view.camera;
+    camera.width = 40;
+    camera.height = 24;
+    camera.focal_x = 30;
+    camera.focal_y = 35;
+    camera.centre_x = 17;
+    camera.centre_y = 13;
+    camera.position = {static_cast<float>(random.normal()), static_cast<float>(random.normal()), 0};
+    camera.camera_from_world = rotation_from_quaternion(normalize(
+        Vec4<float>(1, static_cast<float>(random.normal()), static_cast<float>(random.normal()), 0.2F)));
+  }
+  const auto lies_inside = [&](const Vec3<float>& point, const Camera<float>& camera) {
+    const Vec3<float> x = camera.point_in_camera(point);
+    const float left = -4, top = -4;
+    const float right = static_cast<float>(camera.width) + 4, bottom = static_cast<float>(camera.height) + 4;
+    const std::array<Vec3<float>, 4> corners{camera.ray_in_camera(left, top), camera.ray_in_camera(right, top),
+                                             camera.ray_in_camera(right, bottom),
+                                             camera.ray_in_camera(left, bottom)};
+    bool inside = x.z > near_plane;
+    for (size_t k = 0; k < 4; ++k) inside &= dot(cross(corners[k], corners[(k + 1) % 4]), x) >= 0;
+    return inside;
+  };
+  Tensor<float> points({3000, 3});
+  std::vector<float> expected;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const Vec3<float> point(static_cast<float>(3 * random.normal()), static_cast<float>(3 * random.normal()),
+                            static_cast<float>(3 * random.normal()));
+    store3(points.row(i), point);
+    if (std::any_of(views.begin(), views.end(), [&](const View& v) { return lies_inside(point, v.camera); }))
+      expected.insert(expected.end(), {point.x, point.y, point.z});
+  }
+  const Tensor<float> seen = points_in_view(points, views, near_plane);
+  ASSERT_GT(expected.size(), 300U);
+  ASSERT_LT(expected.size(), 6000U);
+  EXPECT_EQ(std::vector<float>(seen.values().begin(), seen.values().end()), expected);
+  EXPECT_EQ(points_in_view(points, {}, near_plane).dim(0), 0);
+  EXPECT_EQ(points_in_view(Tensor<float>({0, 3}), views, near_plane).dim(0), 0);
 }
 
 }  // namespace

@@ -364,7 +364,7 @@ TEST(Trainer, SurroundingsOutliveTheirFirstDensityControl) {
   for (const char* name : {"paper", "cpu", "demo"}) {
     const TrainOptions options = preset(name);
     Random random(1);
-    Scene scene = initial_scene(capture, options, random);
+    Scene scene = initial_scene(capture, options, random).scene;
     const int64_t began = scene.environment.count();
     SurfelMoments moments;
     moments.reset_like(scene.environment);
@@ -374,6 +374,36 @@ TEST(Trainer, SurroundingsOutliveTheirFirstDensityControl) {
     control.update(scene.environment, moments, limits, random);
     EXPECT_GT(scene.environment.count(), 0.99 * static_cast<double>(began)) << name;
   }
+}
+
+TEST(Trainer, TellsWhereNoViewSeesAnyPoint) {
+  Capture capture = load_capture(capture_folder(), {});
+  // Beyond every camera's back.
+  for (int64_t i = 0; i < capture.points.dim(0); ++i) {
+    const Camera<float>& camera = capture.train.front().camera;
+    store3(capture.points.row(i), camera.position + Vec3<float>(0, 0, -50) * camera.camera_from_world);
+    for (const View& view : capture.train) {
+      if (!view.camera.sees(load3<float>(capture.points.row(i)))) continue;
+      FAIL() << "a point that should not be seen is";
+    }
+  }
+  const int64_t points = capture.points.dim(0);
+  const fs::path run = fs::path(::testing::TempDir()) / ("unseen_" + std::to_string(::getpid()));
+  fs::remove_all(run);
+  Trainer trainer(small_run(1), std::move(capture), run);
+  std::vector<std::string> warnings;
+  events::Started started;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* warning = std::get_if<events::Warning>(&event)) warnings.push_back(warning->text);
+    if (const auto* start = std::get_if<events::Started>(&event)) started = *start;
+  });
+  trainer.run(never);
+  EXPECT_EQ(started.points, points);
+  EXPECT_EQ(started.points_in_view, 0);
+  EXPECT_THAT(warnings,
+              ::testing::Contains("no training view sees any of the " + std::to_string(points) +
+                                  " points: surfels start at random; are the points in the capture's "
+                                  "own coordinates?"));
 }
 
 TEST(Trainer, NoSetStartsLargerThanItMayGrow) {

@@ -91,6 +91,12 @@ std::string status_line(const events::Step& step, int width) {
   return line;
 }
 
+events::Listener warnings_alone(std::ostream& out) {
+  return [progress = Progress(out, 0)](const events::Event& event) mutable {
+    if (std::holds_alternative<events::Warning>(event)) progress(event);
+  };
+}
+
 Progress::Progress(std::ostream& out, int width) : out_(&out), width_(width) {}
 
 Progress Progress::for_stderr() { return {std::cerr, terminal_width()}; }
@@ -111,6 +117,10 @@ void Progress::show(const events::Started& e) {
                          e.iteration > 0 ? fmt::format(" from {}", e.iteration) : "",
                          e.device == "cpu" ? threads : e.device, surfel_text(e.surfels),
                          (e.forecast_bytes + (1 << 20) - 1) >> 20, e.run.string()));
+  if (e.iteration == 0 && e.points_in_view > 0 && e.points_in_view < e.points) {
+    print_line(fmt::format("main surfels start at the {} of {} points that training views see",
+                           e.points_in_view, e.points));
+  }
 }
 
 void Progress::show(const events::Step& e) {

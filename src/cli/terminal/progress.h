@@ -44,6 +44,9 @@ class Progress {
   int64_t shown_percent_ = -100;
 };
 
+// A listener that shows of a run its warnings alone.
+events::Listener warnings_alone(std::ostream& out);
+
 // The status line of one step, made of as many of its parts as fit into `width` columns (0: all, and no bar).
 std::string status_line(const events::Step& step, int width);
 

@@ -156,7 +156,11 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   const Device device = devices.choose(arguments.quiet);
   Trainer trainer(options, std::move(capture), arguments.output, device);
   folder.make();
-  if (!arguments.quiet) trainer.stream().listen(Progress::for_stderr());
+  if (arguments.quiet) {
+    trainer.stream().listen(warnings_alone(std::cerr));
+  } else {
+    trainer.stream().listen(Progress::for_stderr());
+  }
   auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
   trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
   if (!folder.keeps_others_out()) {
@@ -195,7 +199,7 @@ void add_train(CLI::App& program) {
           ->option_text("NAME")
           ->capture_default_str();
   verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint, with its settings");
-  verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but errors");
+  verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but warnings and errors");
   CLI::Option* view =
       verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
   verb->add_option("--view-share", arguments->view_options.share,

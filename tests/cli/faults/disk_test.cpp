@@ -93,13 +93,14 @@ class TrainingOnDisk : public Faults {
   }
   static void expect_a_warning(const Outcome& end, const char* why) {
     EXPECT_EQ(end.code, 0) << end.error;
-    EXPECT_EQ(end.error, "");
+    EXPECT_EQ(lines(end.error), 1) << end.error;
     int warnings = 0;
     for (const nlohmann::json& event : logged("refused")) {
       if (event["event"] != "warning") continue;
       ++warnings;
-      EXPECT_THAT(event["text"].get<std::string>(),
-                  AllOf(HasSubstr(" is not saved: "), HasSubstr(why), HasSubstr("tries again")));
+      const std::string text = event["text"];
+      EXPECT_THAT(text, AllOf(HasSubstr(" is not saved: "), HasSubstr(why), HasSubstr("tries again")));
+      EXPECT_EQ(end.error, "warning: " + text + "\n") << "also of a quiet run";
     }
     EXPECT_EQ(warnings, 1);
     EXPECT_TRUE(state_of(path("refused")) == whole_state());
@@ -137,9 +138,10 @@ TEST_F(TrainingOnDisk, ThatKnowsNoLocksIsToldAndTrainedOn) {
   const Outcome end = run(training("unlocked"), {.disk = {"unlocked/lock", 1, all_that_follow, "flock"}});
   EXPECT_EQ(end.code, 0) << end.error;
   EXPECT_TRUE(state_of(path("unlocked")) == whole_state());
-  EXPECT_EQ(
-      logged("unlocked")[0]["text"],
-      path("unlocked") + " is on a file system without locks: see that no second training writes there");
+  const std::string warning =
+      path("unlocked") + " is on a file system without locks: see that no second training writes there";
+  EXPECT_EQ(logged("unlocked")[0]["text"], warning);
+  EXPECT_EQ(end.error, "warning: " + warning + "\n");
 }
 
 TEST_F(TrainingOnDisk, ThatIsFullForTheLogAloneLosesLinesAndCountsThem) {

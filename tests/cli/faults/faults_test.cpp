@@ -40,7 +40,11 @@ TEST_F(Faults, ADiskThatIsFullWhenARunGoesOnLeavesItsCheckpointsAsTheyWere) {
                     previous = bytes_of(run_in("filled").previous_checkpoint());
   std::vector<std::string> words = resuming("filled");
   words.insert(words.end(), {"-i", "12"});
-  expect_one_line(run(words, {.file_bytes = small_disk}), 2);
+  const Outcome end = run(words, {.file_bytes = small_disk});
+  EXPECT_EQ(end.code, 2);
+  EXPECT_EQ(lines(end.error), 2) << end.error;
+  EXPECT_THAT(end.error, AllOf(HasSubstr("warning: iteration 9 is not saved: "),
+                               HasSubstr("\ntraceflow: iteration 12 is not saved: ")));
   EXPECT_EQ(bytes_of(run_in("filled").checkpoint()), current);
   EXPECT_EQ(bytes_of(run_in("filled").previous_checkpoint()), previous);
   EXPECT_EQ(files_in("filled"), (std::vector<std::string>{"checkpoint.previous.safetensors",

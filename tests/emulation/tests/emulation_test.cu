@@ -3,10 +3,12 @@
 #include <cmath>
 #include <cstring>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "base/kernel.h"
 #include "base/tensor.h"
+#include "emulation/device.h"
 
 // The emulation itself: that kernels compute what CUDA would, and that what CUDA leaves undefined ends the
 // program.
@@ -165,6 +167,37 @@ TEST(EmulationDeathTest, AMaskThatLeavesItsLaneOutEndsTheProgram) {
 TEST(EmulationDeathTest, ThreadsThatWaitForNobodyEndTheProgram) {
   Tensor<int32_t> to({block}, Device::cuda);
   EXPECT_DEATH(cuda::launch("wait", {1, block}, half_a_block_waits, to.data()), "never come");
+}
+
+// Without memory a kernel is not started; what the pool held may be enough for the second try.
+TEST(Emulation, AKernelThatFindsNoMemoryIsTriedAgainOnceThePoolIsTrimmed) {
+  Tensor<int32_t> total({1}, Device::cuda);
+  const auto run = [&] { cuda::launch("count", {2, block}, count_into, total.data()); };
+  const int64_t trims = emulation::trims();
+  emulation::refuse_launches(1, 1);
+  run();
+  EXPECT_EQ(emulation::trims(), trims);
+  run();
+  EXPECT_EQ(emulation::trims(), trims + 1);
+  EXPECT_EQ(total.on(Device::cpu)[0], 2 * 2 * block);
+}
+
+TEST(Emulation, AKernelThatTwiceFindsNoMemoryIsOutOfMemoryAndNoFaultOfTheProgram) {
+  Tensor<int32_t> total({1}, Device::cuda);
+  const auto run = [&] { cuda::launch("count", {2, block}, count_into, total.data()); };
+  const int64_t trims = emulation::trims();
+  emulation::refuse_launches(0, 2);
+  try {
+    run();
+    FAIL() << "was started";
+  } catch (const memory::OutOfMemory& error) {
+    EXPECT_EQ(std::string(error.what()).find("out of device memory: the driver found none for itself, "), 0U)
+        << error.what();
+  }
+  EXPECT_EQ(emulation::trims(), trims + 1);
+  EXPECT_EQ(total.on(Device::cpu)[0], 0);
+  run();
+  EXPECT_EQ(total.on(Device::cpu)[0], 2 * block);
 }
 
 }  // namespace

@@ -1,4 +1,8 @@
+#include <array>
+#include <set>
+
 #include "base/profile.h"
+#include "emulation/device.h"
 #include "support/device.h"
 #include "train/small_run.h"
 
@@ -123,6 +127,57 @@ TEST_F(TrainerOnDevice, RunningOutOfMemoryEndsInASavedState) {
     EXPECT_EQ(scene_bytes(resumed.scene()), scene_bytes(trainer.scene()));
     EXPECT_EQ(resumed.run(never).ending, events::Ending::completed);
   }
+}
+
+// The driver takes memory too when it starts a kernel, and then the optimiser may be half through. Wherever
+// that is, what is on the disk is whole: a resumed run ends in the bytes of one that was never stopped. On a
+// device nothing can be made to fail so, and nothing is tried.
+TEST_F(TrainerOnDevice, RunningOutOfMemoryForAKernelLeavesAStateThatIsWhole) {
+  if (emulation::refuse_launches == nullptr) return;
+  cuda::set_deterministic(true);
+  TrainOptions options = small_run(14);
+  // Density control that finds no memory is left out, and the run goes on differently.
+  options.density.until = options.environment_density.until = 0;
+  constexpr int reached = 9;
+  const fs::path run = fs::path(::testing::TempDir()) / ("kernels_" + std::to_string(::getpid()));
+  const auto load = [&] { return load_capture(capture_folder(), options.capture); };
+  Trainer whole = make_trainer(options, "whole_kernels", Device::cuda);
+  std::array<int64_t, 2> at{};  // kernels after so many iterations, and one more
+  whole.stream().listen([&](const events::Event& event) {
+    const auto* step = std::get_if<events::Step>(&event);
+    if (step == nullptr) return;
+    if (step->iteration == reached) at[0] = emulation::launches();
+    if (step->iteration == reached + 1) at[1] = emulation::launches();
+  });
+  EXPECT_EQ(whole.run(never).ending, events::Ending::completed);
+  const int64_t kernels = at[1] - at[0];
+  ASSERT_GT(kernels, 20);
+
+  std::set<int64_t> resumed_from;
+  // Few of all, and each of the last, where the scene changes.
+  for (int64_t k = 0; k < kernels; k = k < kernels - 6 ? std::min(k + 24, kernels - 6) : k + 1) {
+    SCOPED_TRACE(k);
+    Trainer trainer = make_trainer(options, "kernels", Device::cuda);
+    trainer.stream().listen([&](const events::Event& event) {
+      const auto* step = std::get_if<events::Step>(&event);
+      if (step == nullptr) return;
+      if (step->iteration == reached - 2) trainer.save();
+      if (step->iteration == reached) emulation::refuse_launches(k, 2);
+    });
+    const events::Finished end = trainer.run(never);
+    emulation::refuse_launches(0, 0);
+    ASSERT_EQ(end.ending, events::Ending::out_of_memory);
+    EXPECT_EQ(end.reason.find("out of device memory"), 0U) << end.reason;
+    Trainer resumed(options, load(), run, Device::cuda);
+    resumed.resume();
+    EXPECT_EQ(end.reason.find("not saved") != std::string::npos, resumed.iteration() == reached - 2)
+        << end.reason;
+    resumed_from.insert(resumed.iteration());
+    EXPECT_EQ(resumed.run(never).ending, events::Ending::completed);
+    EXPECT_TRUE(scene_bytes(resumed.scene()) == scene_bytes(whole.scene())) << end.reason;
+  }
+  EXPECT_TRUE(resumed_from.contains(reached - 2)) << "no kernel of a change was refused";
+  EXPECT_TRUE(resumed_from.contains(reached)) << "no other kernel was refused";
 }
 
 // Between two density controls, and once every view has been seen.
