@@ -131,8 +131,10 @@ TEST(Initialise, PointsThatNoViewSeesStartNoMainSurfelsButMayBeSurroundings) {
   std::set<std::array<float, 3>> expected;
   for (const auto& x : places(own)) {
     const Vec3<float> point(x[0], x[1], x[2]);
-    if (std::any_of(capture.train.begin(), capture.train.end(),
-                    [&](const View& view) { return view.camera.sees(point); }))
+    // Beside the image too, by a tenth of its longer side.
+    if (std::any_of(capture.train.begin(), capture.train.end(), [&](const View& view) {
+          return view.camera.sees(point, 0.01F, 0.1F * static_cast<float>(view.camera.width));
+        }))
       expected.insert(x);
   }
   EXPECT_EQ(places(made.scene.main.position), expected);
