@@ -28,6 +28,7 @@ struct ViewImages {
   Tensor<float> colour;        // H×W×3 in [0, 1]
   Tensor<uint8_t> known;       // H×W, 1 where the colour says something; empty where it does everywhere
   Tensor<uint8_t> mask;        // H×W, 1 on the moving specular object
+  Tensor<float> coverage;      // H×W in [0, 1], how much of a pixel the mask covers; empty without one
   Tensor<float> normal_prior;  // H×W×3, world axes, unit or zero where there is none
 };
 

@@ -146,7 +146,7 @@ DecodedColour decode_colour(const ViewSource& view) {
   return result;
 }
 
-Tensor<uint8_t> decode_mask(const ViewSource& view) {
+DecodedMask decode_mask(const ViewSource& view) {
   const Tensor<uint8_t> pixels = read_image(view.mask.open());
   Tensor<float> mask({pixels.dim(0), pixels.dim(1), 1});
   for (int64_t i = 0; i < mask.size(); ++i) {
@@ -154,8 +154,12 @@ Tensor<uint8_t> decode_mask(const ViewSource& view) {
     mask[i] = white != view.mask_is_inverted ? 1.0F : 0.0F;
   }
   mask = to_view_grid(view, std::move(mask));
-  Tensor<uint8_t> result({view.height(), view.width()});
-  for (int64_t i = 0; i < result.size(); ++i) result[i] = mask[i] >= 0.5F ? 1 : 0;
+  const Shape size{view.height(), view.width()};
+  DecodedMask result{Tensor<uint8_t>(size), Tensor<uint8_t>(size)};
+  for (int64_t i = 0; i < mask.size(); ++i) {
+    result.mask[i] = mask[i] >= 0.5F ? 1 : 0;
+    result.coverage[i] = static_cast<uint8_t>(std::lround(255 * std::clamp(mask[i], 0.0F, 1.0F)));
+  }
   return result;
 }
 

@@ -13,7 +13,11 @@ struct DecodedColour {
   Tensor<uint8_t> known;   // H×W of 0 and 1; empty where all is known
 };
 DecodedColour decode_colour(const ViewSource& view);
-Tensor<uint8_t> decode_mask(const ViewSource& view);  // H×W of 0 and 1
+struct DecodedMask {
+  Tensor<uint8_t> mask;      // H×W of 0 and 1: whether it covers half of a pixel
+  Tensor<uint8_t> coverage;  // H×W, 255 where it covers all of one
+};
+DecodedMask decode_mask(const ViewSource& view);
 // H×W×3 in the prior's own axes, unit, zero where there is none.
 Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture);
 ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture);

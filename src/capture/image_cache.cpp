@@ -38,7 +38,7 @@ int64_t ImageCache::bytes() const {
 int64_t ImageCache::bytes_of(const std::string& id) const {
   const ViewSource& view = source(id);
   return view.width() * view.height() *
-         (3 + (view.transparent_is_unknown ? 1 : 0) + (view.mask ? 1 : 0) + (view.has_prior() ? 6 : 0));
+         (3 + (view.transparent_is_unknown ? 1 : 0) + (view.mask ? 2 : 0) + (view.has_prior() ? 6 : 0));
 }
 
 std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
@@ -62,7 +62,11 @@ ViewPixels ImageCache::decode(const std::string& id) const {
   DecodedColour decoded = decode_colour(view);
   pixels.colour = std::move(decoded.colour);
   pixels.known = std::move(decoded.known);
-  if (view.mask) pixels.mask = decode_mask(view);
+  if (view.mask) {
+    DecodedMask decoded_mask = decode_mask(view);
+    pixels.mask = std::move(decoded_mask.mask);
+    pixels.coverage = std::move(decoded_mask.coverage);
+  }
   if (view.has_prior()) {
     Tensor<float> normals = decode_prior(view, capture_);
     turn_to_world(normals, view, capture_.prior_signs);

@@ -11,10 +11,13 @@ void widen(const ViewPixels& pixels, ViewImages& images) {
   images.colour.place(device).resize(pixels.colour.shape());
   images.known = pixels.known;
   images.mask = pixels.mask;
+  images.coverage.place(device).resize(pixels.coverage.shape());
   images.normal_prior.place(device).resize(pixels.normal_prior.shape());
   constexpr int64_t grain = 16384;
   parallel_for(device, "capture: widen colours", images.colour.size(),
                WidenColour{pixels.colour.data(), images.colour.data()}, grain);
+  parallel_for(device, "capture: widen coverages", images.coverage.size(),
+               WidenColour{pixels.coverage.data(), images.coverage.data()}, grain);
   parallel_for(device, "capture: widen normals", images.normal_prior.size() / 3,
                WidenNormal{pixels.normal_prior.data(), images.normal_prior.data()}, grain);
 }

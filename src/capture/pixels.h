@@ -11,12 +11,16 @@ struct ViewPixels {
   Tensor<uint8_t> colour;        // H×W×3
   Tensor<uint8_t> known;         // H×W, 0 and 1; empty where all is known
   Tensor<uint8_t> mask;          // H×W
+  Tensor<uint8_t> coverage;      // H×W, 255 where the mask covers all of a pixel
   Tensor<int16_t> normal_prior;  // H×W×3, unit normals times 32767
 
-  int64_t bytes() const { return colour.size() + known.size() + mask.size() + 2 * normal_prior.size(); }
+  int64_t bytes() const {
+    return colour.size() + known.size() + mask.size() + coverage.size() + 2 * normal_prior.size();
+  }
   // The same pixels on a device.
   ViewPixels on(Device device) const {
-    return {colour.on(device), known.on(device), mask.on(device), normal_prior.on(device)};
+    return {colour.on(device), known.on(device), mask.on(device), coverage.on(device),
+            normal_prior.on(device)};
   }
 };
 

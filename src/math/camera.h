@@ -28,8 +28,8 @@ struct Camera {
     return {focal_x * point_in_camera.x / point_in_camera.z + centre_x,
             focal_y * point_in_camera.y / point_in_camera.z + centre_y};
   }
-  // Whether a point in world falls into the image, or beside it by at most `margin` pixels, and lies more than
-  // near_plane before the camera. False for one that is not finite.
+  // Whether a point in world falls into the image, or beside it by at most `margin` pixels, and lies more
+  // than near_plane before the camera. False for one that is not finite.
   TRACEFLOW_HD bool sees(const Vec3<T>& point_in_world, T near_plane = 0, T margin = 0) const {
     const Vec3<T> x = point_in_camera(point_in_world);
     if (!(x.z > near_plane)) return false;

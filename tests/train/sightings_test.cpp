@@ -107,7 +107,8 @@ TEST_F(SlabBeforeAWall, WithoutPhotographsNothingIsKnown) {
   EXPECT_EQ(s.any, std::vector<uint8_t>(points_.size(), 0));
 }
 
-// Against the planes of each view's pyramid, a tenth of the image wider all around, of which nothing is projected.
+// Against the planes of each view's pyramid, a tenth of the image wider all around, of which nothing is
+// projected.
 TEST(PointsInView, AreThoseInsideSomePyramid) {
   constexpr float near_plane = 0.3F;
   Random random(5);
@@ -128,9 +129,9 @@ TEST(PointsInView, AreThoseInsideSomePyramid) {
     const Vec3<float> x = camera.point_in_camera(point);
     const float left = -4, top = -4;
     const float right = static_cast<float>(camera.width) + 4, bottom = static_cast<float>(camera.height) + 4;
-    const std::array<Vec3<float>, 4> corners{camera.ray_in_camera(left, top), camera.ray_in_camera(right, top),
-                                             camera.ray_in_camera(right, bottom),
-                                             camera.ray_in_camera(left, bottom)};
+    const std::array<Vec3<float>, 4> corners{
+        camera.ray_in_camera(left, top), camera.ray_in_camera(right, top),
+        camera.ray_in_camera(right, bottom), camera.ray_in_camera(left, bottom)};
     bool inside = x.z > near_plane;
     for (size_t k = 0; k < 4; ++k) inside &= dot(cross(corners[k], corners[(k + 1) % 4]), x) >= 0;
     return inside;

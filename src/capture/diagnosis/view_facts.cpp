@@ -82,7 +82,7 @@ void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& fa
   measure_colour(source, facts);
   Tensor<uint8_t> mask;
   if (source.mask) {
-    mask = decode_mask(source);
+    mask = decode_mask(source).mask;
     const auto on = std::count(mask.data(), mask.data() + mask.size(), uint8_t{1});
     facts.masked = static_cast<double>(on) / static_cast<double>(mask.size());
   }
