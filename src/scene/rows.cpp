@@ -22,19 +22,24 @@ Shape with_rows(const Shape& shape, int64_t rows) {
   }
 }
 
-}  // namespace
-
-Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, bool zero_fresh) {
+template <class T>
+Tensor<T> take_rows(const Tensor<T>& tensor, const PlacedEdit& edit, bool zero_fresh) {
   const int64_t row = tensor.row_size();
-  Tensor<float> result;
+  Tensor<T> result;
   result.place(tensor.device()).resize(with_rows(tensor.shape(), edit.count()));
   require(result.size() <= std::numeric_limits<uint32_t>::max(), "numbers of a set are counted in 32 bits",
           result.shape().to_string());
   parallel_for(tensor.device(), "scene: edit rows", result.size(),
-               TakeRow{edit.source.data(), zero_fresh ? edit.fresh.data() : nullptr,
-                       static_cast<uint32_t>(row), tensor.data(), result.data()},
+               TakeRow<T>{edit.source.data(), zero_fresh ? edit.fresh.data() : nullptr,
+                          static_cast<uint32_t>(row), tensor.data(), result.data()},
                16384);
   return result;
+}
+
+}  // namespace
+
+Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, bool zero_fresh) {
+  return take_rows(tensor, edit, zero_fresh);
 }
 
 Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
@@ -42,11 +47,13 @@ Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
                  edited_rows(surfels.rotation, edit, false), edited_rows(surfels.opacity_logit, edit, false),
                  edited_rows(surfels.sh, edit, false),       {}};
   if (surfels.has_tint()) result.tint_logit = edited_rows(surfels.tint_logit, edit, false);
+  if (!surfels.body.empty()) result.body = take_rows(surfels.body, edit, false);
   return result;
 }
 
 void append_rows(Surfels& surfels, const Surfels& more) {
   if (more.count() == 0) return;
+  require(surfels.body.empty() && more.body.empty(), "sets that are joined are carried by no bodies", "");
   std::vector<const Tensor<float>*> added;
   more.for_each([&](const char*, const Tensor<float>& tensor) { added.push_back(&tensor); });
   size_t group = 0;

@@ -6,6 +6,7 @@
 
 #include "scene/environment_map.h"
 #include "scene/field.h"
+#include "scene/motion.h"
 #include "scene/normalisation.h"
 #include "scene/surfels.h"
 
@@ -18,11 +19,12 @@ constexpr std::array<std::string_view, 3> enum_names(Specular) {
 }
 
 // What is reconstructed (method §1): two sets of surfels and a residual field for each, or a cube map in the
-// place of the second set. A field that is absent is F ≡ 0.
+// place of the second set. A field that is absent is F ≡ 0; a motion that is absent carries nothing.
 struct Scene {
   Surfels main;
   Surfels environment;
   std::optional<Field> main_field;
+  std::optional<Motion> main_motion;  // of the bodies that main.body names
   std::optional<Field> environment_field;
   std::optional<EnvironmentMap> environment_map;
   Specular specular = Specular::environment_gaussians;
@@ -30,7 +32,7 @@ struct Scene {
   float extent =
       1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
   // One number: the largest distance by which the main field lately moved a surfel, what view culling must
-  // allow for.
+  // allow for. Those that bodies carry are never culled.
   Tensor<float> main_reach{Shape{1}};
 
   // Where all of it lives.

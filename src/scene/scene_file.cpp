@@ -1,5 +1,6 @@
 #include "scene/scene_file.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "files/json_document.h"
@@ -86,6 +87,39 @@ Surfels get_surfels(const std::string& prefix, const Safetensors& file) {
   return surfels;
 }
 
+void put_motion(const Motion& motion, const Tensor<int32_t>& body, Safetensors& file) {
+  file.add("scene/main/body", body);
+  file.add("scene/motion/time", motion.time);
+  file.add("scene/motion/centre", motion.centre);
+  file.add("scene/motion/rotation", motion.rotation);
+  file.add("scene/motion/shift", motion.shift);
+}
+
+void get_motion(const Safetensors& file, Scene& scene) {
+  Motion motion;
+  motion.time = file.tensor<float>("scene/motion/time");
+  motion.centre = file.tensor<float>("scene/motion/centre");
+  const int64_t bodies = motion.centre.shape().rank() == 2 ? motion.centre.dim(0) : -1;
+  const int64_t keys = motion.time.shape().rank() == 1 ? motion.time.dim(0) : -1;
+  const bool ascends = std::is_sorted(motion.time.data(), motion.time.data() + motion.time.size());
+  if (bodies < 1 || keys < 1 || motion.centre.shape() != Shape{bodies, 3} || !ascends) {
+    throw InputError(
+        file.origin(), "scene/motion",
+        "shapes " + motion.centre.shape().to_string() + " and " + motion.time.shape().to_string(),
+        "B×3 centres of bodies and K ascending times");
+  }
+  motion.rotation = take(file, "scene/motion/rotation", {bodies, keys, 4});
+  motion.shift = take(file, "scene/motion/shift", {bodies, keys, 3});
+  scene.main.body = file.tensor<int32_t>("scene/main/body");
+  bool fits = scene.main.body.shape() == Shape{scene.main.count()};
+  for (const int32_t body : scene.main.body.values()) fits = fits && body >= -1 && body < bodies;
+  if (!fits) {
+    throw InputError(file.origin(), "scene/main/body", scene.main.body.shape().to_string(),
+                     "for each main surfel a body from -1 to " + std::to_string(bodies - 1));
+  }
+  scene.main_motion = std::move(motion);
+}
+
 EnvironmentMap get_map(const JsonField& json, const Safetensors& file) {
   EnvironmentMap map;
   map.logit = file.tensor<float>("scene/map/logit");
@@ -117,6 +151,7 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
   if (json["environment"].yes()) scene.environment = get_surfels("scene/environment/", file);
   if (json.has("main_field"))
     scene.main_field = get_field(json["main_field"], residual::main_outputs, "scene/main_field/", file);
+  if (json.has("motion") && json["motion"].yes()) get_motion(file, scene);
   if (json.has("environment_field")) {
     scene.environment_field =
         get_field(json["environment_field"], residual::environment_outputs, "scene/environment_field/", file);
@@ -139,6 +174,8 @@ void put_scene(const Scene& scene, Safetensors& file) {
   json["map"] = scene.environment_map.has_value();
   put_surfels(scene.main, "scene/main/", file);
   if (scene.environment.count() > 0) put_surfels(scene.environment, "scene/environment/", file);
+  json["motion"] = scene.main_motion.has_value();
+  if (scene.main_motion) put_motion(*scene.main_motion, scene.main.body, file);
   if (scene.main_field) put_field(*scene.main_field, "scene/main_field/", file, json["main_field"]);
   if (scene.environment_field) {
     put_field(*scene.environment_field, "scene/environment_field/", file, json["environment_field"]);

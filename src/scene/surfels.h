@@ -14,6 +14,9 @@ struct BasicSurfels {
   Tensor<T> opacity_logit;  // N
   Tensor<T> sh;             // N×K×3, spherical harmonics, K = (degree + 1)²
   Tensor<T> tint_logit;     // N, specular tint; empty for the environment
+  // N, the body that carries it (scene/motion.h), -1 for none; empty where there are no bodies. Not trained:
+  // gradients and moments have none.
+  Tensor<int32_t> body{};
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint_logit.empty(); }
@@ -21,8 +24,8 @@ struct BasicSurfels {
   Device device() const { return position.device(); }
   // The same set on a device.
   BasicSurfels on(Device device) const {
-    return {position.on(device),      log_scale.on(device), rotation.on(device),
-            opacity_logit.on(device), sh.on(device),        tint_logit.on(device)};
+    return {position.on(device), log_scale.on(device),  rotation.on(device), opacity_logit.on(device),
+            sh.on(device),       tint_logit.on(device), body.on(device)};
   }
 
   // The shapes of another set, on its device, in the memory that is there.
@@ -104,8 +107,13 @@ BasicSurfels<To> zeros_like(const BasicSurfels<From>& s) {
 }
 template <class To, class From>
 BasicSurfels<To> convert(const BasicSurfels<From>& s) {
-  return {convert<To>(s.position),      convert<To>(s.log_scale), convert<To>(s.rotation),
-          convert<To>(s.opacity_logit), convert<To>(s.sh),        convert<To>(s.tint_logit)};
+  return {convert<To>(s.position),
+          convert<To>(s.log_scale),
+          convert<To>(s.rotation),
+          convert<To>(s.opacity_logit),
+          convert<To>(s.sh),
+          convert<To>(s.tint_logit),
+          s.body};
 }
 template <class To, class From>
 BasicPosedSurfels<To> convert(const BasicPosedSurfels<From>& s) {

@@ -47,6 +47,9 @@ Scene full_scene() {
   scene.normalisation = {{0.1, -2, 3}, 0.37};
   scene.extent = 1.75F;
   scene.main_reach[0] = 0.125F;
+  scene.main.body = tensor_of(std::vector<int32_t>{-1, 0, 1, 1, -1, 0, 0});
+  scene.main_motion = still_motion(noise({2, 3}, random), tensor_of(std::vector<float>{0, 0.25F, 1}));
+  for (float& v : scene.main_motion->shift.values()) v = static_cast<float>(random.normal());
   return scene;
 }
 
@@ -58,6 +61,12 @@ std::vector<float> all_numbers(const Scene& scene) {
   scene.main.for_each(take);
   scene.environment.for_each(take);
   if (scene.main_field) scene.main_field->for_each(take);
+  if (scene.main_motion) {
+    scene.main_motion->for_each(take);
+    take("", scene.main_motion->time);
+    take("", scene.main_motion->centre);
+  }
+  for (const int32_t body : scene.main.body.values()) all.push_back(static_cast<float>(body));
   if (scene.environment_field) scene.environment_field->for_each(take);
   if (scene.environment_map) {
     take("map", scene.environment_map->logit);

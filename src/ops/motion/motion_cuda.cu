@@ -1,0 +1,14 @@
+#include "base/kernel.h"
+#include "ops/motion/motion_kernels.h"
+#include "primitives/sum_kernels.h"
+
+namespace traceflow {
+
+template void cuda::for_each_index(const char*, int64_t, const motion::PoseBody&);
+template void cuda::for_each_index(const char*, int64_t, const motion::MoveSurfel&);
+template void cuda::for_each_index(const char*, int64_t, const motion::PullKeys&);
+template void cuda::for_each_index(const char*, int64_t, const motion::TurnGradientBack&);
+template void cuda::sum_each_index<motion::Pull>(const char*, int64_t, const motion::PullOfSurfel&,
+                                                 const motion::KeepPull&);
+
+}  // namespace traceflow
