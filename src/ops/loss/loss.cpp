@@ -77,6 +77,16 @@ void distortion(const Tensor<float>& distortion_map, double weight, Tensor<float
                       MeanOver{count, value.on(distortion_map.device())}, block_pixels);
 }
 
+void silhouette(const Tensor<float>& silhouette, const Tensor<float>& mask, double weight,
+                Tensor<float>& grad_silhouette, const MeanSlot& value) {
+  check_same_shape(silhouette, mask, grad_silhouette);
+  const auto count = static_cast<double>(silhouette.size());
+  const Silhouette step{silhouette.data(), mask.data(), static_cast<float>(weight / count),
+                        grad_silhouette.data()};
+  ordered_sum<double>(silhouette.device(), "loss: silhouette", silhouette.size(), step,
+                      MeanOver{count, value.on(silhouette.device())}, block_pixels);
+}
+
 void squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& known,
                    const MeanSlot& value) {
   check_same_shape(image, target, image);

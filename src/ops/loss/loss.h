@@ -45,6 +45,13 @@ double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>
 void distortion(const Tensor<float>& distortion_map, double weight, Tensor<float>& grad_distortion,
                 const MeanSlot& value);
 
+// mean H(silhouette − mask) over pixels, H(x) = x²/0.2 up to |x| = 0.1 and |x| − 0.05 beyond: what lies in
+// the mask's border pixels, of which a mask knows the least, pulls less. silhouette, mask: H×W in [0, 1].
+void silhouette(const Tensor<float>& silhouette, const Tensor<float>& mask, double weight,
+                Tensor<float>& grad_silhouette, const MeanSlot& value);
+double silhouette_reference(const Tensor<double>& silhouette, const Tensor<double>& mask, double weight,
+                            Tensor<double>& grad_silhouette);
+
 // mean (image − target)² over channels and pixels, which PSNR is made of; no term of the loss. known (H×W,
 // may be empty) restricts the mean to pixels where it is non-zero.
 void squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& known,

@@ -110,6 +110,25 @@ struct Distortion {
   }
 };
 
+struct Silhouette {
+  static constexpr float width = 0.1F;  // of the quadratic part
+
+  const float *silhouette, *mask;
+  float scale;
+  float* gradient;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    const float x = silhouette[i] - mask[i];
+    const float size = std::abs(x);
+    if (size < width) {
+      gradient[i] += scale * x / width;
+      return static_cast<double>(x) * x / (2.0 * width);
+    }
+    gradient[i] += scale * sign(x);
+    return static_cast<double>(size) - 0.5 * width;
+  }
+};
+
 // Method §7.4, L_norm: a pixel is compared with the geometry around it.
 template <class T>
 struct NormalConsistency {

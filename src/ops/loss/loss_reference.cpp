@@ -81,6 +81,19 @@ double ssim_loss_reference(const Tensor<double>& image, const Tensor<double>& ta
   return sum / count;
 }
 
+double silhouette_reference(const Tensor<double>& silhouette, const Tensor<double>& mask, double weight,
+                            Tensor<double>& grad_silhouette) {
+  constexpr double width = 0.1;
+  const auto count = static_cast<double>(silhouette.size());
+  double sum = 0;
+  for (int64_t i = 0; i < silhouette.size(); ++i) {
+    const double x = silhouette[i] - mask[i];
+    sum += std::abs(x) < width ? x * x / (2 * width) : std::abs(x) - width / 2;
+    grad_silhouette[i] += weight / count * std::clamp(x / width, -1.0, 1.0);
+  }
+  return count > 0 ? sum / count : 0;
+}
+
 double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& pseudo, double weight,
                                     Tensor<double>& grad_normal, Tensor<double>& grad_pseudo) {
   Mean mean{};

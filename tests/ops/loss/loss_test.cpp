@@ -138,6 +138,28 @@ TEST(Distortion, IsTheMeanOfItsMap) {
   for (const float g : gradient.values()) EXPECT_EQ(g, 2);
 }
 
+// Away from the bend, where differences see both sides.
+TEST(Silhouette, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
+  Random random(4);
+  Tensor<double> silhouette = random_tensor<double>({6, 7}, random, 0, 1);
+  Tensor<double> mask = random_tensor<double>({6, 7}, random, 0, 1);
+  for (int64_t i = 0; i < mask.size(); i += 3) mask[i] = silhouette[i] + 0.07;  // in the quadratic part
+  for (int64_t i = 0; i < mask.size(); ++i) {
+    if (std::abs(std::abs(silhouette[i] - mask[i]) - 0.1) < 1e-3) mask[i] += 0.01;
+  }
+  Tensor<double> expected({6, 7}), unused({6, 7});
+  const double value = loss::silhouette_reference(silhouette, mask, 0.3, expected);
+  expect_close(expected,
+               central_differences(
+                   silhouette, [&] { return 0.3 * loss::silhouette_reference(silhouette, mask, 1, unused); }),
+               1e-6, "silhouette");
+  Tensor<loss::Mean> slot({1});
+  Tensor<float> found({6, 7});
+  loss::silhouette(convert<float>(silhouette), convert<float>(mask), 0.3, found, {slot, 0});
+  EXPECT_NEAR(slot[0].value, value, 1e-6);
+  expect_close(found, expected, 1e-5, "silhouette");
+}
+
 TEST(SquaredError, IsTheMeanOverWhatIsKnown) {
   Tensor<float> image({1, 3, 3}), target({1, 3, 3});
   for (int64_t pixel = 0; pixel < 3; ++pixel) {

@@ -117,7 +117,7 @@ struct Drawn {
   }
 };
 
-class CpuForward : public testing::TestWithParam<Case> {};
+class CpuForward : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CpuForward, matches_the_reference) {
   const Case& c = GetParam();
@@ -192,13 +192,13 @@ void expect_same_gradient(const Case& c, uint64_t seed, unsigned outputs) {
   }
 }
 
-class CpuBackward : public testing::TestWithParam<Case> {};
+class CpuBackward : public ::testing::TestWithParam<Case> {};
 
 TEST_P(CpuBackward, matches_the_reference) {
   for (uint64_t seed = 1; seed <= 2; ++seed) expect_same_gradient(GetParam(), seed, 0x7f);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, CpuBackward, testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, CpuBackward, ::testing::ValuesIn(cases()),
                          [](const auto& test) { return test.param.name; });
 TEST(CpuBackwardOfEachOutput, matches_the_reference) {
   for (const Case& c : cases()) {
@@ -210,7 +210,7 @@ TEST(CpuBackwardOfEachOutput, matches_the_reference) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, CpuForward, testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, CpuForward, ::testing::ValuesIn(cases()),
                          [](const auto& test) { return test.param.name; });
 
 }  // namespace

@@ -61,7 +61,7 @@ void expect_same_bytes(Result& a, Result& b) {
   EXPECT_EQ(a.gradient.camera.position, b.gradient.camera.position);
 }
 
-class Orders : public testing::TestWithParam<SortOrder> {
+class Orders : public ::testing::TestWithParam<SortOrder> {
  protected:
   void SetUp() override { set_threads(1); }
   Options options() const {
@@ -71,7 +71,7 @@ class Orders : public testing::TestWithParam<SortOrder> {
     return o;
   }
 };
-INSTANTIATE_TEST_SUITE_P(Raster, Orders, testing::Values(SortOrder::centre, SortOrder::hit),
+INSTANTIATE_TEST_SUITE_P(Raster, Orders, ::testing::Values(SortOrder::centre, SortOrder::hit),
                          [](const auto& test) {
                            return std::string(enum_names(test.param)[static_cast<size_t>(test.param)]);
                          });

@@ -104,7 +104,7 @@ std::vector<GradientCase> gradient_cases() {
           {"near_hit", hit, near}};
 }
 
-class ReferenceGradient : public testing::TestWithParam<GradientCase> {};
+class ReferenceGradient : public ::testing::TestWithParam<GradientCase> {};
 
 TEST_P(ReferenceGradient, matches_central_differences_of_all_outputs_at_once) {
   for (uint64_t seed = 1; seed <= 3; ++seed) {
@@ -122,7 +122,7 @@ TEST_P(ReferenceGradient, matches_central_differences_of_each_output) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, ReferenceGradient, testing::ValuesIn(gradient_cases()),
+INSTANTIATE_TEST_SUITE_P(Cases, ReferenceGradient, ::testing::ValuesIn(gradient_cases()),
                          [](const auto& test) { return test.param.name; });
 
 // One surfel that faces a camera at the origin, its centre on the ray through the pixel (2, 1).

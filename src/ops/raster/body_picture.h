@@ -1,0 +1,24 @@
+#pragma once
+
+#include "ops/raster/raster.h"
+
+// What tracking sees of rigid bodies: where they cover the picture and how it is turned there, with exact
+// derivatives by their poses (forward mode: a few directions for many pixels).
+namespace traceflow::raster {
+
+struct BodyPicture {
+  Tensor<float> silhouette;  // H×W, Σ w over the surfels of all bodies
+  Tensor<float> normal;      // H×W×3, world axes, Σ w n over the same, n turned to the camera
+  // H×W×(6·B)×4: by ω_x, ω_y, ω_z (radians, about the body's pivot, world axes) and the shift s_x, s_y, s_z
+  // (scene units) of each body: of the silhouette and the three normal components. Empty where not asked for.
+  Tensor<float> jacobian;
+};
+
+// Draws posed surfels on the CPU in the order of their centres. body: of each posed surfel, −1 to B − 1.
+// pivot: B×3, world. Derivatives hold the order and the cut-offs of the blend still, as raster::backward
+// does.
+void draw_bodies(const PosedSurfels& surfels, const Tensor<int32_t>& body, const Tensor<float>& pivot,
+                 const Camera<float>& camera, const Options& options, bool with_jacobian,
+                 BodyPicture& picture);
+
+}  // namespace traceflow::raster
