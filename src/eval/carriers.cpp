@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "ops/deform/deform.h"
+#include "ops/motion/motion.h"
 #include "scene/rows.h"
 
 namespace traceflow::eval {
@@ -17,7 +18,8 @@ Surfels posed_rows(const show::Subject& subject, const std::vector<int32_t>& row
   RowEdit edit;
   for (const int32_t row : rows) edit.keep(row);
   const Scene& scene = subject.scene;
-  const Surfels stored = edited_rows(scene.main, PlacedEdit(edit, scene.device()));
+  Surfels stored = edited_rows(scene.main, PlacedEdit(edit, scene.device()));
+  if (scene.main_motion) motion::move(*scene.main_motion, stored.body, time, stored);
   const bool moves = subject.request.deform_main && scene.main_field;
   return moves ? deform::displaced(stored, *scene.main_field, time, subject.render.precision).on(Device::cpu)
                : stored.on(Device::cpu);

@@ -20,6 +20,7 @@ struct FrameRequest {
   bool deform_environment = true;  // likewise the environment's
   bool specular = true;            // trace reflections, where the scene has them (method §7.2)
   bool pseudo_normals = false;     // compute N_d, which only the losses need
+  bool silhouette = false;         // draw where bodies cover the picture, which only the losses need
   bool probes = false;             // training: trace a random share of the other pixels too (method §4.4)
   uint64_t probe_seed = 0;
   // Skip main surfels that lie outside the view by more than the scene's reach. Training does; a picture does
@@ -46,6 +47,7 @@ struct Frame {
   PosedSurfels environment;     // what was traced
   raster::Output raster;        // diffuse colour, alpha, tint, normal, depths, distortion
   Tensor<float> pseudo_normal;  // H×W×3 when asked for
+  Tensor<float> silhouette;     // H×W when asked for, Σ w over the surfels that bodies carry
   surface::TracedPixels traced;
   MirroredRays mirrored;
   Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
@@ -64,6 +66,7 @@ struct FrameGradient {
   Tensor<float> distortion;     // H×W
   Tensor<float> alpha;          // H×W
   Tensor<float> depth;          // H×W
+  Tensor<float> silhouette;     // H×W
   Tensor<float> main_position;  // M×3, of the posed main surfels
 };
 
@@ -73,6 +76,7 @@ struct Trainable {
   bool main = true;  // every group of the main surfels but tint
   bool tint = true;
   bool main_field = true;
+  bool main_motion = true;
   bool environment = true;  // environment surfels, or the map
   bool environment_field = true;
   bool camera = true;  // its pose
@@ -83,6 +87,7 @@ struct SceneGradient {
   Surfels main;
   Surfels environment;
   Field main_field;
+  Motion main_motion;
   Field environment_field;
   EnvironmentMap environment_map;
   CameraGradient<float> camera;

@@ -59,6 +59,14 @@ struct PlaceSignal {
   }
 };
 
+// 1 for a surfel that a body carries, else 0.
+struct IsCarried {
+  StoredRow row;
+  const int32_t* body;
+  float* to;
+  TRACEFLOW_HD void operator()(int64_t i) const { to[i] = body[row(i)] >= 0 ? 1.0F : 0.0F; }
+};
+
 struct FlagNonZero {
   const float* value;
   uint8_t* flag;
@@ -104,9 +112,11 @@ struct CanShow {
   ViewPyramid pyramid;
   const float *position, *log_scale;
   float near_plane;
-  const float* reach;  // null for 0
+  const float* reach;   // null for 0
+  const int32_t* body;  // null: none is carried
 
   TRACEFLOW_HD bool operator()(int64_t i) const {
+    if (body != nullptr && body[i] >= 0) return true;
     const Vec3<float> centre = camera.point_in_camera(load3<float>(position + 3 * i));
     const float a = log_scale[2 * i], b = log_scale[2 * i + 1];
     const float moved = reach != nullptr ? *reach : 0.0F;

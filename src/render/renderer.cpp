@@ -20,6 +20,8 @@ int stored_degree(const Surfels& surfels) { return surfels.count() > 0 ? sh_degr
 
 StoredRow stored_row(const Frame& frame) { return {frame.subset.empty() ? nullptr : frame.subset.data()}; }
 
+const Motion* motion_if(const Scene& scene) { return scene.main_motion ? &*scene.main_motion : nullptr; }
+
 // Leaves the largest distance between posed and stored positions in the frame.
 void find_reach(const Surfels& stored, Frame& frame) {
   const SquareOfMove move{stored_row(frame), stored.position.data(), frame.main.position.data()};
@@ -52,6 +54,7 @@ void SceneGradient::reset(const Scene& scene) {
   like(main, scene.main);
   like(environment, scene.environment);
   if (scene.main_field) like(main_field, *scene.main_field);
+  if (scene.main_motion) like(main_motion, *scene.main_motion);
   if (scene.environment_field) like(environment_field, *scene.environment_field);
   if (scene.environment_map) {
     sized(environment_map.logit, scene.environment_map->logit.shape());
@@ -86,7 +89,9 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
   const Field* field = field_if(scene.main_field, request.deform_main);
   const Device device = scene.device();
   const int degree = std::min(request.sh_degree_main, stored_degree(scene.main));
-  const Pose pose{field ? request.time : 0, degree, field != nullptr};
+  const Motion* motion = motion_if(scene);
+  const bool moves = field != nullptr || motion != nullptr;
+  const Pose pose{moves ? request.time : 0, degree, moves};
   const bool anew = keep_for_backward || request.cull;
   if (!anew && main_pose_ == pose) return;
   main_pose_.reset();
@@ -104,6 +109,8 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
   }
   frame_.reach.place(device).reset({1});
   if (field) find_reach(scene.main, frame_);
+  if (motion)
+    motion::forward(*motion, scene.main.body, request.time, frame_.subset, frame_.main, *motion_saved_);
   if (!request.cull) main_pose_ = pose;
 }
 
@@ -138,6 +145,9 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
                             frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
   }
 
+  frame_.silhouette.place(device).resize({0});
+  if (request.silhouette && !scene.main.body.empty()) draw_silhouette(scene, request);
+
   // Mirror the view at what was drawn.
   frame_.traced.pixel.place(device).resize({0});
   frame_.traced.weight.place(device).resize({0});
@@ -151,6 +161,40 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   shade::forward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.specular_rays,
                  frame_.colour);
   return frame_;
+}
+
+void Renderer::draw_silhouette(const Scene& scene, const FrameRequest& request) {
+  const Device device = scene.device();
+  const int64_t count = frame_.main.count();
+  carried_.position = frame_.main.position;
+  carried_.scale = frame_.main.scale;
+  carried_.rotation = frame_.main.rotation;
+  carried_.opacity = frame_.main.opacity;
+  carried_.sh.place(device).reset({count, 1, 3});
+  carried_.tint.place(device).resize({count});
+  parallel_for(device, "render: carried surfels", count,
+               IsCarried{stored_row(frame_), scene.main.body.data(), carried_.tint.data()});
+  raster::forward(carried_, request.camera, frame_.drawn_with, carried_output_, carried_saved_.get());
+  frame_.silhouette.swap(carried_output_.tint);
+}
+
+void Renderer::backward_silhouette(const Scene& scene, const FrameRequest& request,
+                                   const FrameGradient& grad_frame) {
+  if (grad_frame.silhouette.empty() || frame_.main.count() == 0) return;
+  grad_carried_.tint = grad_frame.silhouette;
+  grad_carried_input_.wants_camera = false;
+  raster::backward(carried_, request.camera, frame_.drawn_with, *carried_saved_, grad_carried_,
+                   grad_carried_input_);
+  const PosedSurfels& from = grad_carried_input_.surfels;
+  PosedSurfels& to = grad_raster_input_.surfels;
+  const auto add = [&](const Tensor<float>& more, Tensor<float>& sum) {
+    parallel_for(scene.device(), "render: add gradients of silhouettes", more.size(),
+                 AddNumbers{more.data(), sum.data()});
+  };
+  add(from.position, to.position);
+  add(from.scale, to.scale);
+  add(from.rotation, to.rotation);
+  add(from.opacity, to.opacity);
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
@@ -201,7 +245,9 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
                   grad_trace_.colour);
   // Trace and reflect.
   if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, gradient);
-  if (frame_.main.count() == 0 || !(trainable.main || trainable.tint || trainable.main_field)) return;
+  if (frame_.main.count() == 0 ||
+      !(trainable.main || trainable.tint || trainable.main_field || trainable.main_motion))
+    return;
 
   // With the geometry frozen only the tint's gradient is wanted (method §7.2).
   if (!trainable.main) {
@@ -223,6 +269,7 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   grad_raster_input_.wants_camera = trainable.camera;
   raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
                    grad_raster_, grad_raster_input_);
+  if (trainable.main) backward_silhouette(scene, request, grad_frame);
   parallel_for(scene.device(), "render: add gradients of positions", grad_frame.main_position.size(),
                AddNumbers{grad_frame.main_position.data(), grad_raster_input_.surfels.position.data()});
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;
@@ -231,7 +278,11 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   parallel_for(scene.device(), "render: place signals", frame_.main.count(),
                PlaceSignal{stored_row(frame_), grad_raster_input_.screen_gradient.data(), drawn_.data(),
                            gradient.main_signal.data(), gradient.main_visible.data()});
-  // Deform.
+  // Move and deform.
+  if (const Motion* motion = motion_if(scene)) {
+    motion::backward(*motion, scene.main.body, request.time, frame_.subset, frame_.main, *motion_saved_,
+                     grad_raster_input_.surfels, trainable.main_motion ? &gradient.main_motion : nullptr);
+  }
   deform::backward(scene.main, field, request.time, frame_.subset, frame_.main, main_saved_,
                    grad_raster_input_.surfels, gradient.main,
                    field && trainable.main_field ? &gradient.main_field : nullptr);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "ops/deform/deform.h"
+#include "ops/motion/motion.h"
 #include "render/frame.h"
 #include "render/reflection_map.h"
 #include "render/render_options.h"
@@ -49,13 +50,22 @@ class Renderer {
   void begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors);
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                          SceneGradient& gradient);
+  void draw_silhouette(const Scene& scene, const FrameRequest& request);
+  void backward_silhouette(const Scene& scene, const FrameRequest& request, const FrameGradient& grad_frame);
   bool reflects(const Scene& scene, const FrameRequest& request) const;
 
   RenderOptions options_;
   Frame frame_;
   std::optional<Pose> main_pose_, environment_pose_;  // of all of the last scene's surfels, in frame_
   deform::Saved main_saved_, environment_saved_;
+  motion::SavedPtr motion_saved_ = motion::make_saved();
   raster::SavedPtr raster_saved_ = raster::make_saved();
+  // The carried surfels white, the others black.
+  PosedSurfels carried_;
+  raster::SavedPtr carried_saved_ = raster::make_saved();
+  raster::Output carried_output_;
+  raster::OutputGradient grad_carried_;
+  raster::InputGradient grad_carried_input_;
   trace::BvhPtr bvh_ = trace::make_bvh();
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;

@@ -82,7 +82,8 @@ std::string hello_text(const Stage& stage, const Setting& setting) {
                       {"name", setting.name},
                       {"capture", setting.capture != nullptr ? setting.capture->name : ""},
                       {"device", name_of(scene.device())},
-                      {"moves", scene.main_field.has_value() || scene.environment_field.has_value()},
+                      {"moves", scene.main_field.has_value() || scene.main_motion.has_value() ||
+                                    scene.environment_field.has_value()},
                       {"layers", layers(setting.capture != nullptr)},
                       {"maps", std::move(maps)},
                       {"cameras",

@@ -10,6 +10,7 @@
 #include "math/symmetric_eigen.h"
 #include "scene/neighbours.h"
 #include "scene/rows.h"
+#include "train/bodies.h"
 #include "train/common_view.h"
 #include "train/sightings.h"
 
@@ -256,11 +257,14 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
   // mirrors grew into one before the camera, which can show any scene.
   const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks && !capture.masks_are_estimated;
+  const bool finds_bodies = options.deform.main && options.deform.kind == "nodes" && capture.has_masks &&
+                            !capture.masks_are_estimated;
   if (options.initial.colours_from_views || by_masks) {
     const Sightings sightings = look_at(scene.main, earliest_photographs(capture));
     if (options.initial.colours_from_views) set_colours(scene.main, sightings);
     if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
   }
+  if (finds_bodies) scene.main_motion = find_bodies(capture, scene.main);
   if (options.deform.main)
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
 

@@ -32,7 +32,7 @@ LossTerms LossMeans::read() const {
   const Tensor<loss::Mean> means = means_.on(Device::cpu);
   const std::array<double*, squared_error> values{&terms.l1,           &terms.ssim,       &terms.normal,
                                                   &terms.normal_prior, &terms.distortion, &terms.lpips,
-                                                  &terms.rigidity};
+                                                  &terms.rigidity,     &terms.silhouette};
   for (size_t term = 0; term < values.size(); ++term) {
     if (!weight_[term]) continue;
     *values[term] = means[static_cast<int64_t>(term)].value;
@@ -74,6 +74,11 @@ void evaluate_objective(const Frame& frame, const ViewImages& target, const Loss
   if (options.distortion > 0) {
     loss::distortion(frame.raster.distortion, options.distortion, gradient.distortion,
                      slot(LossMeans::distortion, options.distortion));
+  }
+  gradient.silhouette.place(device).reset(frame.silhouette.shape());
+  if (!frame.silhouette.empty()) {
+    loss::silhouette(frame.silhouette, target.coverage, options.silhouette, gradient.silhouette,
+                     slot(LossMeans::silhouette, options.silhouette));
   }
   if (perceptual != nullptr) {
     lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined, options.lpips,

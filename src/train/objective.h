@@ -20,6 +20,7 @@ struct LossTerms {
   double normal_prior = 0;  // L_tc-norm
   double distortion = 0;
   double rigidity = 0;
+  double silhouette = 0;
   double lpips = 0;
   // dB, of the image as it is, not rounded; absent where nothing of the photograph is known.
   std::optional<double> psnr;
@@ -30,7 +31,18 @@ struct LossTerms {
 class LossMeans {
  public:
   // In the order in which they are added up; the last is no term of the sum.
-  enum Term { l1, ssim, normal, normal_prior, distortion, lpips, rigidity, squared_error, term_count };
+  enum Term {
+    l1,
+    ssim,
+    normal,
+    normal_prior,
+    distortion,
+    lpips,
+    rigidity,
+    silhouette,
+    squared_error,
+    term_count
+  };
 
   // Forgets the last frame's.
   void begin(Device device);

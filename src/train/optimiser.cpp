@@ -11,9 +11,11 @@ optimize::AdamState zero_state(const Tensor<float>& parameter) {
           Tensor<float>(parameter.shape(), parameter.device()), 0};
 }
 
-std::vector<optimize::AdamState> zero_states(const Field& field) {
+// Of a field or a motion.
+template <class Parameters>
+std::vector<optimize::AdamState> zero_states(const Parameters& parameters) {
   std::vector<optimize::AdamState> states;
-  field.for_each(
+  parameters.for_each(
       [&](const std::string&, const Tensor<float>& tensor) { states.push_back(zero_state(tensor)); });
   return states;
 }
@@ -104,6 +106,7 @@ Optimiser::Optimiser(const Scene& scene) {
   main_.reset_like(scene.main);
   environment_.reset_like(scene.environment);
   if (scene.main_field) main_field_ = zero_states(*scene.main_field);
+  if (scene.main_motion) main_motion_ = zero_states(*scene.main_motion);
   if (scene.environment_field) environment_field_ = zero_states(*scene.environment_field);
   if (scene.environment_map) {
     map_ = zero_state(scene.environment_map->logit);
@@ -123,6 +126,12 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
   }
   if (trainable.main_field && scene.main_field) {
     step_field(step, "main_field", *scene.main_field, gradient.main_field, main_field_, field_rate);
+  }
+  if (trainable.main_motion && scene.main_motion) {
+    Motion& motion = *scene.main_motion;
+    const double rate = schedule.motion_rate(iteration);
+    step("main_motion.rotation", motion.rotation, gradient.main_motion.rotation, main_motion_[0], rate / 2);
+    step("main_motion.shift", motion.shift, gradient.main_motion.shift, main_motion_[1], rate * scene.extent);
   }
   if (trainable.environment && scene.environment.count() > 0) {
     step_surfels(step, "environment", scene.environment, gradient.environment, environment_, position_rate,
@@ -154,6 +163,7 @@ void Optimiser::for_each(Self& self, F&& f) {
   };
   surfels("main", self.main_);
   surfels("environment", self.environment_);
+  fields("main_motion", self.main_motion_);
   fields("main_field", self.main_field_);
   fields("environment_field", self.environment_field_);
   fields("map_field", self.map_field_);

@@ -74,6 +74,7 @@ class Optimiser {
   static void for_each(Self& self, F&& f);
 
   SurfelMoments main_, environment_;
+  std::vector<optimize::AdamState> main_motion_;
   std::vector<optimize::AdamState> main_field_, environment_field_, map_field_;
   optimize::AdamState map_;
   StepNotes notes_;

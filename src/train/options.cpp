@@ -36,6 +36,7 @@ TrainOptions cpu_preset() {
   o.initial.environment_cells = 10;
   o.initial.environment_points = 6000;
   o.initial.map_size = 32;
+  o.deform.kind = "nodes";
   o.deform.network.width = 96;
   o.deform.network.depth = 6;
   o.deform.network.skip = 3;
@@ -110,6 +111,8 @@ void RateOptions::validate() const {
                                     {position_end, "rates.position_end"},
                                     {field, "rates.field"},
                                     {field_end, "rates.field_end"},
+                                    {motion, "rates.motion"},
+                                    {motion_end, "rates.motion_end"},
                                     {map, "rates.map"},
                                     {map_end, "rates.map_end"}}) {
     check_option(value > 0, name, value, "a positive number");
@@ -135,6 +138,7 @@ void LossOptions::validate() const {
   check_not_negative(rigidity, "loss.rigidity");
   // Its square is divided by, in single precision.
   check_option(rigidity_strain >= 1e-6F, "loss.rigidity_strain", rigidity_strain, "1e-6 or more");
+  check_not_negative(silhouette, "loss.silhouette");
   check_not_negative(lpips, "loss.lpips");
   check_not_negative(lpips_from, "loss.lpips_from");
   if (lpips > 0 && lpips_weights.empty()) {
@@ -159,8 +163,20 @@ void DensityOptions::validate(const std::string& group) const {
                "a positive number");
 }
 
+void TrackOptions::validate() const {
+  check_not_negative(warm_up, "deform.track.warm_up");
+  check_option(map_each > 0, "deform.track.map_each", map_each, "a positive number");
+  check_option(steps > 0, "deform.track.steps", steps, "a positive number");
+  check_not_negative(again, "deform.track.again");
+  check_option(window > 0, "deform.track.window", window, "a positive number");
+  check_not_negative(blur, "deform.track.blur");
+  check_not_negative(silhouette, "deform.track.silhouette");
+  check_not_negative(normal, "deform.track.normal");
+}
+
 void DeformOptions::validate() const {
-  check_option(kind == "network", "deform.kind", kind, "network");
+  check_option(kind == "network" || kind == "nodes", "deform.kind", kind, "network or nodes");
+  track.validate();
   network.validate();
   environment_network.validate();
 }

@@ -60,6 +60,8 @@ struct RateOptions {
   float tint = 0.01F;
   float field = 8e-4F;
   float field_end = 1.6e-6F;
+  float motion = 5e-4F;
+  float motion_end = 5e-5F;
   float map = 0.016F;
   float map_end = 1.6e-4F;
   float beta1 = 0.9F;
@@ -78,6 +80,8 @@ struct RateOptions {
     v.field("tint", tint, "", "Specular-tint logits.");
     v.field("field", field, "", "Residual fields, first iteration.");
     v.field("field_end", field_end, "", "Residual fields, last iteration (log-linear between).");
+    v.field("motion", motion, "radians", "Poses of bodies, first iteration; shifts in extents.");
+    v.field("motion_end", motion_end, "radians", "Poses of bodies, last iteration (log-linear between).");
     v.field("map", map, "", "Environment map, first iteration.");
     v.field("map_end", map_end, "", "Environment map, last iteration (log-linear between).");
     v.field("beta1", beta1, "", "Adam's decay of the first moment.");
@@ -96,6 +100,7 @@ struct LossOptions {
   float distortion = 0;
   float rigidity = 0;
   float rigidity_strain = 0.2F;
+  float silhouette = 0.3F;
   float lpips = 0;
   int lpips_from = 45000;
   std::string lpips_weights;
@@ -111,6 +116,8 @@ struct LossOptions {
             "Neighbouring main surfels keep their distances while the field moves them (not in the paper).");
     v.field("rigidity_strain", rigidity_strain, "",
             "Relative stretch from which neighbours count as parted.");
+    v.field("silhouette", silhouette, "",
+            "Bodies cover what the capture's masks cover (deform.kind = nodes; not in the paper).");
     v.field("lpips", lpips, "", "Perceptual distance LPIPS, late in training (method §7.4).");
     v.field("lpips_from", lpips_from, "iteration", "Where that starts.");
     v.field("lpips_weights", lpips_weights, "",
@@ -162,19 +169,50 @@ struct DensityOptions {
   void validate(const std::string& group) const;
 };
 
+// How bodies are followed through the film before everything trains (deform.kind = nodes).
+struct TrackOptions {
+  int warm_up = 300;
+  int map_each = 4;
+  int steps = 8;
+  int again = 3;
+  int window = 10;
+  float blur = 2;
+  float silhouette = 0.5F;
+  float normal = 0.3F;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("warm_up", warm_up, "iterations",
+            "Training on the first time alone; at most an eighth of the run.");
+    v.field("map_each", map_each, "iterations", "Training between one time and the next, poses held.");
+    v.field("steps", steps, "", "Gauss-Newton steps for the poses of a new time.");
+    v.field("again", again, "times", "Recent times whose poses are solved again before each new one.");
+    v.field("window", window, "times", "How far back these lie at most.");
+    v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
+    v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
+    v.field("normal", normal, "", "Weight of the residual of normals.");
+  }
+  void validate() const;
+};
+
 // Which fields there are, and their networks (method §1.2, §9).
 struct DeformOptions {
   std::string kind = "network";
   bool main = true;
   bool environment = true;
+  TrackOptions track;
   NetworkOptions network;
   NetworkOptions environment_network;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("kind", kind, "", "Kind of residual field: network.");
+    v.field("kind", kind, "",
+            "How main surfels move: network (a residual field), or nodes (rigid bodies found in masks and "
+            "tracked; "
+            "network where there are none).");
     v.field("main", main, "", "The main surfels move.");
     v.field("environment", environment, "", "The environment moves.");
+    v.group("track", track);
     v.group("network", network);
     v.group("environment_network", environment_network);
   }

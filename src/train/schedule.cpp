@@ -147,6 +147,11 @@ double Schedule::field_rate(int iteration) const {
   return optimize::log_linear(options_.rates.field, options_.rates.field_end, iteration, options_.iterations);
 }
 
+double Schedule::motion_rate(int iteration) const {
+  return optimize::log_linear(options_.rates.motion, options_.rates.motion_end, iteration,
+                              options_.iterations);
+}
+
 double Schedule::map_rate(int iteration) const {
   return optimize::log_linear(options_.rates.map, options_.rates.map_end, iteration, options_.iterations);
 }

@@ -46,6 +46,7 @@ class Schedule {
   // Learning rates that fall along the run.
   double position_rate(int iteration) const;
   double field_rate(int iteration) const;
+  double motion_rate(int iteration) const;
   double map_rate(int iteration) const;
 
  private:

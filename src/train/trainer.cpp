@@ -14,6 +14,7 @@
 #include "ops/loss/rigidity.h"
 #include "render/frame_kernels.h"
 #include "scene/scene_file.h"
+#include "train/bodies.h"
 #include "train/continuation.h"
 #include "train/initialise.h"
 
@@ -141,7 +142,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
-      before_step_{random_, views_, -1} {
+      before_step_{random_, views_, -1, {}, {}} {
   density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
@@ -157,7 +158,8 @@ FrameRequest Trainer::request_for(const View& view) {
   request.camera = view.camera;
   const double noise =
       schedule_.time_jitter(iteration_) * random_.normal() / static_cast<double>(capture_.train.size());
-  request.time = std::clamp(view.time + static_cast<float>(noise), 0.0F, 1.0F);
+  request.time =
+      scene_.main_motion ? view.time : std::clamp(view.time + static_cast<float>(noise), 0.0F, 1.0F);
   request.sh_degree_main = schedule_.sh_degree_main(iteration_);
   request.sh_degree_environment = schedule_.sh_degree_environment(iteration_);
   request.deform_main = schedule_.deforms_main(iteration_);
@@ -170,7 +172,86 @@ FrameRequest Trainer::request_for(const View& view) {
   return request;
 }
 
+Trainer::Tracking Trainer::tracking(int iteration) const {
+  if (!scene_.main_motion) return {false, false, 0};
+  const TrackOptions& track = options_.deform.track;
+  constexpr int least_share = 8;  // of a run, for the warm-up
+  const int64_t keys = scene_.main_motion->keys();
+  const int since = iteration - std::min(track.warm_up, options_.iterations / least_share);
+  if (since < 0) return {true, false, 0};
+  const int64_t key = 1 + since / track.map_each;
+  if (key >= keys) return {false, key == keys && since % track.map_each == 0, keys - 1};
+  return {true, since % track.map_each == 0, key};
+}
+
+// Of times that are known better now than when they were new.
+constexpr int few_steps = 3;
+constexpr double little_blur = 0.35;
+
+void Trainer::follow_again() {
+  const Surfels main = scene_.main.on(Device::cpu);
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  const TrackOptions& track = options_.deform.track;
+  const Tracker tracker(track, options_.render, capture_);
+  const int64_t last = motion.keys() - 1;
+  for (int64_t key = 0; key <= last; ++key)
+    tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur);
+  scene_.main_motion = motion.on(device_);
+}
+
+void Trainer::follow(int64_t key) {
+  const Surfels main = scene_.main.on(Device::cpu);
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  const TrackOptions& track = options_.deform.track;
+  const Tracker tracker(track, options_.render, capture_);
+  if (key > 2) {
+    const int64_t oldest = std::max<int64_t>(1, key - track.window);
+    for (int k = 0; k < track.again; ++k) {
+      const int64_t at = oldest + static_cast<int64_t>(random_.below(static_cast<int64_t>(key - oldest)));
+      tracker.solve(main, motion, at, scene_.extent, few_steps, little_blur * track.blur);
+    }
+  }
+  Tracker::predict(motion, key);
+  tracker.solve(main, motion, key, scene_.extent, track.steps, track.blur);
+  // What is behind stands where this one does until it is reached.
+  for (int64_t b = 0; b < motion.bodies(); ++b) {
+    for (int64_t later = key + 1; later < motion.keys(); ++later) {
+      std::copy_n(&motion.rotation(b, key, 0), 4, &motion.rotation(b, later, 0));
+      std::copy_n(&motion.shift(b, key, 0), 3, &motion.shift(b, later, 0));
+    }
+  }
+  scene_.main_motion = motion.on(device_);
+  health_.expect_fall();
+}
+
+void Trainer::let_strays_go(int64_t key) {
+  Surfels main = scene_.main.on(Device::cpu);
+  const Motion motion = scene_.main_motion->on(Device::cpu);
+  release_strays(capture_, motion, motion.time[key], main);
+  scene_.main.body = main.body.on(device_);
+}
+
+const View& Trainer::draw_tracked_view(const Tracking& now) {
+  // Half of the views are of the newest times, for their surface is the least known.
+  constexpr double newest_share = 0.5, newest_duration = 0.08;
+  const Tensor<float> times = scene_.main_motion->time.on(Device::cpu);
+  const float latest = times[now.key];
+  if (now.key > 0 && random_.uniform() < newest_share) {
+    std::vector<const View*> newest;
+    for (const View& view : capture_.train) {
+      if (view.time <= latest && view.time >= latest - newest_duration) newest.push_back(&view);
+    }
+    return *newest[random_.below(static_cast<int64_t>(newest.size()))];
+  }
+  for (;;) {
+    const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
+    if (view.time <= latest) return view;
+  }
+}
+
 const View& Trainer::draw_view() {
+  const Tracking now = tracking(iteration_);
+  if (now.goes_on) return draw_tracked_view(now);
   const auto [first, last] =
       std::minmax_element(capture_.train.begin(), capture_.train.end(),
                           [](const View& a, const View& b) { return a.time < b.time; });
@@ -183,10 +264,18 @@ const View& Trainer::draw_view() {
 
 LossTerms Trainer::step() {
   density_changes_.clear();
+  const Tracking now = tracking(iteration_);
+  if (now.enters && now.goes_on) follow(now.key);
+  constexpr int64_t strays_every = 5;  // times
+  if (now.enters && !now.goes_on) follow_again();
+  if (now.enters && (now.key % strays_every == 0 || !now.goes_on)) let_strays_go(now.key);
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view);
-  const FrameRequest request = request_for(view);
-  const Trainable trainable = schedule_.trainable(iteration_);
+  FrameRequest request = request_for(view);
+  request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
+  Trainable trainable = schedule_.trainable(iteration_);
+  trainable.main_motion = trainable.main && scene_.main_motion && !now.goes_on;
+  if (now.goes_on) request.deform_main = trainable.main_field = false;
 
   const Frame& frame = renderer_.forward(scene_, request, true);
   take_unknown(frame.colour, target);
@@ -282,7 +371,8 @@ events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
                  {"normal", terms.normal},
                  {"normal_prior", terms.normal_prior},
                  {"distortion", terms.distortion},
-                 {"rigidity", terms.rigidity}};
+                 {"rigidity", terms.rigidity},
+                 {"silhouette", terms.silhouette}};
   if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
   event.psnr = health_.smoothed_psnr();
   event.seconds = seconds_;
@@ -330,7 +420,11 @@ std::string Trainer::tell_iteration() {
     tell_measured();
     stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
-  before_step_ = Draws{random_, views_, iteration_};
+  before_step_ = Draws{random_, views_, iteration_, {}, {}};
+  if (tracking(iteration_).enters) {
+    before_step_.motion = scene_.main_motion;
+    before_step_.body = scene_.main.body;
+  }
   const Clock::time_point start = Clock::now();
   LossTerms terms;
   {
@@ -465,6 +559,10 @@ void Trainer::step_back() {
   if (iteration_ == before_step_.iteration) {
     random_ = before_step_.random;
     views_ = before_step_.views;
+    if (before_step_.motion) {
+      scene_.main_motion = before_step_.motion;
+      scene_.main.body = before_step_.body;
+    }
   }
   tell_density();
   // What the next frame would need is free for the copies that saving makes.

@@ -20,6 +20,7 @@
 #include "train/schedule.h"
 #include "train/step_meter.h"
 #include "train/targets.h"
+#include "train/tracker.h"
 
 namespace traceflow {
 
@@ -76,6 +77,20 @@ class Trainer {
  private:
   // Takes over what is told of the scene that the run starts from.
   Scene begin(InitialScene made);
+  // Where the run is while bodies are tracked (deform.kind = nodes).
+  struct Tracking {
+    bool goes_on;  // the film has not been followed to its end
+    bool enters;   // this iteration begins with a new time
+    int64_t key;   // the newest time
+  };
+  Tracking tracking(int iteration) const;
+  // Follows bodies to a new time.
+  void follow(int64_t key);
+  // Finds the poses of all times again, the first one's too, when the film has been followed to its end.
+  void follow_again();
+  // What lies behind a body may have been taken for a part of it: the times up to this one tell.
+  void let_strays_go(int64_t key);
+  const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();
   FrameRequest request_for(const View& view);
@@ -110,6 +125,9 @@ class Trainer {
     Random random;
     ViewOrder views;
     int iteration;
+    // As the step found them, where it follows bodies to a new time.
+    std::optional<Motion> motion;
+    Tensor<int32_t> body;
   };
   // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
   // again.

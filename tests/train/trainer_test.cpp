@@ -35,7 +35,9 @@ TEST(Trainer, LearnsTheCapture) {
 
 // What view culling allows for: nothing before anything moved, then as far as the field moved a surfel.
 TEST(Trainer, CullingLearnsHowFarTheFieldMoves) {
-  Trainer trainer = make_trainer(small_run(12), "reach");
+  TrainOptions options = small_run(12);
+  options.deform.kind = "network";  // from the first iterations on
+  Trainer trainer = make_trainer(options, "reach");
   EXPECT_EQ(trainer.scene().main_reach[0], 0);
   for (int i = 0; i < 10; ++i) trainer.step();
   EXPECT_GT(trainer.scene().main_reach[0], 0);
@@ -286,7 +288,8 @@ TEST(Trainer, ARefusedResumeLeavesADamagedCheckpointWhereItIs) {
 }
 
 TEST(Trainer, BondsThatDoNotFitTheSurfelsAreRefused) {
-  const TrainOptions options = small_run(6);
+  TrainOptions options = small_run(6);
+  options.deform.kind = "network";  // which bonds hold from the first iterations on
   Trainer trainer = make_trainer(options, "bonds");
   trainer.run(never);
   const RunFolder run{fs::path(::testing::TempDir()) / ("bonds_" + std::to_string(::getpid()))};

@@ -1,0 +1,221 @@
+#include "train/bodies.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "base/parallel.h"
+#include "ops/motion/motion.h"
+
+namespace traceflow {
+
+namespace {
+
+// A part of a mask with fewer pixels, or with fewer surfels, is none: noise, or too small to be followed.
+constexpr int64_t least_pixels = 24;
+constexpr int64_t least_surfels = 24;
+constexpr int32_t most_bodies = 8;
+// Surfels belong to a part of a mask where they lie beside it by at most such a share of the image's width.
+constexpr double label_margin = 1.0 / 120;
+// A carried surfel belongs to its body where it lies in the masks, or beside them by at most such a share of
+// the image's width, in as many of the views that see it.
+constexpr double mask_margin = 1.0 / 80;
+constexpr double share_in_masks = 0.9;
+
+// Connected parts (8 neighbours) of a mask.
+struct Parts {
+  Tensor<int32_t> label;      // H×W, of the part that a pixel lies in or beside, -1 for none
+  std::vector<int64_t> area;  // pixels of each
+};
+
+// Labels reach one pixel beyond the mask at a time.
+void grow(Tensor<int32_t>& label) {
+  const Tensor<int32_t> before = label;
+  for (int64_t y = 0; y < label.dim(0); ++y) {
+    for (int64_t x = 0; x < label.dim(1); ++x) {
+      if (before(y, x) >= 0) continue;
+      const auto take = [&](int64_t row, int64_t column) {
+        if (row < 0 || column < 0 || row >= label.dim(0) || column >= label.dim(1)) return;
+        label(y, x) = std::max(label(y, x), before(row, column));
+      };
+      take(y - 1, x);
+      take(y + 1, x);
+      take(y, x - 1);
+      take(y, x + 1);
+    }
+  }
+}
+
+Parts parts_of(const Tensor<uint8_t>& mask) {
+  const int64_t height = mask.dim(0), width = mask.dim(1);
+  Parts parts{Tensor<int32_t>({height, width}), {}};
+  parts.label.fill(-1);
+  std::vector<int64_t> part;
+  Tensor<uint8_t> visited({height, width});
+  for (int64_t start = 0; start < mask.size(); ++start) {
+    if (mask[start] == 0 || visited[start] != 0) continue;
+    part.assign(1, start);
+    visited[start] = 1;
+    for (size_t k = 0; k < part.size(); ++k) {
+      const int64_t row = part[k] / width, column = part[k] % width;
+      for (int64_t y = std::max<int64_t>(0, row - 1); y <= std::min(height - 1, row + 1); ++y) {
+        for (int64_t x = std::max<int64_t>(0, column - 1); x <= std::min(width - 1, column + 1); ++x) {
+          const int64_t at = y * width + x;
+          if (mask[at] == 0 || visited[at] != 0) continue;
+          visited[at] = 1;
+          part.push_back(at);
+        }
+      }
+    }
+    if (static_cast<int64_t>(part.size()) < least_pixels) continue;
+    for (const int64_t pixel : part) parts.label[pixel] = static_cast<int32_t>(parts.area.size());
+    parts.area.push_back(static_cast<int64_t>(part.size()));
+  }
+  const int64_t margin = std::max<int64_t>(1, std::llround(label_margin * static_cast<double>(width)));
+  for (int64_t k = 0; k < margin; ++k) grow(parts.label);
+  return parts;
+}
+
+// A surfel that projects into a part of a mask.
+struct Candidate {
+  int64_t row;
+  Vec2<float> pixel;
+  float z;
+};
+
+// The rows of those that lie at most as far behind the part's front as the part is wide: what lies farther is
+// seen past it at other times. The front is the median of the nearest in each of some cells.
+std::vector<int64_t> within_thickness(const std::vector<Candidate>& candidates, int64_t area,
+                                      const Camera<float>& camera) {
+  constexpr float cells_across = 6;
+  const float size = std::sqrt(static_cast<float>(area));
+  std::map<std::pair<int, int>, float> nearest;
+  for (const Candidate& c : candidates) {
+    const std::pair cell(static_cast<int>(c.pixel.x * cells_across / size),
+                         static_cast<int>(c.pixel.y * cells_across / size));
+    const auto [found, is_new] = nearest.emplace(cell, c.z);
+    if (!is_new) found->second = std::min(found->second, c.z);
+  }
+  if (nearest.empty()) return {};
+  std::vector<float> front;
+  for (const auto& [cell, z] : nearest) front.push_back(z);
+  const auto middle = front.begin() + static_cast<std::ptrdiff_t>(front.size() / 2);
+  std::nth_element(front.begin(), middle, front.end());
+  const float farthest = *middle * (1 + size / camera.focal_x);
+  std::vector<int64_t> rows;
+  for (const Candidate& c : candidates) {
+    if (c.z <= farthest) rows.push_back(c.row);
+  }
+  return rows;
+}
+
+Tensor<float> times_of(const std::vector<View>& views) {
+  std::set<float> times;
+  for (const View& view : views) times.insert(view.time);
+  return tensor_of(std::vector<float>(times.begin(), times.end()));
+}
+
+Vec3<float> median_of(const Surfels& surfels, const std::vector<int64_t>& rows) {
+  Vec3<float> middle(0);
+  std::vector<float> values(rows.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (size_t k = 0; k < rows.size(); ++k) values[k] = surfels.position(rows[k], axis);
+    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), half, values.end());
+    middle[axis] = *half;
+  }
+  return middle;
+}
+
+// The mask, wider by a square of `margin` pixels to each side.
+Tensor<uint8_t> widened(const Tensor<uint8_t>& mask, int64_t margin) {
+  const int64_t height = mask.dim(0), width = mask.dim(1);
+  Tensor<uint8_t> along({height, width}), wide({height, width});
+  for (int64_t y = 0; y < height; ++y) {
+    for (int64_t x = 0; x < width; ++x) {
+      for (int64_t k = std::max<int64_t>(0, x - margin); k <= std::min(width - 1, x + margin); ++k)
+        along(y, x) = static_cast<uint8_t>(along(y, x) | mask(y, k));
+    }
+  }
+  for (int64_t y = 0; y < height; ++y) {
+    for (int64_t k = std::max<int64_t>(0, y - margin); k <= std::min(height - 1, y + margin); ++k) {
+      for (int64_t x = 0; x < width; ++x) wide(y, x) = static_cast<uint8_t>(wide(y, x) | along(k, x));
+    }
+  }
+  return wide;
+}
+
+}  // namespace
+
+std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels) {
+  const View& first = *std::min_element(capture.train.begin(), capture.train.end(),
+                                        [](const View& a, const View& b) { return a.time < b.time; });
+  const std::shared_ptr<const ViewImages> images = load_images(capture, first);
+  if (images->mask.empty()) return std::nullopt;
+  const Parts parts = parts_of(images->mask);
+  std::vector<std::vector<Candidate>> candidates(parts.area.size());
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    const Vec3<float> point = load3<float>(surfels.position.row(i));
+    if (!first.camera.sees(point)) continue;
+    const Vec3<float> at = first.camera.point_in_camera(point);
+    const Vec2<float> pixel = first.camera.project(at);
+    const int32_t part = parts.label(static_cast<int64_t>(pixel.y), static_cast<int64_t>(pixel.x));
+    if (part >= 0) candidates[static_cast<size_t>(part)].push_back({i, pixel, at.z});
+  }
+  std::vector<std::vector<int64_t>> rows;
+  for (size_t part = 0; part < candidates.size(); ++part) {
+    rows.push_back(within_thickness(candidates[part], parts.area[part], first.camera));
+  }
+  std::erase_if(rows, [](const auto& part) { return static_cast<int64_t>(part.size()) < least_surfels; });
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
+  if (rows.size() > static_cast<size_t>(most_bodies)) rows.resize(static_cast<size_t>(most_bodies));
+  if (rows.empty()) return std::nullopt;
+
+  surfels.body.resize({surfels.count()});
+  surfels.body.fill(-1);
+  Tensor<float> centre({static_cast<int64_t>(rows.size()), 3});
+  for (size_t b = 0; b < rows.size(); ++b) {
+    for (const int64_t i : rows[b]) surfels.body[i] = static_cast<int32_t>(b);
+    store3(centre.row(static_cast<int64_t>(b)), median_of(surfels, rows[b]));
+  }
+  return still_motion(centre, times_of(capture.train));
+}
+
+int64_t release_strays(const Capture& capture, const Motion& motion, float latest, Surfels& surfels) {
+  const int64_t count = surfels.count();
+  std::vector<int32_t> seen(static_cast<size_t>(count)), inside(static_cast<size_t>(count));
+  for (const View& view : capture.train) {
+    if (view.time > latest) continue;
+    const std::shared_ptr<const ViewImages> images = load_images(capture, view);
+    if (images->mask.empty()) continue;
+    const Tensor<uint8_t> mask =
+        widened(images->mask,
+                std::max<int64_t>(1, std::llround(mask_margin * static_cast<double>(view.camera.width))));
+    Surfels moved;
+    moved.position = surfels.position;
+    moved.rotation = surfels.rotation;
+    moved.sh.reset({count, 1, 3});
+    motion::move(motion, surfels.body, view.time, moved);
+    parallel_for("bodies: look for strays", count, [&](int64_t i) {
+      const Vec3<float> point = load3<float>(moved.position.row(i));
+      if (surfels.body[i] < 0 || !view.camera.sees(point)) return;
+      const Vec2<float> at = view.camera.project(view.camera.point_in_camera(point));
+      ++seen[static_cast<size_t>(i)];
+      inside[static_cast<size_t>(i)] += mask(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x));
+    });
+  }
+  int64_t released = 0;
+  for (size_t i = 0; i < seen.size(); ++i) {
+    int32_t& body = surfels.body[static_cast<int64_t>(i)];
+    if (body < 0 || inside[i] >= share_in_masks * seen[i]) continue;
+    body = -1;
+    ++released;
+  }
+  return released;
+}
+
+}  // namespace traceflow

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <optional>
+
+#include "capture/capture.h"
+#include "scene/motion.h"
+#include "scene/surfels.h"
+
+// Which surfels move together, by the capture's masks.
+namespace traceflow {
+
+// A body for each connected part of the earliest photograph's mask: it carries the surfels that project into
+// it and lie no farther behind its front than it is wide. Sets surfels.body and returns bodies that stand
+// still at the times of the training views; nothing where no part has enough surfels.
+std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);
+
+// Lets carried surfels stand still that their body takes out of the masks of the views up to the time
+// `latest`: they lay behind it, or beside it. surfels and motion on the CPU. Returns how many.
+int64_t release_strays(const Capture& capture, const Motion& motion, float latest, Surfels& surfels);
+
+}  // namespace traceflow

@@ -1,0 +1,214 @@
+#include "train/bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "base/parallel.h"
+#include "capture/motion_truth.h"
+#include "math/rotation_group.h"
+#include "math/similarity_fit.h"
+#include "train/initialise.h"
+#include "train/small_run.h"
+#include "train/tracker.h"
+
+namespace traceflow {
+namespace {
+
+// Two things that turn and come closer (docs/synth.md), every 24th of their way a picture.
+const fs::path& tumbling() {
+  static const fs::path folder = [] {
+    fs::path path = fs::path(::testing::TempDir()) / ("tumbling_" + std::to_string(::getpid()));
+    SynthOptions options;
+    options.scene = SynthScene::tumble;
+    options.frames = 25;
+    options.width = 120;
+    options.height = 68;
+    options.samples = 1;
+    options.points = 4000;
+    write_synthetic_capture(options, path);
+    return path;
+  }();
+  return folder;
+}
+
+struct Tumbling {
+  Capture capture = load_capture(tumbling(), {});
+  Scene scene;
+
+  explicit Tumbling(const std::string& kind = "nodes") {
+    TrainOptions options = preset("cpu");
+    options.deform.kind = kind;
+    Random random(1);
+    scene = initial_scene(capture, options, random).scene;
+  }
+};
+
+// The true points of a thing (scene units), at a time's index.
+std::vector<Vec3<double>> true_points(const Capture& capture, const MotionTruth& truth, int32_t object,
+                                      int64_t at) {
+  std::vector<Vec3<double>> points;
+  for (int64_t i = 0; i < truth.object.size(); ++i) {
+    if (truth.object[i] == object)
+      points.push_back(capture.normalisation.in_scene(load3<double>(&truth.points(at, i, 0))));
+  }
+  return points;
+}
+
+double least_distance(const Vec3<double>& x, const std::vector<Vec3<double>>& points) {
+  double least = 1e9;
+  for (const Vec3<double>& p : points) least = std::min(least, length(x - p));
+  return least;
+}
+
+// The thing that a body is: whose points its surfels are nearest to.
+int32_t thing_of(const Tumbling& at, const MotionTruth& truth, int32_t body) {
+  double best = 1e9;
+  int32_t thing = -1;
+  for (const int32_t object : {0, 1}) {
+    const double d = least_distance(load3<double>(at.scene.main_motion->centre.row(body)),
+                                    true_points(at.capture, truth, object, 0));
+    if (d < best) {
+      best = d;
+      thing = object;
+    }
+  }
+  return thing;
+}
+
+TEST(Bodies, AreTheThingsOfTheMask) {
+  const Tumbling at;
+  const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
+  ASSERT_TRUE(truth && at.scene.main_motion);
+  ASSERT_EQ(at.scene.main_motion->bodies(), 2);
+  ASSERT_EQ(at.scene.main_motion->keys(), 25);
+  const double unit = at.capture.normalisation.scale;  // a metre
+  std::set<int32_t> things;
+  for (const int32_t body : {0, 1}) {
+    const int32_t thing = thing_of(at, *truth, body);
+    things.insert(thing);
+    const auto points = true_points(at.capture, *truth, thing, 0);
+    int64_t carried = 0, near = 0;
+    for (int64_t i = 0; i < at.scene.main.count(); ++i) {
+      if (at.scene.main.body[i] != body) continue;
+      ++carried;
+      // Their back is not among the points that the first view sees: a thing is 0.4 m across.
+      near += least_distance(load3<double>(at.scene.main.position.row(i)), points) < 0.25 * unit ? 1 : 0;
+    }
+    EXPECT_GT(carried, 100);
+    EXPECT_GT(static_cast<double>(near), 0.9 * static_cast<double>(carried));
+  }
+  EXPECT_EQ(things.size(), 2U);
+  // What the first view sees of the things is carried.
+  int64_t on_things = 0, left = 0;
+  for (int64_t i = 0; i < at.scene.main.count(); ++i) {
+    const Vec3<double> x = load3<double>(at.scene.main.position.row(i));
+    if (std::min(least_distance(x, true_points(at.capture, *truth, 0, 0)),
+                 least_distance(x, true_points(at.capture, *truth, 1, 0))) > 0.01 * unit)
+      continue;
+    ++on_things;
+    left += at.scene.main.body[i] < 0 ? 1 : 0;
+  }
+  EXPECT_GT(on_things, 200);
+  EXPECT_LT(static_cast<double>(left), 0.1 * static_cast<double>(on_things));
+}
+
+TEST(Bodies, ThereAreNoneWithoutMasksOrWhereTheNetworkMovesSurfels) {
+  EXPECT_FALSE(Tumbling("network").scene.main_motion);
+  Tumbling at("network");
+  for (View& view : at.capture.train) view.time += 1;
+  Capture bare = at.capture;
+  bare.has_masks = false;
+  TrainOptions options = preset("cpu");
+  Random random(1);
+  const Scene scene = initial_scene(bare, options, random).scene;
+  EXPECT_FALSE(scene.main_motion);
+  EXPECT_TRUE(scene.main.body.empty());
+  EXPECT_TRUE(scene.main_field);
+}
+
+// Masks and normals, and a shape that was trained on the first picture for a moment, are enough to follow
+// bodies a third of the way.
+TEST(Tracker, FollowsBodiesFromTimeToTime) {
+  const Tumbling at;
+  const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
+  TrainOptions options = preset("cpu");
+  options.iterations = 400;
+  options.specular = Specular::none;
+  options.initial.max_points = options.density.max_surfels = 4000;
+  constexpr int64_t last = 8;
+  const int until = options.iterations / 8 + static_cast<int>(last) * options.deform.track.map_each;
+  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "followed");
+  while (trainer.iteration() < until) trainer.step();
+  const Motion& motion = *trainer.scene().main_motion;
+  for (const int32_t body : {0, 1}) {
+    const int32_t thing = thing_of(at, *truth, body);
+    const auto from = true_points(at.capture, *truth, thing, 0),
+               to = true_points(at.capture, *truth, thing, last);
+    const Similarity expected = fit_similarity(from, to);
+    const Vec3<double> centre = load3<double>(motion.centre.row(body)),
+                       shift = load3<double>(&motion.shift(body, last, 0));
+    const Mat3<double> turn = rotation_from_quaternion(load4<double>(&motion.rotation(body, last, 0)));
+    std::vector<double> moved, missed;
+    for (size_t i = 0; i < from.size(); ++i) {
+      moved.push_back(length(to[i] - from[i]));
+      missed.push_back(length(turn * (from[i] - centre) + centre + shift - to[i]));
+    }
+    std::sort(moved.begin(), moved.end());
+    std::sort(missed.begin(), missed.end());
+    EXPECT_LT(missed[missed.size() / 2], 0.6 * moved[moved.size() / 2]) << body;
+    EXPECT_LT(rotation_angle_deg(turn * transpose(expected.rotation)),
+              0.6 * rotation_angle_deg(expected.rotation))
+        << body;
+  }
+}
+
+TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
+  Tumbling at;
+  const TrackOptions options;
+  const Tracker tracker(options, preset("cpu").render, at.capture);
+  std::set<std::vector<float>> found;
+  for (const int threads : {1, 3}) {
+    set_threads(threads);
+    Motion motion = *at.scene.main_motion;
+    Tracker::predict(motion, 1);
+    tracker.solve(at.scene.main, motion, 1, at.scene.extent, 3, options.blur);
+    found.insert({motion.rotation.values().begin(), motion.rotation.values().end()});
+  }
+  set_threads(0);
+  EXPECT_EQ(found.size(), 1U);
+}
+
+TEST(Tracker, PredictsWhatGoesOnAsBefore) {
+  Motion motion =
+      still_motion(Tensor<float>({1, 3}), tensor_of(std::vector<float>{0, 0.1F, 0.2F, 0.3F, 0.4F, 1}));
+  for (int64_t key = 1; key < 4; ++key) {
+    const Vec4<double> q = quaternion_exp(Vec3<double>(0, 0.1 * static_cast<double>(key), 0));
+    for (int k = 0; k < 4; ++k) motion.rotation(0, key, k) = static_cast<float>(q[k]);
+    motion.shift(0, key, 1) = 0.5F * static_cast<float>(key);
+  }
+  Tracker::predict(motion, 4);
+  EXPECT_NEAR(quaternion_log(load4<double>(&motion.rotation(0, 4, 0))).y, 0.4, 1e-6);
+  EXPECT_NEAR(motion.shift(0, 4, 1), 2, 1e-6);
+  EXPECT_EQ(motion.shift(0, 5, 1), motion.shift(0, 4, 1));
+}
+
+// A body that is moved off the masks loses its surfels; one that stays in them keeps them.
+TEST(Bodies, LoseSurfelsThatTheyTakeOutOfTheMasks) {
+  Tumbling at;
+  Surfels main = at.scene.main;
+  const auto count_of = [&](int32_t body) {
+    return std::count(main.body.data(), main.body.data() + main.count(), body);
+  };
+  const auto before = count_of(1);
+  Motion motion = *at.scene.main_motion;
+  for (int64_t key = 1; key < motion.keys(); ++key) motion.shift(0, key, 2) = 100;
+  const int64_t released = release_strays(at.capture, motion, at.capture.train[1].time, main);
+  EXPECT_EQ(released,
+            std::count(main.body.data(), main.body.data() + main.count(), -1) -
+                std::count(at.scene.main.body.data(), at.scene.main.body.data() + main.count(), -1));
+  EXPECT_GT(static_cast<double>(count_of(1)), 0.8 * static_cast<double>(before));
+}
+
+}  // namespace
+}  // namespace traceflow
