@@ -101,6 +101,7 @@ std::vector<int64_t> within_thickness(const std::vector<Candidate>& candidates, 
   }
   if (nearest.empty()) return {};
   std::vector<float> front;
+  front.reserve(nearest.size());
   for (const auto& [cell, z] : nearest) front.push_back(z);
   const auto middle = front.begin() + static_cast<std::ptrdiff_t>(front.size() / 2);
   std::nth_element(front.begin(), middle, front.end());

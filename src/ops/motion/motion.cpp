@@ -50,11 +50,11 @@ void forward(const Motion& motion, const Tensor<int32_t>& body, float time, cons
 }
 
 void backward(const Motion& motion, const Tensor<int32_t>& body, float time, const Tensor<int32_t>& subset,
-              const PosedSurfels& moved, const Saved& kept, PosedSurfels& grad_posed, Motion* grad_motion) {
+              const PosedSurfels& moved, const Saved& saved, PosedSurfels& grad_posed, Motion* grad_motion) {
   if (body.empty() || moved.count() == 0) return;
   const Device device = moved.device();
   const CarrierOf carrier = carrier_of(body, subset);
-  const PosedBody* const bodies = kept.bodies.data();
+  const PosedBody* const bodies = saved.bodies.data();
   if (grad_motion != nullptr) {
     static thread_local Tensor<Pull> pulls;
     static thread_local Tensor<ShRotation<float>> generators;
