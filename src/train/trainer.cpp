@@ -12,6 +12,7 @@
 #include "base/version.h"
 #include "files/options_json.h"
 #include "ops/loss/rigidity.h"
+#include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
 #include "scene/scene_file.h"
 #include "train/bodies.h"
@@ -194,7 +195,7 @@ void Trainer::follow_again() {
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
   const int64_t last = motion.keys() - 1;
-  for (int64_t key = 0; key <= last; ++key)
+  for (int64_t key = 1; key <= last; ++key)
     tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur);
   scene_.main_motion = motion.on(device_);
 }
@@ -297,6 +298,7 @@ LossTerms Trainer::step() {
 void Trainer::learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable) {
   gradient_.reset(scene_);
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
+  if (scene_.main_motion) motion::hold_first_key(gradient_.main_motion);
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
   // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.

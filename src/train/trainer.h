@@ -86,7 +86,7 @@ class Trainer {
   Tracking tracking(int iteration) const;
   // Follows bodies to a new time.
   void follow(int64_t key);
-  // Finds the poses of all times again, the first one's too, when the film has been followed to its end.
+  // Finds the poses of all times but the first again, when the film has been followed to its end.
   void follow_again();
   // What lies behind a body may have been taken for a part of it: the times up to this one tell.
   void let_strays_go(int64_t key);

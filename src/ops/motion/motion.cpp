@@ -75,6 +75,11 @@ void backward(const Motion& motion, const Tensor<int32_t>& body, float time, con
                TurnGradientBack{carrier, bodies, to.position, to.rotation, to.sh, to.sh_row, to.sh_degree});
 }
 
+void hold_first_key(Motion& gradient) {
+  parallel_for(gradient.device(), "motion: hold the first key", gradient.bodies(),
+               HoldFirstKey{gradient.keys(), gradient.rotation.data(), gradient.shift.data()});
+}
+
 void move(const Motion& motion, const Tensor<int32_t>& body, float time, Surfels& surfels) {
   if (body.empty() || surfels.count() == 0) return;
   Tensor<PosedBody> bodies;

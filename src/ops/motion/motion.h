@@ -31,6 +31,10 @@ void forward(const Motion& motion, const Tensor<int32_t>& body, float time, cons
 void backward(const Motion& motion, const Tensor<int32_t>& body, float time, const Tensor<int32_t>& subset,
               const PosedSurfels& moved, const Saved& saved, PosedSurfels& grad_posed, Motion* grad_motion);
 
+// Zeroes the gradient by the first key of each body. A body that grows and goes away from the camera looks
+// the same; the points that it began with say how large it is as long as its first pose stands.
+void hold_first_key(Motion& gradient);
+
 // Moves stored surfels in place to where they are at a time. Not differentiable.
 void move(const Motion& motion, const Tensor<int32_t>& body, float time, Surfels& surfels);
 

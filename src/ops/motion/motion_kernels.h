@@ -119,6 +119,17 @@ struct PullKeys {
   }
 };
 
+// i: a body.
+struct HoldFirstKey {
+  int64_t keys;
+  float *rotation, *shift;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    for (int k = 0; k < 4; ++k) rotation[4 * keys * i + k] = 0;
+    for (int k = 0; k < 3; ++k) shift[3 * keys * i + k] = 0;
+  }
+};
+
 // The gradient by a surfel as it was; i: a surfel.
 struct TurnGradientBack {
   CarrierOf carrier;

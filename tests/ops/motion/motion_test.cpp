@@ -146,6 +146,20 @@ TEST(Motion, AFrozenOneGetsNoGradientAndABrokenSurfelGivesNone) {
   EXPECT_TRUE(all_finite(pass.grad_motion.shift));
 }
 
+TEST(Motion, HoldsTheFirstKeyAndNoOther) {
+  Motion gradient = random_motion(2, 3);
+  const Motion before = gradient;
+  motion::hold_first_key(gradient);
+  for (int64_t b = 0; b < 2; ++b) {
+    for (int64_t key = 0; key < 3; ++key) {
+      for (int k = 0; k < 3; ++k)
+        EXPECT_EQ(gradient.shift(b, key, k), key == 0 ? 0 : before.shift(b, key, k));
+      for (int k = 0; k < 4; ++k)
+        EXPECT_EQ(gradient.rotation(b, key, k), key == 0 ? 0 : before.rotation(b, key, k));
+    }
+  }
+}
+
 TEST(Motion, IsTheSameBytesAtAnyThreadCount) {
   const Motion motion = random_motion(bodies, 4);
   const PosedSurfels posed = random_posed(9000, 2);
