@@ -36,7 +36,6 @@ TrainOptions cpu_preset() {
   o.initial.environment_cells = 10;
   o.initial.environment_points = 6000;
   o.initial.map_size = 32;
-  o.deform.kind = "nodes";
   o.deform.network.width = 96;
   o.deform.network.depth = 6;
   o.deform.network.skip = 3;

@@ -133,6 +133,7 @@ TEST(Tracker, FollowsBodiesFromTimeToTime) {
   const Tumbling at;
   const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
   TrainOptions options = preset("cpu");
+  options.deform.kind = "nodes";
   options.iterations = 400;
   options.specular = Specular::none;
   options.initial.max_points = options.density.max_surfels = 4000;
