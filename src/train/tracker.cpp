@@ -281,8 +281,12 @@ void Tracker::solve(const Surfels& main, Motion& motion, int64_t key, float exte
 
   PosedSurfels still, posed;
   deform::forward(main, nullptr, time, {}, 0, field::Precision::fp32, still, nullptr);
+  // The rasteriser's tint is then the silhouette.
+  still.tint.resize({main.count()});
+  for (int64_t i = 0; i < main.count(); ++i) still.tint[i] = main.body[i] >= 0 ? 1.0F : 0.0F;
   const motion::SavedPtr saved = motion::make_saved();
-  const raster::Options drawn = render_.raster_options(extent);
+  raster::Options drawn = render_.raster_options(extent);
+  drawn.sort = raster::SortOrder::centre;  // as draw_bodies
   const auto params = static_cast<size_t>(pose_size * motion.bodies());
   const std::vector<double> radius = radii_of(main, motion);
   Tensor<float> pivot({motion.bodies(), 3});
@@ -296,8 +300,8 @@ void Tracker::solve(const Surfels& main, Motion& motion, int64_t key, float exte
     }
   };
   const auto look = [&](const Target& target, double sigma, bool with_jacobian) {
-    raster::draw_bodies(posed, main.body, pivot, target.camera, drawn, with_jacobian, picture);
-    const int64_t pixels = picture.silhouette.size();
+    raster::forward(posed, target.camera, drawn, whole, nullptr);
+    const int64_t pixels = whole.tint.size();
     Residuals r{Tensor<float>({pixels, channels}), {}};
     const auto silhouette = options_.silhouette, normal = options_.normal;
     const bool has_prior = !target.normal_prior.empty();
@@ -306,12 +310,13 @@ void Tracker::solve(const Surfels& main, Motion& motion, int64_t key, float exte
              dot(load3<float>(&target.normal_prior[3 * i]), load3<float>(&target.normal_prior[3 * i])) > 0;
     };
     for (int64_t i = 0; i < pixels; ++i) {
-      r.value(i, 0) = silhouette * (picture.silhouette[i] - target.coverage[i]);
+      r.value(i, 0) = silhouette * (whole.tint[i] - target.coverage[i]);
       if (!counts(i)) continue;
       for (int64_t k = 0; k < 3; ++k)
-        r.value(i, 1 + k) = normal * (picture.normal[3 * i + k] - target.normal_prior[3 * i + k]);
+        r.value(i, 1 + k) = normal * (whole.normal[3 * i + k] - target.normal_prior[3 * i + k]);
     }
     if (with_jacobian) {
+      raster::draw_bodies(posed, main.body, pivot, target.camera, drawn, picture);
       r.jacobian.swap(picture.jacobian);
       for (int64_t i = 0; i < pixels; ++i) {
         const float by_normal = counts(i) ? normal : 0;

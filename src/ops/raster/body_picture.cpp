@@ -59,7 +59,7 @@ class BodyTile {
         options_(options),
         saved_(saved),
         picture_(picture),
-        params_(picture.jacobian.empty() ? 0 : pose_size * static_cast<int>(pivot.dim(0))),
+        params_(pose_size * static_cast<int>(pivot.dim(0))),
         by_transmittance_(static_cast<size_t>(params_)) {}
 
   void run(int64_t tile) {
@@ -92,7 +92,7 @@ class BodyTile {
                    static_cast<float>(x1) - 0.5F, static_cast<float>(y1) - 0.5F))
         continue;
       const int32_t body = body_[surfel];
-      listed_.push_back({surfel, body, params_ > 0 && body >= 0 ? axes_of(surfels_, surfel) : SurfelAxes{}});
+      listed_.push_back({surfel, body, body >= 0 ? axes_of(surfels_, surfel) : SurfelAxes{}});
     }
     for (int64_t y = y0; y < y1; ++y) {
       for (int64_t x = x0; x < x1; ++x) blend(x, y);
@@ -103,7 +103,7 @@ class BodyTile {
     const int64_t pixel = y * camera_.width + x;
     const float px = static_cast<float>(x) + 0.5F, py = static_cast<float>(y) + 0.5F;
     const Vec3<float> ray = camera_.ray_in_world(px, py);
-    float* const to = params_ > 0 ? picture_.jacobian.data() + pixel * params_ * channels : nullptr;
+    float* const to = picture_.jacobian.data() + pixel * params_ * channels;
     std::fill(by_transmittance_.begin(), by_transmittance_.end(), 0.0F);
     float transmittance = 1, silhouette = 0;
     Vec3<float> normal(0);
@@ -118,9 +118,9 @@ class BodyTile {
       const Vec3<float> n = load3<float>(splat.normal);
       const float indicator = listed.body >= 0 ? 1.0F : 0.0F;
       moves = moves || listed.body >= 0;
-      if (to != nullptr && moves) differentiate(listed, splat, hit, ray, {alpha, weight, indicator, n}, to);
+      if (moves) differentiate(listed, splat, hit, ray, {alpha, weight, indicator, n}, to);
       silhouette += weight * indicator;
-      normal += weight * indicator * n;
+      normal += weight * n;
       transmittance -= weight;
     }
     picture_.silhouette[pixel] = silhouette;
@@ -137,7 +137,7 @@ class BodyTile {
     const auto add = [&](int p, float by_weight) {
       float* const row = to + p * channels;
       row[0] += by_weight * hit.indicator;
-      for (int k = 0; k < 3; ++k) row[1 + k] += by_weight * hit.indicator * hit.normal[k];
+      for (int k = 0; k < 3; ++k) row[1 + k] += by_weight * hit.normal[k];
       by_transmittance_[static_cast<size_t>(p)] -= by_weight;
     };
     // What stands before dims this hit.
@@ -179,8 +179,7 @@ class BodyTile {
 }  // namespace
 
 void draw_bodies(const PosedSurfels& surfels, const Tensor<int32_t>& body, const Tensor<float>& pivot,
-                 const Camera<float>& camera, const Options& options, bool with_jacobian,
-                 BodyPicture& picture) {
+                 const Camera<float>& camera, const Options& options, BodyPicture& picture) {
   require(surfels.device() == Device::cpu, "bodies are drawn on the CPU", "");
   require(body.size() == surfels.count(), "each posed surfel has a body or none",
           std::to_string(body.size()));
@@ -190,8 +189,7 @@ void draw_bodies(const PosedSurfels& surfels, const Tensor<int32_t>& body, const
   const Shape image{camera.height, camera.width};
   picture.silhouette.reset(image);
   picture.normal.reset({camera.height, camera.width, 3});
-  const int64_t params = with_jacobian && !pivot.empty() ? pose_size * pivot.dim(0) : 0;
-  picture.jacobian.reset(params > 0 ? Shape{camera.height, camera.width, params, channels} : Shape{0});
+  picture.jacobian.reset({camera.height, camera.width, pose_size * pivot.dim(0), channels});
   const Saved& tiles = saved;
   parallel_blocks("raster: draw bodies", tiles.tiles(), 1, [&](int64_t tile, int64_t) {
     BodyTile(surfels, body, pivot, camera, options, tiles, picture).run(tile);

@@ -7,10 +7,11 @@
 namespace traceflow::raster {
 
 struct BodyPicture {
+  // Where a tile of 16×16 pixels has no carried surfel these are 0, as are their derivatives.
   Tensor<float> silhouette;  // H×W, Σ w over the surfels of all bodies
-  Tensor<float> normal;      // H×W×3, world axes, Σ w n over the same, n turned to the camera
+  Tensor<float> normal;      // H×W×3, world axes, Σ w n of every surfel, as raster::BasicOutput has it
   // H×W×(6·B)×4: by ω_x, ω_y, ω_z (radians, about the body's pivot, world axes) and the shift s_x, s_y, s_z
-  // (scene units) of each body: of the silhouette and the three normal components. Empty where not asked for.
+  // (scene units) of each body: of the silhouette and the three normal components.
   Tensor<float> jacobian;
 };
 
@@ -18,7 +19,6 @@ struct BodyPicture {
 // pivot: B×3, world. Derivatives hold the order and the cut-offs of the blend still, as raster::backward
 // does.
 void draw_bodies(const PosedSurfels& surfels, const Tensor<int32_t>& body, const Tensor<float>& pivot,
-                 const Camera<float>& camera, const Options& options, bool with_jacobian,
-                 BodyPicture& picture);
+                 const Camera<float>& camera, const Options& options, BodyPicture& picture);
 
 }  // namespace traceflow::raster

@@ -30,24 +30,15 @@ BodyScene body_scene(uint64_t seed, double opacity_max = 0.9) {
   return made;
 }
 
-// Silhouette and the carried surfels' normals, H·W×4, by the reference: what its colours are where each
-// surfel has its own normal, or black, for its colour.
-Tensor<double> reference_picture(const BasicPosedSurfels<double>& surfels, const Tensor<int32_t>& body,
-                                 const Camera<double>& camera, const Options& options) {
-  BasicPosedSurfels<double> painted = surfels;
-  painted.sh.reset({surfels.count(), 1, 3});
-  for (int64_t i = 0; i < surfels.count(); ++i) {
-    const Vec3<double> n = rotation_from_quaternion(load4<double>(surfels.rotation.row(i)))[2];
-    const double side = dot(n, load3<double>(surfels.position.row(i)) - camera.position) > 0 ? -1 : 1;
-    // Colours are a half more than the harmonics say and not below 0: so halved.
-    store3(painted.sh.row(i), body[i] >= 0 ? side * n * 0.5 / sh_c0 : Vec3<double>(-0.5 / sh_c0));
-  }
+// Silhouette and normals, H·W×4, by the reference.
+Tensor<double> reference_picture(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera,
+                                 const Options& options) {
   BasicOutput<double> output;
-  forward_reference(painted, camera, options, output);
+  forward_reference(surfels, camera, options, output);
   Tensor<double> result({output.alpha.size(), 4});
   for (int64_t i = 0; i < output.alpha.size(); ++i) {
     result(i, 0) = output.tint[i];
-    for (int k = 0; k < 3; ++k) result(i, k + 1) = 2 * output.colour[3 * i + k] - output.tint[i];
+    for (int k = 0; k < 3; ++k) result(i, k + 1) = output.normal[3 * i + k];
   }
   return result;
 }
@@ -65,13 +56,13 @@ Tensor<double> picture_after(const BodyScene& at, const Options& options, int b,
     const Vec4<double> turned = quaternion_product(q, load4<double>(moved.rotation.row(i)));
     for (int k = 0; k < 4; ++k) moved.rotation(i, k) = turned[k];
   }
-  return reference_picture(moved, at.body, at.scene.camera, options);
+  return reference_picture(moved, at.scene.camera, options);
 }
 
-BodyPicture drawn(const BodyScene& at, const Options& options, bool with_jacobian = true) {
+BodyPicture drawn(const BodyScene& at, const Options& options) {
   BodyPicture picture;
   draw_bodies(convert<float>(at.scene.surfels), at.body, at.pivot, convert<float>(at.scene.camera), options,
-              with_jacobian, picture);
+              picture);
   return picture;
 }
 
@@ -79,9 +70,8 @@ TEST(BodyPicture, IsThatOfTheReference) {
   const Options options;
   for (uint64_t seed = 1; seed <= 8; ++seed) {
     const BodyScene at = body_scene(seed, 1.0);
-    const BodyPicture picture = drawn(at, options, false);
-    EXPECT_TRUE(picture.jacobian.empty());
-    const Tensor<double> expected = reference_picture(at.scene.surfels, at.body, at.scene.camera, options);
+    const BodyPicture picture = drawn(at, options);
+    const Tensor<double> expected = reference_picture(at.scene.surfels, at.scene.camera, options);
     Tensor<float> found(expected.shape());
     for (int64_t i = 0; i < picture.silhouette.size(); ++i) {
       found(i, 0) = picture.silhouette[i];
@@ -135,7 +125,7 @@ TEST(BodyPicture, WithoutSurfelsIsEmpty) {
   none.sh.resize({0, 1, 3});
   BodyPicture picture;
   draw_bodies(none, Tensor<int32_t>(Shape{0}), Tensor<float>({1, 3}), convert<float>(test_camera(20, 10)), {},
-              true, picture);
+              picture);
   for (const float value : picture.silhouette.values()) EXPECT_EQ(value, 0);
   for (const float value : picture.jacobian.values()) EXPECT_EQ(value, 0);
 }
