@@ -6,12 +6,12 @@
 
 namespace traceflow {
 
-void widen(const ViewPixels& pixels, ViewImages& images) {
+void widen(const ViewPixels& pixels, ViewImages& images, bool with_coverage) {
   const Device device = pixels.colour.device();
   images.colour.place(device).resize(pixels.colour.shape());
   images.known = pixels.known;
   images.mask = pixels.mask;
-  images.coverage.place(device).resize(pixels.coverage.shape());
+  images.coverage.place(device).resize(with_coverage ? pixels.coverage.shape() : Shape{0});
   images.normal_prior.place(device).resize(pixels.normal_prior.shape());
   constexpr int64_t grain = 16384;
   parallel_for(device, "capture: widen colours", images.colour.size(),

@@ -25,7 +25,8 @@ struct ViewPixels {
 };
 
 // Numbers of [0, 1] and unit or zero normals again, where the pixels are; `images` is resized and put there.
-void widen(const ViewPixels& pixels, ViewImages& images);
+// Without with_coverage its coverage stays empty.
+void widen(const ViewPixels& pixels, ViewImages& images, bool with_coverage = true);
 
 // Where a photograph says nothing it takes the colours that were rendered (H×W×3, where the images are): what
 // is not known is no error.

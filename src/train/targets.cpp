@@ -2,11 +2,11 @@
 
 namespace traceflow {
 
-ViewImages& Targets::of(const Capture& capture, const View& view) {
+ViewImages& Targets::of(const Capture& capture, const View& view, bool with_coverage) {
   if (device_ == Device::cpu) {
-    widen(*load_pixels(capture, view), images_);
+    widen(*load_pixels(capture, view), images_, with_coverage);
   } else {
-    widen(on_device(capture, view), images_);
+    widen(on_device(capture, view), images_, with_coverage);
   }
   return images_;
 }

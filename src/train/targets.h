@@ -15,8 +15,8 @@ class Targets {
   // come in random order, so that dropping one for another would save nothing.
   Targets(Device device, int64_t limit_bytes) : device_(device), limit_bytes_(limit_bytes) {}
 
-  // Stands until the next call.
-  ViewImages& of(const Capture& capture, const View& view);
+  // Stands until the next call. with_coverage: the masks' coverage too.
+  ViewImages& of(const Capture& capture, const View& view, bool with_coverage);
 
  private:
   const ViewPixels& on_device(const Capture& capture, const View& view);

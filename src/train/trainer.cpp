@@ -271,7 +271,7 @@ LossTerms Trainer::step() {
   if (now.enters && !now.goes_on) follow_again();
   if (now.enters && (now.key % strays_every == 0 || !now.goes_on)) let_strays_go(now.key);
   const View& view = draw_view();
-  ViewImages& target = targets_.of(capture_, view);
+  ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
   request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);

@@ -17,8 +17,8 @@ TEST_F(TargetsOnDevice, AreThePhotographsThatTheCpuSees) {
     Targets on_device(Device::cuda, room);
     for (int round = 0; round < 2; ++round) {
       for (const View& view : capture.train) {
-        const ViewImages& found = on_device.of(capture, view);
-        const ViewImages& expected = on_cpu.of(capture, view);
+        const ViewImages& found = on_device.of(capture, view, true);
+        const ViewImages& expected = on_cpu.of(capture, view, true);
         expect_close_on_host(found.colour, expected.colour, 1e-7, "colour");
         expect_close_on_host(found.normal_prior, expected.normal_prior, 1e-6, "normal prior");
         EXPECT_EQ(list_of(found.mask.on(Device::cpu)), list_of(expected.mask));
