@@ -16,8 +16,10 @@ void widen(const ViewPixels& pixels, ViewImages& images, bool with_coverage) {
   constexpr int64_t grain = 16384;
   parallel_for(device, "capture: widen colours", images.colour.size(),
                WidenColour{pixels.colour.data(), images.colour.data()}, grain);
-  parallel_for(device, "capture: widen coverages", images.coverage.size(),
-               WidenColour{pixels.coverage.data(), images.coverage.data()}, grain);
+  if (!images.coverage.empty()) {
+    parallel_for(device, "capture: widen coverages", images.coverage.size(),
+                 WidenColour{pixels.coverage.data(), images.coverage.data()}, grain);
+  }
   parallel_for(device, "capture: widen normals", images.normal_prior.size() / 3,
                WidenNormal{pixels.normal_prior.data(), images.normal_prior.data()}, grain);
 }
