@@ -1,0 +1,90 @@
+#include <algorithm>
+
+#include "train/bodies.h"
+#include "train/trainer.h"
+
+// The part of the loop that follows bodies from time to time before everything trains.
+namespace traceflow {
+
+namespace {
+
+// Of times that are known better now than when they were new.
+constexpr int few_steps = 3;
+constexpr double little_blur = 0.35;
+
+}  // namespace
+
+Trainer::Tracking Trainer::tracking(int iteration) const {
+  if (!scene_.main_motion) return {false, false, 0};
+  const TrackOptions& track = options_.deform.track;
+  constexpr int least_share = 8;  // of a run, for the warm-up
+  const int64_t keys = scene_.main_motion->keys();
+  const int since = iteration - std::min(track.warm_up, options_.iterations / least_share);
+  if (since < 0) return {true, false, 0};
+  const int64_t key = 1 + since / track.map_each;
+  if (key >= keys) return {false, key == keys && since % track.map_each == 0, keys - 1};
+  return {true, since % track.map_each == 0, key};
+}
+
+void Trainer::follow_again() {
+  const Surfels main = scene_.main.on(Device::cpu);
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  const TrackOptions& track = options_.deform.track;
+  const Tracker tracker(track, options_.render, capture_);
+  const int64_t last = motion.keys() - 1;
+  for (int64_t key = 1; key <= last; ++key)
+    tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur);
+  scene_.main_motion = motion.on(device_);
+}
+
+void Trainer::follow(int64_t key) {
+  const Surfels main = scene_.main.on(Device::cpu);
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  const TrackOptions& track = options_.deform.track;
+  const Tracker tracker(track, options_.render, capture_);
+  if (key > 2) {
+    const int64_t oldest = std::max<int64_t>(1, key - track.window);
+    for (int k = 0; k < track.again; ++k) {
+      const int64_t at = oldest + static_cast<int64_t>(random_.below(static_cast<int64_t>(key - oldest)));
+      tracker.solve(main, motion, at, scene_.extent, few_steps, little_blur * track.blur);
+    }
+  }
+  Tracker::predict(motion, key);
+  tracker.solve(main, motion, key, scene_.extent, track.steps, track.blur);
+  // What is behind stands where this one does until it is reached.
+  for (int64_t b = 0; b < motion.bodies(); ++b) {
+    for (int64_t later = key + 1; later < motion.keys(); ++later) {
+      std::copy_n(&motion.rotation(b, key, 0), 4, &motion.rotation(b, later, 0));
+      std::copy_n(&motion.shift(b, key, 0), 3, &motion.shift(b, later, 0));
+    }
+  }
+  scene_.main_motion = motion.on(device_);
+  health_.expect_fall();
+}
+
+void Trainer::let_strays_go(int64_t key) {
+  Surfels main = scene_.main.on(Device::cpu);
+  const Motion motion = scene_.main_motion->on(Device::cpu);
+  release_strays(capture_, motion, motion.time[key], main);
+  scene_.main.body = main.body.on(device_);
+}
+
+const View& Trainer::draw_tracked_view(const Tracking& now) {
+  // Half of the views are of the newest times, for their surface is the least known.
+  constexpr double newest_share = 0.5, newest_duration = 0.08;
+  const Tensor<float> times = scene_.main_motion->time.on(Device::cpu);
+  const float latest = times[now.key];
+  if (now.key > 0 && random_.uniform() < newest_share) {
+    std::vector<const View*> newest;
+    for (const View& view : capture_.train) {
+      if (view.time <= latest && view.time >= latest - newest_duration) newest.push_back(&view);
+    }
+    return *newest[random_.below(static_cast<int64_t>(newest.size()))];
+  }
+  for (;;) {
+    const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
+    if (view.time <= latest) return view;
+  }
+}
+
+}  // namespace traceflow
