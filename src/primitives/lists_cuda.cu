@@ -10,9 +10,9 @@ namespace traceflow::cuda {
 
 namespace {
 
-constexpr int threads = 256;
+constexpr int list_threads = 256;
 
-__device__ int64_t this_thread() { return int64_t{blockIdx.x} * threads + threadIdx.x; }
+__device__ int64_t this_thread() { return int64_t{blockIdx.x} * list_threads + threadIdx.x; }
 
 __global__ void count_keys(int64_t n, const int32_t* key, int32_t* count) {
   const int64_t i = this_thread();
@@ -58,11 +58,11 @@ void list_by_key(const int32_t* key, int64_t n, int64_t keys, Lists& lists) {
   lists.filled.place(Device::cuda).reset({keys});
   lists.entry.place(Device::cuda).resize({n});
   int32_t* const begin = lists.begin.data();
-  launch("lists: count", {blocks_for(n, threads), threads}, count_keys, n, key, begin);
+  launch("lists: count", {blocks_for(n, list_threads), list_threads}, count_keys, n, key, begin);
   exclusive_sum(begin, begin, keys + 1, lists.scratch);
-  launch("lists: fill", {blocks_for(n, threads), threads}, fill_lists, n, key, begin, lists.filled.data(),
+  launch("lists: fill", {blocks_for(n, list_threads), list_threads}, fill_lists, n, key, begin, lists.filled.data(),
          lists.entry.data());
-  launch("lists: sort", {blocks_for(keys, threads), threads}, sort_lists, keys, begin, lists.entry.data());
+  launch("lists: sort", {blocks_for(keys, list_threads), list_threads}, sort_lists, keys, begin, lists.entry.data());
 }
 
 template void for_each_index(const char*, int64_t, const PutFlagged&);

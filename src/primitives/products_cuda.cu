@@ -24,7 +24,7 @@ const CublasLt& lt() {
   return found;
 }
 
-void check(cublasStatus_t result, const char* what) {
+void check_blas(cublasStatus_t result, const char* what) {
   if (result == CUBLAS_STATUS_ALLOC_FAILED) throw memory::OutOfMemory(0, facts().free_bytes);
   require(result == CUBLAS_STATUS_SUCCESS, what,
           result == CUBLAS_STATUS_SUCCESS ? "" : lt().status_string(result));
@@ -56,7 +56,7 @@ class Plan {
  private:
   template <class T>
   void set(cublasLtMatmulDescAttributes_t attribute, const T& value) const {
-    check(lt().set_operation(operation_, attribute, &value, sizeof(value)), "a product is described");
+    check_blas(lt().set_operation(operation_, attribute, &value, sizeof(value)), "a product is described");
   }
   void point(const ProductDescription& p, const void* bias, const void* mask) const {
     if (p.bias) set(CUBLASLT_MATMUL_DESC_BIAS_POINTER, bias);
@@ -74,14 +74,14 @@ class Plan {
 cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored_columns, int64_t stride,
                               int64_t batches, int64_t batch_stride) {
   cublasLtMatrixLayout_t made = nullptr;
-  check(lt().create_layout(&made, type_of(number), static_cast<uint64_t>(stored_columns),
+  check_blas(lt().create_layout(&made, type_of(number), static_cast<uint64_t>(stored_columns),
                            static_cast<uint64_t>(stored_rows), stride),
         "a product's matrix is described");
   if (batches > 1) {
     const auto count = static_cast<int32_t>(batches);
-    check(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_BATCH_COUNT, &count, sizeof(count)),
+    check_blas(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_BATCH_COUNT, &count, sizeof(count)),
           "a product's batches are described");
-    check(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_STRIDED_BATCH_OFFSET, &batch_stride,
+    check_blas(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_STRIDED_BATCH_OFFSET, &batch_stride,
                           sizeof(batch_stride)),
           "a product's batches are described");
   }
@@ -89,7 +89,7 @@ cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored
 }
 
 Plan::Plan(const ProductDescription& p, cublasLtHandle_t handle) {
-  check(lt().create_operation(&operation_, CUBLAS_COMPUTE_32F, CUDA_R_32F), "a product is described");
+  check_blas(lt().create_operation(&operation_, CUBLAS_COMPUTE_32F, CUDA_R_32F), "a product is described");
   set(CUBLASLT_MATMUL_DESC_TRANSA, p.transposed_b ? CUBLAS_OP_T : CUBLAS_OP_N);
   set(CUBLASLT_MATMUL_DESC_TRANSB, p.transposed_a ? CUBLAS_OP_T : CUBLAS_OP_N);
   set(CUBLASLT_MATMUL_DESC_EPILOGUE, epilogue_of(p));
@@ -107,9 +107,9 @@ Plan::Plan(const ProductDescription& p, cublasLtHandle_t handle) {
 
 void Plan::choose(cublasLtHandle_t handle) {
   cublasLtMatmulPreference_t preference = nullptr;
-  check(lt().create_preference(&preference), "a product's preferences");
+  check_blas(lt().create_preference(&preference), "a product's preferences");
   const auto prefer = [&](cublasLtMatmulPreferenceAttributes_t attribute, const auto& value) {
-    check(lt().set_preference(preference, attribute, &value, sizeof(value)), "a product's preferences");
+    check_blas(lt().set_preference(preference, attribute, &value, sizeof(value)), "a product's preferences");
   };
   prefer(CUBLASLT_MATMUL_PREF_MAX_WORKSPACE_BYTES, uint64_t{workspace_bytes});
   // Parts of a sum meet in the workspace and are added in their order, never where they fall.
@@ -133,7 +133,7 @@ void Plan::run(const ProductDescription& p, const ProductAddresses& at, cublasLt
                void* workspace) const {
   point(p, at.bias, at.mask);
   const float one = 1, before = p.accumulate ? 1.0F : 0.0F;
-  check(lt().matmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
+  check_blas(lt().matmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
                     workspace, workspace_bytes, stream()),
         "a matrix product on the CUDA device");
 }
@@ -165,7 +165,7 @@ class Library {
 
  private:
   Library() : workspace_({static_cast<int64_t>(workspace_bytes)}, Device::cuda) {
-    check(lt().create(&handle_), "cuBLASLt answers");
+    check_blas(lt().create(&handle_), "cuBLASLt answers");
     int major = 0;
     traceflow::cuda::check(cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, 0),
                            "the CUDA device's compute capability");

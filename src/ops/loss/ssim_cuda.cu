@@ -22,8 +22,8 @@ constexpr int taps = 2 * ssim_radius + 1;
 constexpr int tile_columns = 32, tile_rows = 16;
 constexpr int rows_each = 2;  // that a thread sums down to
 constexpr int loaded_columns = tile_columns + 2 * ssim_radius, loaded_rows = tile_rows + 2 * ssim_radius;
-constexpr int threads = static_cast<int>(sum_threads);
-static_assert(tile_columns * tile_rows == threads * rows_each);
+constexpr int ssim_threads = static_cast<int>(sum_threads);
+static_assert(tile_columns * tile_rows == ssim_threads * rows_each);
 
 struct Size {
   int height, width;
@@ -59,7 +59,7 @@ __device__ Tile tile_of_block(const Size& size) {
 template <class F>
 __device__ void load(const Tile& tile, const Size& size, F value,
                      float (&into)[loaded_rows][loaded_columns]) {
-  for (int i = static_cast<int>(threadIdx.x); i < loaded_rows * loaded_columns; i += threads) {
+  for (int i = static_cast<int>(threadIdx.x); i < loaded_rows * loaded_columns; i += ssim_threads) {
     const int r = i / loaded_columns, c = i % loaded_columns;
     const int row = tile.row + r - ssim_radius, column = tile.column + c - ssim_radius;
     const bool inside = row >= 0 && row < size.height && column >= 0 && column < size.width;
@@ -110,7 +110,7 @@ __global__ void __launch_bounds__(sum_threads)
       tile, p.size, [&](int64_t pixel) { return p.target[pixel * channels + tile.channel]; }, y);
   __syncthreads();
 
-  for (int i = static_cast<int>(threadIdx.x); i < loaded_rows * tile_columns; i += threads) {
+  for (int i = static_cast<int>(threadIdx.x); i < loaded_rows * tile_columns; i += ssim_threads) {
     const int r = i / tile_columns, c = i % tile_columns;
     SsimMoments<float> m{0, 0, 0, 0};
     for (int k = 0; k < taps; ++k) {
@@ -163,7 +163,7 @@ __global__ void __launch_bounds__(sum_threads)
       tile, p.size, [&](int64_t pixel) { return planes.by_product[plane + pixel]; }, derivative[2]);
   __syncthreads();
 
-  for (int i = static_cast<int>(threadIdx.x); i < loaded_rows * tile_columns; i += threads) {
+  for (int i = static_cast<int>(threadIdx.x); i < loaded_rows * tile_columns; i += ssim_threads) {
     const int r = i / tile_columns, c = i % tile_columns;
     for (int m = 0; m < 3; ++m) {
       float sum = 0;
@@ -204,8 +204,8 @@ void compare(const Pictures& p, const HalfWindow& window, const uint8_t* mask, c
              const Finish& finish) {
   const int64_t blocks = p.size.blocks();
   CountedSum* const partial = memory_for_partial_sums<CountedSum>(blocks);
-  launch("loss: ssim", {blocks, threads}, compare_tiles, p, window, mask, planes, partial);
-  launch("loss: ssim sum", {1, threads}, add_up<CountedSum, Finish>, blocks, partial, finish);
+  launch("loss: ssim", {blocks, ssim_threads}, compare_tiles, p, window, mask, planes, partial);
+  launch("loss: ssim sum", {1, ssim_threads}, add_up<CountedSum, Finish>, blocks, partial, finish);
 }
 
 }  // namespace
@@ -218,7 +218,7 @@ void ssim_loss(const Tensor<float>& image, const Tensor<float>& target, const Ha
   kept.place(Device::cuda).resize({3, image.size()});
   const DerivativePlanes planes{kept.row(0), kept.row(1), kept.row(2)};
   compare(p, window, nullptr, planes, OneLessMean{count, mean});
-  launch("loss: ssim backward", {p.size.blocks(), threads}, add_gradient, p, window, planes,
+  launch("loss: ssim backward", {p.size.blocks(), ssim_threads}, add_gradient, p, window, planes,
          static_cast<float>(-weight / count), grad_image.data());
 }
 

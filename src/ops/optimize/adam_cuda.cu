@@ -7,10 +7,10 @@ namespace traceflow::optimize::cuda {
 
 namespace {
 
-constexpr int threads = 256;
+constexpr int adam_threads = 256;
 constexpr int group_entries = 4;
 constexpr int groups_each = 4;  // so that a tensor is not looked up for a handful of entries
-constexpr int block_entries = threads * group_entries * groups_each;
+constexpr int block_entries = adam_threads * group_entries * groups_each;
 
 struct alignas(16) Group {
   float value[group_entries];
@@ -35,7 +35,7 @@ struct Setting {
   }
 };
 
-__global__ void __launch_bounds__(threads) step(const __grid_constant__ AdamTable table) {
+__global__ void __launch_bounds__(adam_threads) step(const __grid_constant__ AdamTable table) {
   __shared__ float rates[most_rates];
   const auto thread = static_cast<int>(threadIdx.x), block = static_cast<int>(blockIdx.x);
   const int k = traceflow::cuda::part_of(table.tensor.data(), table.tensors, block);
@@ -49,7 +49,7 @@ __global__ void __launch_bounds__(threads) step(const __grid_constant__ AdamTabl
   const int64_t block_begin = int64_t{block - t.first_block} * block_entries;
   const int64_t block_end = std::min<int64_t>(t.count, block_begin + block_entries);
   for (int64_t begin = block_begin + thread * group_entries; begin < block_end;
-       begin += threads * group_entries) {
+       begin += adam_threads * group_entries) {
     int32_t column = static_cast<int32_t>(begin) % t.columns;
     const auto next_rate = [&] {
       const float rate = rates[column];
@@ -80,7 +80,7 @@ void adam_step(AdamTable& table) {
   const int64_t blocks = traceflow::cuda::deal_blocks(
       std::span(table.tensor).first(static_cast<size_t>(table.tensors)),
       [](const AdamTensor& tensor) { return traceflow::cuda::blocks_for(tensor.count, block_entries); });
-  traceflow::cuda::launch("optimize: adam", {blocks, threads}, step, table);
+  traceflow::cuda::launch("optimize: adam", {blocks, adam_threads}, step, table);
 }
 
 }  // namespace traceflow::optimize::cuda

@@ -8,14 +8,14 @@ using namespace traceflow::cuda;
 
 namespace {
 
-constexpr int threads = 128;
+constexpr int backward_threads = 128;
 
 // What the lanes of a block bring to their surfels, a row each, so that a warp adds a row together.
 struct Rows {
-  float basis[threads][17];  // of the lane's ray; an odd width keeps the rows in different banks
-  float passed[threads][3];
-  float part[threads][part::count + 1];
-  uint32_t surfel[threads];
+  float basis[backward_threads][17];  // of the lane's ray; an odd width keeps the rows in different banks
+  float passed[backward_threads][3];
+  float part[backward_threads][part::count + 1];
+  uint32_t surfel[backward_threads];
 };
 
 // A ray's records from the last hit to the first.
@@ -145,7 +145,7 @@ __device__ void keep_row(const Rows& rows, int64_t i, const RecordWalk& walk, co
 
 // A thread a ray, back to front.
 template <int degree, bool in_order>
-__global__ void __launch_bounds__(threads) backward_kernel(BackwardTask task) {
+__global__ void __launch_bounds__(backward_threads) backward_kernel(BackwardTask task) {
   __shared__ Rows rows;
   const int64_t i = task.rays.own();
   const bool exists = i < task.rays.last;
@@ -185,7 +185,7 @@ __global__ void __launch_bounds__(threads) backward_kernel(BackwardTask task) {
 
 template <int degree>
 void start(const BackwardTask& task) {
-  const Grid grid{blocks_for(task.rays.last - task.rays.first, threads), threads};
+  const Grid grid{blocks_for(task.rays.last - task.rays.first, backward_threads), backward_threads};
   if (task.parts) {
     launch("trace: backward in order", grid, backward_kernel<degree, true>, task);
   } else {

@@ -13,7 +13,7 @@ using namespace traceflow::cuda;
 
 namespace {
 
-constexpr int threads = 256;
+constexpr int build_threads = 256;
 constexpr uint64_t left_out = uint64_t{1} << 63;  // behind every key of the curve
 constexpr uint32_t no_parent = 0xffffffffU;
 
@@ -44,7 +44,7 @@ __device__ DiskBox box_of(const BuildInput& input, int64_t i) {
 
 // Finds the surfels that can be hit, and the bounds of their centres: bounds holds the largest of x, y, z,
 // -x, -y, -z, ordered.
-__global__ void __launch_bounds__(threads)
+__global__ void __launch_bounds__(build_threads)
     choose_surfels(BuildInput input, uint64_t* keys, uint32_t* indices, uint32_t* bounds) {
   const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
   uint32_t largest[6] = {};
@@ -72,7 +72,7 @@ __device__ uint64_t spread_bits(uint64_t x) {
   return (x | x << 2) & 0x1249249249249249U;
 }
 
-__global__ void __launch_bounds__(threads)
+__global__ void __launch_bounds__(build_threads)
     make_keys(const float* position, int64_t count, const uint32_t* bounds, uint64_t* keys) {
   const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
   if (i >= count || keys[i] == left_out) return;
@@ -129,7 +129,7 @@ __device__ void make_lone_root(const TreeView& tree) {
 
 // Node i covers the places of all keys that share more bits with key i than key i shares with its neighbour
 // on the other side, and is cut where those keys first differ.
-__global__ void __launch_bounds__(threads) make_nodes(Keys keys, TreeView tree) {
+__global__ void __launch_bounds__(build_threads) make_nodes(Keys keys, TreeView tree) {
   const int64_t index = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
   if (index == 0) tree.node_parent[0] = no_parent;
   if (index == 0 && keys.count == 1) make_lone_root(tree);
@@ -176,7 +176,7 @@ __device__ void join_other_half(const Node& node, uint32_t side, DiskBox& box) {
 
 // Every disk climbs towards the root and fills in boxes, until it comes to a node whose other child is not
 // there yet: that one will go on.
-__global__ void __launch_bounds__(threads)
+__global__ void __launch_bounds__(build_threads)
     make_disks_and_boxes(BuildInput input, const uint64_t* sorted_keys, const uint32_t* sorted_indices,
                          TreeView tree, Disk* disks) {
   const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
@@ -232,7 +232,7 @@ void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
   const BuildInput input{surfels, count, {options.alpha_min, options.alpha_max, options.transmittance_min}};
   const TreeView view{tree.nodes.data(), tree.disk_parent.data(), tree.node_parent.data(),
                       tree.arrived.data()};
-  const Grid grid{blocks_for(count, threads), threads};
+  const Grid grid{blocks_for(count, build_threads), build_threads};
   launch("trace: choose surfels", grid, choose_surfels, input, tree.keys.data(), tree.indices.data(),
          tree.bounds.data());
   launch("trace: surfel keys", grid, make_keys, surfels.position.data(), count, tree.bounds.data(),

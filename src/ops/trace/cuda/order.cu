@@ -10,7 +10,7 @@ using namespace traceflow::cuda;
 namespace {
 
 constexpr int samples = 256;
-constexpr int threads = 256;
+constexpr int order_threads = 256;
 
 // One number from each thread of the block, and the one in their middle.
 struct Median {
@@ -52,7 +52,7 @@ __global__ void __launch_bounds__(samples) find_frame(RayInput input, int64_t su
   frame[3] = reach > 0 ? reach : 1;
 }
 
-__global__ void __launch_bounds__(threads)
+__global__ void __launch_bounds__(order_threads)
     make_ray_keys(RayInput input, const float* frame, uint32_t* keys, uint32_t* indices) {
   const int64_t r = input.own();
   if (r >= input.last) return;
@@ -69,7 +69,7 @@ const uint32_t* sort_rays(const RayInput& input, int64_t surfels, SortedRays& ra
   }
   rays.frame.place(Device::cuda).resize({4});
   launch("trace: ray frame", {1, samples}, find_frame, input, surfels, rays.frame.data());
-  launch("trace: ray keys", {blocks_for(count, threads), threads}, make_ray_keys, input, rays.frame.data(),
+  launch("trace: ray keys", {blocks_for(count, order_threads), order_threads}, make_ray_keys, input, rays.frame.data(),
          rays.keys.data(), rays.indices.data());
   sort_pairs(count, ray_key_bits, rays.keys.data(), rays.sorted_keys.data(), rays.indices.data(),
              rays.order.data(), rays.sort_scratch);

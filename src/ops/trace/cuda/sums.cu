@@ -11,7 +11,7 @@ using namespace traceflow::cuda;
 
 namespace {
 
-constexpr int threads = 128;
+constexpr int sum_threads = 128;
 constexpr int64_t span_rows = 64;
 constexpr int row_values = 2 * warp_lanes;  // dL/dsh, then the parts, then nothing
 
@@ -73,7 +73,7 @@ __device__ void add_total(const Totals& totals, uint32_t surfel, const float (&s
 }
 
 template <class Rows>
-__global__ void __launch_bounds__(threads) add_runs(Rows rows, int64_t count, Totals totals, Ends ends) {
+__global__ void __launch_bounds__(sum_threads) add_runs(Rows rows, int64_t count, Totals totals, Ends ends) {
   const int64_t span = (int64_t{blockIdx.x} * blockDim.x + threadIdx.x) / warp_lanes;
   const int64_t begin = span * span_rows;
   if (begin >= count) return;
@@ -137,7 +137,7 @@ void sum_in_order(int degree, int64_t records, uint32_t surfels, int ray_bits, S
     hits.end_surfels[to].place(Device::cuda).resize({2 * spans});
     hits.end_sums[to].place(Device::cuda).resize({2 * spans, row_values});
     const Ends ends{hits.end_surfels[to].data(), hits.end_sums[to].data()};
-    const Grid grid{blocks_for(spans * warp_lanes, threads), threads};
+    const Grid grid{blocks_for(spans * warp_lanes, sum_threads), sum_threads};
     if (level == 0) {
       launch("trace: sums of hits", grid, add_runs<HitRows>, rows, count, totals, ends);
     } else {
