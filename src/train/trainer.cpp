@@ -255,7 +255,8 @@ void Trainer::control_density(int done) {
     change.opacity_reset = reset;
     density_changes_.push_back(std::move(change));
   };
-  if (schedule_.densifies_main(done)) {
+  // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
+  if (schedule_.densifies_main(done) && !tracking(done - 1).goes_on) {
     const bool reset = schedule_.resets_main_opacity(done);
     const DensityLimits limits{{scene_.extent, cloud_radius_},
                                memory_.caps.main,
