@@ -115,9 +115,10 @@ Optimiser::Optimiser(const Scene& scene) {
 }
 
 void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
-                     const Schedule& schedule, const RateOptions& rates, int iteration) {
+                     const Schedule& schedule, const RateOptions& rates, int iteration,
+                     double share_of_positions) {
   Stepper step(notes_);
-  const double position_rate = schedule.position_rate(iteration) * scene.extent;
+  const double position_rate = share_of_positions * schedule.position_rate(iteration) * scene.extent;
   const double field_rate = schedule.field_rate(iteration);
 
   if (trainable.main) step_surfels(step, "main", scene.main, gradient.main, main_, position_rate, rates);

@@ -54,10 +54,10 @@ class Optimiser {
   // Zero moments in the shapes of the scene.
   explicit Optimiser(const Scene& scene);
 
-  // One step on whatever is trainable. Entries that are not finite are left alone. Where memory runs out,
-  // nothing has changed.
+  // One step on whatever is trainable, of positions at that share of their rate. Entries that are not finite
+  // are left alone. Where memory runs out, nothing has changed.
   void step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable, const Schedule& schedule,
-            const RateOptions& rates, int iteration);
+            const RateOptions& rates, int iteration, double share_of_positions = 1);
   // What the last step left alone. Waits for the device.
   NonFiniteGradients left_alone() const { return notes_.report(); }
 

@@ -22,7 +22,7 @@ TrainOptions paper_preset() {
 // Short runs cannot find everything from photographs alone, as the paper's 60,000 iterations do. They lean on
 // the capture: geometry starts opaque at its points, its masks say what reflects, reflection and normals
 // count from the start (without them a mirror's surface drifts behind itself, to where its images seem to
-// be), and motion is followed from the first pictures on.
+// be), and motion is followed from the first pictures on: of bodies where masks show them.
 TrainOptions cpu_preset() {
   TrainOptions o;
   o.iterations = 8000;
@@ -36,6 +36,7 @@ TrainOptions cpu_preset() {
   o.initial.environment_cells = 10;
   o.initial.environment_points = 6000;
   o.initial.map_size = 32;
+  o.deform.kind = "nodes";
   o.deform.network.width = 96;
   o.deform.network.depth = 6;
   o.deform.network.skip = 3;

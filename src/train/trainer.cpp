@@ -28,6 +28,8 @@ constexpr int bond_stride = 4;
 // Of their rates, after a collapse: held a film of 8,000 iterations that fell apart at the preset's
 // (docs/results.md).
 constexpr float slower_fields = 0.25F;
+// Of the rate of positions while bodies are followed: a shape that learns fast takes on each time's lag.
+constexpr double share_while_tracking = 1.0 / 3;
 
 using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) {
@@ -178,7 +180,9 @@ const View& Trainer::draw_view() {
   const auto [first, last] =
       std::minmax_element(capture_.train.begin(), capture_.train.end(),
                           [](const View& a, const View& b) { return a.time < b.time; });
-  const double latest = schedule_.latest_time(iteration_, first->time, last->time);
+  // Bodies have been followed through all times.
+  const double latest =
+      scene_.main_motion ? last->time : schedule_.latest_time(iteration_, first->time, last->time);
   for (;;) {
     const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
     if (view.time <= latest || view.time == first->time) return view;
@@ -198,7 +202,12 @@ LossTerms Trainer::step() {
   request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);
   trainable.main_motion = trainable.main && scene_.main_motion && !now.goes_on;
-  if (now.goes_on) request.deform_main = trainable.main_field = false;
+  // Reflections that a shape may follow keep it where a body was: it is followed by what does not depend on them.
+  if (now.goes_on) {
+    request.specular = false;
+    trainable.main = true;
+    trainable.tint = trainable.environment = trainable.environment_field = false;
+  }
 
   const Frame& frame = renderer_.forward(scene_, request, true);
   take_unknown(frame.colour, target);
@@ -207,7 +216,7 @@ LossTerms Trainer::step() {
   evaluate_objective(frame, target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main,
                      grad_frame_, means_, schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   leave_unknown(target, grad_frame_.colour);
-  if (trainable.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
+  if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
   const bool learns = std::isfinite(terms.total);
   if (learns) learn(frame, request, trainable);
@@ -226,7 +235,8 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.
   // Nothing behind this asks for memory, but the driver may, to start a kernel.
   torn_ = true;
-  optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_);
+  const double share_of_positions = tracking(iteration_).goes_on ? share_while_tracking : 1;
+  optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_, share_of_positions);
   if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
   if (trainable.environment && scene_.environment.count() > 0) {
     environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);

@@ -32,7 +32,7 @@ void Trainer::follow_again() {
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
   const int64_t last = motion.keys() - 1;
-  for (int64_t key = 1; key <= last; ++key)
+  for (int64_t key = 0; key <= last; ++key)
     tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur);
   scene_.main_motion = motion.on(device_);
 }
@@ -42,8 +42,9 @@ void Trainer::follow(int64_t key) {
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
+  if (key == 1) tracker.solve(main, motion, 0, scene_.extent, track.steps, little_blur * track.blur);
   if (key > 2) {
-    const int64_t oldest = std::max<int64_t>(1, key - track.window);
+    const int64_t oldest = std::max<int64_t>(0, key - track.window);
     for (int k = 0; k < track.again; ++k) {
       const int64_t at = oldest + static_cast<int64_t>(random_.below(static_cast<int64_t>(key - oldest)));
       tracker.solve(main, motion, at, scene_.extent, few_steps, little_blur * track.blur);
@@ -70,17 +71,22 @@ void Trainer::let_strays_go(int64_t key) {
 }
 
 const View& Trainer::draw_tracked_view(const Tracking& now) {
-  // Half of the views are of the newest times, for their surface is the least known.
-  constexpr double newest_share = 0.5, newest_duration = 0.08;
+  // Many views are of the first time, at which the points say how large a body is, and of the newest ones,
+  // whose surface is the least known.
+  constexpr double first_share = 0.3, newest_share = 0.35;
+  constexpr float newest_duration = 0.08F;
   const Tensor<float> times = scene_.main_motion->time.on(Device::cpu);
   const float latest = times[now.key];
-  if (now.key > 0 && random_.uniform() < newest_share) {
-    std::vector<const View*> newest;
+  const auto draw_between = [&](float from, float to) -> const View& {
+    std::vector<const View*> views;
     for (const View& view : capture_.train) {
-      if (view.time <= latest && view.time >= latest - newest_duration) newest.push_back(&view);
+      if (view.time >= from && view.time <= to) views.push_back(&view);
     }
-    return *newest[random_.below(static_cast<int64_t>(newest.size()))];
-  }
+    return *views[random_.below(static_cast<int64_t>(views.size()))];
+  };
+  const double share = now.key > 0 ? random_.uniform() : 1;
+  if (share < first_share) return draw_between(times[0], times[0]);
+  if (share < first_share + newest_share) return draw_between(latest - newest_duration, latest);
   for (;;) {
     const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
     if (view.time <= latest) return view;

@@ -114,8 +114,10 @@ TEST(Bodies, AreTheThingsOfTheMask) {
 }
 
 TEST(Bodies, ThereAreNoneWithoutMasksOrWhereTheNetworkMovesSurfels) {
-  EXPECT_FALSE(Tumbling("network").scene.main_motion);
+  EXPECT_FALSE(Tumbling().scene.main_field);
   Tumbling at("network");
+  EXPECT_FALSE(at.scene.main_motion);
+  EXPECT_TRUE(at.scene.main_field);
   for (View& view : at.capture.train) view.time += 1;
   Capture bare = at.capture;
   bare.has_masks = false;
