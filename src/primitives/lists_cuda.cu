@@ -60,9 +60,10 @@ void list_by_key(const int32_t* key, int64_t n, int64_t keys, Lists& lists) {
   int32_t* const begin = lists.begin.data();
   launch("lists: count", {blocks_for(n, list_threads), list_threads}, count_keys, n, key, begin);
   exclusive_sum(begin, begin, keys + 1, lists.scratch);
-  launch("lists: fill", {blocks_for(n, list_threads), list_threads}, fill_lists, n, key, begin, lists.filled.data(),
+  launch("lists: fill", {blocks_for(n, list_threads), list_threads}, fill_lists, n, key, begin,
+         lists.filled.data(), lists.entry.data());
+  launch("lists: sort", {blocks_for(keys, list_threads), list_threads}, sort_lists, keys, begin,
          lists.entry.data());
-  launch("lists: sort", {blocks_for(keys, list_threads), list_threads}, sort_lists, keys, begin, lists.entry.data());
 }
 
 template void for_each_index(const char*, int64_t, const PutFlagged&);

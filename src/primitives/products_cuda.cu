@@ -75,15 +75,15 @@ cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored
                               int64_t batches, int64_t batch_stride) {
   cublasLtMatrixLayout_t made = nullptr;
   check_blas(lt().create_layout(&made, type_of(number), static_cast<uint64_t>(stored_columns),
-                           static_cast<uint64_t>(stored_rows), stride),
-        "a product's matrix is described");
+                                static_cast<uint64_t>(stored_rows), stride),
+             "a product's matrix is described");
   if (batches > 1) {
     const auto count = static_cast<int32_t>(batches);
     check_blas(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_BATCH_COUNT, &count, sizeof(count)),
-          "a product's batches are described");
+               "a product's batches are described");
     check_blas(lt().set_layout(made, CUBLASLT_MATRIX_LAYOUT_STRIDED_BATCH_OFFSET, &batch_stride,
-                          sizeof(batch_stride)),
-          "a product's batches are described");
+                               sizeof(batch_stride)),
+               "a product's batches are described");
   }
   return made;
 }
@@ -133,9 +133,9 @@ void Plan::run(const ProductDescription& p, const ProductAddresses& at, cublasLt
                void* workspace) const {
   point(p, at.bias, at.mask);
   const float one = 1, before = p.accumulate ? 1.0F : 0.0F;
-  check_blas(lt().matmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_, &algorithm_,
-                    workspace, workspace_bytes, stream()),
-        "a matrix product on the CUDA device");
+  check_blas(lt().matmul(handle, operation_, &one, at.b, b_, at.a, a_, &before, at.c, c_, at.c, c_,
+                         &algorithm_, workspace, workspace_bytes, stream()),
+             "a matrix product on the CUDA device");
 }
 
 // The library's handle, its workspace and all plans made so far. Stands until the program ends, since the

@@ -69,8 +69,8 @@ const uint32_t* sort_rays(const RayInput& input, int64_t surfels, SortedRays& ra
   }
   rays.frame.place(Device::cuda).resize({4});
   launch("trace: ray frame", {1, samples}, find_frame, input, surfels, rays.frame.data());
-  launch("trace: ray keys", {blocks_for(count, order_threads), order_threads}, make_ray_keys, input, rays.frame.data(),
-         rays.keys.data(), rays.indices.data());
+  launch("trace: ray keys", {blocks_for(count, order_threads), order_threads}, make_ray_keys, input,
+         rays.frame.data(), rays.keys.data(), rays.indices.data());
   sort_pairs(count, ray_key_bits, rays.keys.data(), rays.sorted_keys.data(), rays.indices.data(),
              rays.order.data(), rays.sort_scratch);
   return rays.order.data();
