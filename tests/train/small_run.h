@@ -34,7 +34,6 @@ inline const fs::path& capture_folder() {
 
 inline TrainOptions small_run(int iterations) {
   TrainOptions o = preset("demo");
-  o.deform.kind = "network";  // the film would be followed for as long as these trainings last
   o.iterations = iterations;
   o.schedule.length = 40;
   o.schedule.deform_from = 4;
