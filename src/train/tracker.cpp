@@ -182,6 +182,7 @@ Tracker::Target Tracker::target_of(const View& view) const {
   Target target;
   target.camera = view.camera;
   if (images->coverage.empty()) return target;
+  target.is_shrunk = factor > 1;
   const auto shrunk = static_cast<float>(factor);
   target.camera.width = view.camera.width / static_cast<int>(factor);
   target.camera.height = view.camera.height / static_cast<int>(factor);
@@ -287,6 +288,9 @@ void Tracker::solve(const Surfels& main, Motion& motion, int64_t key, float exte
   const motion::SavedPtr saved = motion::make_saved();
   raster::Options drawn = render_.raster_options(extent);
   drawn.sort = raster::SortOrder::centre;  // as draw_bodies
+  // The low-pass widens surfels by a share of a pixel: by more than in training where pixels are larger.
+  drawn.low_pass = drawn.low_pass && !std::any_of(targets.begin(), targets.end(),
+                                                  [](const Target& target) { return target.is_shrunk; });
   const auto params = static_cast<size_t>(pose_size * motion.bodies());
   const std::vector<double> radius = radii_of(main, motion);
   Tensor<float> pivot({motion.bodies(), 3});

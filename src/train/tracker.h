@@ -28,6 +28,7 @@ class Tracker {
   // A view at the size for tracking.
   struct Target {
     Camera<float> camera;
+    bool is_shrunk = false;
     Tensor<float> coverage;      // H×W
     Tensor<uint8_t> mask;        // H×W
     Tensor<float> normal_prior;  // H×W×3 or empty
