@@ -33,8 +33,8 @@ if(NOT TRACEFLOW_CUDA STREQUAL "OFF")
   endif()
 endif()
 
-# Puts in the place of a list of .cu files fewer that include them, which CMake's own UNITY_BUILD does for C++ alone: most of what
-# nvcc does for a file is to read the same headers.
+# A unity build for CUDA, which CMake's UNITY_BUILD does for C++ alone: replaces a list of .cu files by fewer that include them. Most of
+# the time that nvcc takes for a file goes into the same headers.
 function(traceflow_join_sources list)
   set(files_each 6)
   set(joined)

@@ -22,7 +22,7 @@ TrainOptions paper_preset() {
 // Short runs cannot find everything from photographs alone, as the paper's 60,000 iterations do. They lean on
 // the capture: geometry starts opaque at its points, its masks say what reflects, reflection and normals
 // count from the start (without them a mirror's surface drifts behind itself, to where its images seem to
-// be), and motion is followed from the first pictures on: of bodies where masks show them.
+// be), and motion is followed from the first pictures on, that of bodies where masks show them.
 TrainOptions cpu_preset() {
   TrainOptions o;
   o.iterations = 8000;

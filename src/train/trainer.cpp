@@ -202,8 +202,7 @@ LossTerms Trainer::step() {
   request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);
   trainable.main_motion = trainable.main && scene_.main_motion && !now.goes_on;
-  // Reflections that a shape may follow keep it where a body was: it is followed by what does not depend on
-  // them.
+  // Gradients through reflections hold back the rotation of a body, so it is followed without them.
   if (now.goes_on) {
     request.specular = false;
     trainable.main = true;
