@@ -5,6 +5,7 @@
 #include "base/parallel.h"
 #include "math/spherical_harmonics.h"
 #include "ops/deform/deform_kernels.h"
+#include "primitives/list_where.h"
 
 namespace traceflow::deform {
 
@@ -77,24 +78,43 @@ void pose_backward(const Tensor<int32_t>& subset, const PosedSurfels& posed, con
   }
 }
 
+// Leaves the residuals of all posed surfels, of which bodies carry some: theirs are zero. None where there
+// are none.
+void evaluate(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
+              int64_t count, field::Precision precision, Saved& kept, bool keep_for_backward) {
+  const Device device = stored.device();
+  const bool some_are_carried = !stored.body.empty();
+  kept.moved.place(device).resize({0});
+  if (field != nullptr && some_are_carried)
+    list_where(device, "deform: free surfels", count, IsFree{rows_of(subset), stored.body.data()},
+               kept.moved);
+  const int64_t moved = some_are_carried ? kept.moved.size() : count;
+  if (field == nullptr || (some_are_carried && moved == 0)) {
+    kept.points.resize({0, 3});
+    kept.residuals.resize({});
+    return;
+  }
+  kept.points.place(device).resize({moved, 3});
+  parallel_for(device, "deform gather", moved,
+               Gather{rows_of(subset), rows_of(kept.moved), stored.position.data(), kept.points.data()});
+  Tensor<float>& outputs = some_are_carried ? kept.of_moved : kept.residuals;
+  field::forward(*field, kept.points, time, precision, outputs, keep_for_backward ? &kept.field : nullptr);
+  if (!some_are_carried) return;
+  const int64_t columns = outputs.row_size();
+  kept.residuals.place(device).reset({count, columns});
+  parallel_for(
+      device, "deform: spread residuals", outputs.size(),
+      SpreadResiduals{rows_of(kept.moved), outputs.data(), kept.residuals.data(), static_cast<int>(columns)});
+}
+
 }  // namespace
 
 void forward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
              int sh_degree, field::Precision precision, PosedSurfels& posed, Saved* saved) {
   thread_local Saved unsaved;
   Saved& kept = saved == nullptr ? unsaved : *saved;
-  const int64_t count = posed_count(stored, subset);
-  resize(stored, count, sh_degree, posed);
-  if (field == nullptr) {
-    kept.points.resize({0, 3});
-    kept.residuals.resize({});
-  } else {
-    kept.points.place(stored.device()).resize({count, 3});
-    parallel_for(stored.device(), "deform gather", count,
-                 Gather{rows_of(subset), stored.position.data(), kept.points.data()});
-    field::forward(*field, kept.points, time, precision, kept.residuals,
-                   saved == nullptr ? nullptr : &kept.field);
-  }
+  resize(stored, posed_count(stored, subset), sh_degree, posed);
+  evaluate(stored, field, time, subset, posed.count(), precision, kept, saved != nullptr);
   pose(stored, subset, kept.residuals, posed);
 }
 
@@ -103,14 +123,16 @@ Surfels displaced(const Surfels& stored, const Field& field, float time, field::
   field::forward(field, stored.position, time, precision, residuals, nullptr);
   Surfels result = stored;
   parallel_for(stored.device(), "deform displace", stored.count(),
-               Displace{rows_of(residuals), {StoredAddresses<float>(result)}});
+               Displace{rows_of(residuals),
+                        stored.body.empty() ? nullptr : stored.body.data(),
+                        {StoredAddresses<float>(result)}});
   return result;
 }
 
 void backward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
               Surfels& grad_stored, Field* grad_field) {
-  thread_local Tensor<float> scratch;
+  thread_local Tensor<float> scratch, collected;
   require(posed.count() == posed_count(stored, subset), "posed are the surfels of the subset",
           std::to_string(posed.count()));
   const bool reaches_field = field != nullptr && grad_field != nullptr && !saved.residuals.empty();
@@ -119,7 +141,15 @@ void backward(const Surfels& stored, const Field* field, float time, const Tenso
   pose_backward(
       subset, posed, grad_posed, grad_stored,
       {reaches_field ? grad_residuals.data() : nullptr, static_cast<int>(grad_residuals.row_size())});
-  if (reaches_field) field::backward(*field, saved.points, time, saved.field, grad_residuals, *grad_field);
+  if (!reaches_field) return;
+  if (!saved.moved.empty()) {
+    const auto columns = static_cast<int>(grad_residuals.row_size());
+    collected.place(stored.device()).resize(saved.of_moved.shape());
+    parallel_for(stored.device(), "deform: collect gradients of residuals", collected.size(),
+                 CollectResiduals{rows_of(saved.moved), grad_residuals.data(), collected.data(), columns});
+  }
+  field::backward(*field, saved.points, time, saved.field, saved.moved.empty() ? grad_residuals : collected,
+                  *grad_field);
 }
 
 }  // namespace traceflow::deform

@@ -7,13 +7,16 @@
 // activations.
 //   position p + Δp · rotation q + Δr (not normalised here) · scale exp(log s + Δs) · opacity σ(o + Δo) ·
 //   tint σ(τ + Δτ)
+// The field does not move what a body carries (scene/motion.h): those residuals are zero.
 // Differentiable: every stored value and the field's parameters. The position enters the field detached. Runs
 // where the stored surfels are; the field is there too.
 namespace traceflow::deform {
 
 struct Saved {
-  Tensor<float> points;     // M×3, where the field was evaluated
+  Tensor<float> points;     // m×3, where the field was evaluated
   Tensor<float> residuals;  // M×outputs; empty without a field
+  Tensor<int32_t> moved;    // m, which of the M posed surfels the field moves (ascending); empty means all
+  Tensor<float> of_moved;   // m×outputs, their residuals where these are not all
   field::Saved field;
 };
 

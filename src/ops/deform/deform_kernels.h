@@ -93,14 +93,45 @@ class AllFinite {
   float sum_ = 0;
 };
 
-// Where the field is evaluated. i: a posed surfel.
-struct Gather {
+// Whether no body carries posed surfel i.
+struct IsFree {
   Rows rows;
+  const int32_t* body;
+
+  TRACEFLOW_HD bool operator()(int64_t i) const { return body[rows.at(i)] < 0; }
+};
+
+// Where the field is evaluated. i: a posed surfel that it moves.
+struct Gather {
+  Rows rows, moved;
   const float* position;
   float* points;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    for (int k = 0; k < 3; ++k) points[3 * i + k] = position[3 * rows.at(i) + k];
+    for (int k = 0; k < 3; ++k) points[3 * i + k] = position[3 * rows.at(moved.at(i)) + k];
+  }
+};
+
+// The field's outputs to the rows of the posed surfels that it moves; i: (such a surfel, output).
+struct SpreadResiduals {
+  Rows moved;
+  const float* from;
+  float* to;
+  int columns;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    to[moved.at(i / columns) * columns + i % columns] = from[i];
+  }
+};
+// Their gradient back.
+struct CollectResiduals {
+  Rows moved;
+  const float* from;
+  float* to;
+  int columns;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    to[i] = from[moved.at(i / columns) * columns + i % columns];
   }
 };
 
@@ -187,12 +218,15 @@ struct AddToStored {
   }
 };
 
-// Adds the residuals of one surfel.
+// Adds the residuals of one surfel that no body carries.
 struct Displace {
   Residuals<const float> residuals;
+  const int32_t* body;  // null: there are none
   AddToStored add;
 
-  TRACEFLOW_HD void operator()(int64_t i) const { add(residuals.load(i), i); }
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (body == nullptr || body[i] < 0) add(residuals.load(i), i);
+  }
 };
 
 // A surfel that is hidden, or so faint that nothing saw it, has no gradient.

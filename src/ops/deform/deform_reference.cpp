@@ -52,9 +52,14 @@ Tensor<double> evaluate(const BasicField<double>* field, const Tensor<double>& p
   return residuals;
 }
 
-Residuals residuals_of(const Tensor<double>& residuals, int64_t i) {
-  return residuals.empty() ? Residuals(nullptr, 0)
-                           : Residuals(residuals.row(i), static_cast<int>(residuals.row_size()));
+bool is_carried(const BasicSurfels<double>& stored, int64_t i) {
+  return !stored.body.empty() && stored.body[i] >= 0;
+}
+
+Residuals residuals_of(const BasicSurfels<double>& stored, const Tensor<double>& residuals, int64_t i) {
+  return residuals.empty() || is_carried(stored, i)
+             ? Residuals(nullptr, 0)
+             : Residuals(residuals.row(i), static_cast<int>(residuals.row_size()));
 }
 
 }  // namespace
@@ -74,7 +79,7 @@ void forward_reference(const BasicSurfels<double>& stored, const BasicField<doub
   for (int64_t i = 0; i < n; ++i) {
     posed.scale(i, 0) = posed.scale(i, 1) = 1;
     posed.rotation(i, 0) = 1;
-    const Moved m = move(stored, i, residuals_of(residuals, i));
+    const Moved m = move(stored, i, residuals_of(stored, residuals, i));
     if (!usable(m, stored.sh.row(i), 3 * coefficients)) continue;
     for (int k = 0; k < 3; ++k) posed.position(i, k) = m.position[k];
     for (int k = 0; k < 4; ++k) posed.rotation(i, k) = m.rotation[k];
@@ -94,7 +99,7 @@ void backward_reference(const BasicSurfels<double>& stored, const BasicField<dou
   const Tensor<double> residuals = evaluate(field, field_points, time);
   Tensor<double> grad_residuals(Shape{n, field == nullptr ? 0 : field->outputs()});
   for (int64_t i = 0; i < n; ++i) {
-    const Moved m = move(stored, i, residuals_of(residuals, i));
+    const Moved m = move(stored, i, residuals_of(stored, residuals, i));
     if (!usable(m, stored.sh.row(i), sh_values)) continue;
     std::vector<double> grad(residual::main_outputs, 0.0);
     for (int k = 0; k < 3; ++k) grad[residual::position + k] = grad_posed.position(i, k);
@@ -111,7 +116,8 @@ void backward_reference(const BasicSurfels<double>& stored, const BasicField<dou
     grad_stored.opacity_logit[i] += grad[residual::opacity];
     if (stored.has_tint()) grad_stored.tint_logit[i] += grad[residual::tint];
     for (int64_t k = 0; k < sh_values; ++k) grad_stored.sh.row(i)[k] += grad_posed.sh.row(i)[k];
-    for (int64_t k = 0; k < grad_residuals.row_size() && k < residual::main_outputs; ++k) {
+    for (int64_t k = 0; !is_carried(stored, i) && k < grad_residuals.row_size() && k < residual::main_outputs;
+         ++k) {
       grad_residuals(i, k) = grad[k];
     }
   }

@@ -14,6 +14,7 @@ using testing::broken_surfels;
 using testing::expect_close;
 using testing::is_broken;
 using testing::nan;
+using testing::partly_carried;
 using testing::random_surfels;
 using testing::same_bytes;
 using testing::small;
@@ -67,6 +68,30 @@ TEST(Deform, MatchesTheReferenceForMainSurfels) {
 TEST(Deform, MatchesTheReferenceForEnvironmentSurfels) {
   const Field field = testing::random_field(small, residual::environment_outputs);
   expect_matches_reference(random_surfels(300, false), &field, 1);
+}
+
+TEST(Deform, MatchesTheReferenceWhereBodiesCarrySome) {
+  const Field field = testing::random_field(small, residual::main_outputs);
+  expect_matches_reference(partly_carried(random_surfels(300, true)), &field, 3);
+}
+
+TEST(Deform, TheFieldDoesNotMoveWhatBodiesCarry) {
+  const Field field = testing::random_field(small, residual::main_outputs);
+  Surfels stored = partly_carried(random_surfels(300, true));
+  const std::vector<int32_t> subset = testing::some_of(300);
+  const Pass pass = run(stored, &field, tensor_of(subset));
+  const Surfels displaced = deform::displaced(stored, field, test_time, Precision::fp32);
+  for (size_t i = 0; i < subset.size(); ++i) {
+    const auto row = static_cast<int64_t>(i);
+    const bool stands = pass.posed.position(row, 0) == stored.position(subset[i], 0) &&
+                        pass.posed.rotation(row, 2) == stored.rotation(subset[i], 2);
+    EXPECT_EQ(stands, stored.body[subset[i]] >= 0) << subset[i];
+    EXPECT_NEAR(pass.posed.position(row, 1), displaced.position(subset[i], 1), 1e-6);
+  }
+  stored.body.fill(0);
+  const Pass still = run(stored, &field);
+  EXPECT_TRUE(same_bytes(still.posed.position, stored.position));
+  EXPECT_TRUE(same_bytes(still.grad_field, zeros_like<float>(field)));
 }
 
 TEST(Deform, MatchesTheReferenceWithoutAField) {
@@ -184,7 +209,7 @@ TEST(Deform, DisplacedSurfelsStandWhereTheFieldMovesThem) {
 }
 
 TEST(Deform, IsTheSameBytesAtAnyThreadCount) {
-  const Surfels stored = random_surfels(5003, true);
+  const Surfels stored = partly_carried(random_surfels(5003, true));
   const Field field = testing::random_field(small, residual::main_outputs);
   for (const Precision precision : {Precision::fp32, Precision::bf16}) {
     testing::expect_same_bytes_at_any_thread_count([&] {

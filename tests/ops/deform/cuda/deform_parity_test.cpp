@@ -49,6 +49,13 @@ TEST_F(DeformOnDevice, AgreesForASubset) {
   expect_agreement(random_surfels(500, true), &field, tensor_of(some_of(500)), 2);
 }
 
+TEST_F(DeformOnDevice, AgreesWhereBodiesCarrySome) {
+  const Field field = random_field(small, residual::main_outputs);
+  const Surfels stored = partly_carried(random_surfels(500, true));
+  expect_agreement(stored, &field, {}, 3);
+  expect_agreement(stored, &field, tensor_of(some_of(500)), 2);
+}
+
 TEST_F(DeformOnDevice, AgreesWithoutAField) {
   expect_agreement(random_surfels(100, true), nullptr, {}, 0);
   expect_agreement(random_surfels(100, false), nullptr, tensor_of(some_of(100)), 3);
