@@ -173,6 +173,7 @@ void TrackOptions::validate() const {
   check_not_negative(blur, "deform.track.blur");
   check_not_negative(silhouette, "deform.track.silhouette");
   check_not_negative(normal, "deform.track.normal");
+  check_not_negative(colour, "deform.track.colour");
 }
 
 void DeformOptions::validate() const {

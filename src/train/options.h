@@ -179,6 +179,7 @@ struct TrackOptions {
   float blur = 2;
   float silhouette = 0.5F;
   float normal = 0.3F;
+  float colour = 0.3F;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -191,6 +192,8 @@ struct TrackOptions {
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");
+    v.field("colour", colour, "",
+            "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
   }
   void validate() const;
 };

@@ -52,6 +52,16 @@ int64_t count_in(const Safetensors& file, const std::string& key) {
   return static_cast<int64_t>(value);
 }
 
+// What a body carries stays as it is of itself, and away from what does not move with it.
+void leave_bodies(const Tensor<int32_t>& body, Tensor<int32_t>& bonds) {
+  for (int64_t i = 0; i < bonds.dim(0); ++i) {
+    for (int64_t k = 0; k < bonds.dim(1); ++k) {
+      int32_t& other = bonds(i, k);
+      if (other >= 0 && (body[i] >= 0 || body[other] >= 0)) other = -1;
+    }
+  }
+}
+
 void check_bonds(const Neighbours& bonds, int64_t surfels) {
   bool fits =
       bonds.index.shape() == Shape{surfels, bonds_each} && bonds.distance2.shape() == bonds.index.shape();
@@ -144,7 +154,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
-      before_step_{random_, views_, -1, {}, {}} {
+      before_step_{random_, views_, -1, {}, {}, {}} {
   density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
@@ -205,7 +215,9 @@ LossTerms Trainer::step() {
   // Gradients through reflections hold back the rotation of a body, so it is followed without them.
   if (now.goes_on) {
     request.specular = false;
+    request.deform_main = false;
     trainable.main = true;
+    trainable.main_field = false;
     trainable.tint = trainable.environment = trainable.environment_field = false;
   }
 
@@ -249,7 +261,9 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
 void Trainer::add_rigidity(const Frame& frame) {
   if (frame.main.count() == 0) return;
   if (bonds_.index.empty()) {
-    bonds_ = spread_neighbours(scene_.main.position.on(Device::cpu), bonds_each, bond_stride).on(device_);
+    Neighbours bonds = spread_neighbours(scene_.main.position.on(Device::cpu), bonds_each, bond_stride);
+    if (scene_.main_motion) leave_bodies(scene_.main.body.on(Device::cpu), bonds.index);
+    bonds_ = bonds.on(device_);
   }
   grad_frame_.main_position.reset(frame.main.position.shape());
   grad_rest_.reset(scene_.main.position.shape());
@@ -355,10 +369,11 @@ std::string Trainer::tell_iteration() {
     tell_measured();
     stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
-  before_step_ = Draws{random_, views_, iteration_, {}, {}};
+  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}};
   if (tracking(iteration_).enters) {
     before_step_.motion = scene_.main_motion;
     before_step_.body = scene_.main.body;
+    before_step_.colour_trust = colour_trust_;
   }
   const Clock::time_point start = Clock::now();
   LossTerms terms;
@@ -434,6 +449,10 @@ Safetensors Trainer::checkpoint() const {
     file.add("bonds/index", bonds_.index);
     file.add("bonds/distance2", bonds_.distance2);
   }
+  if (!colour_trust_.turned.empty()) {
+    file.add("colour_trust/taken_back", colour_trust_.taken_back);
+    file.add("colour_trust/turned", colour_trust_.turned);
+  }
   file.add("views/order", views_.order());
   Tensor<int64_t> random(Shape{4});
   for (size_t i = 0; i < 4; ++i) random[static_cast<int64_t>(i)] = std::bit_cast<int64_t>(random_.state()[i]);
@@ -497,6 +516,7 @@ void Trainer::step_back() {
     if (before_step_.motion) {
       scene_.main_motion = before_step_.motion;
       scene_.main.body = before_step_.body;
+      colour_trust_ = before_step_.colour_trust;
     }
   }
   tell_density();
@@ -524,6 +544,15 @@ void Trainer::resume() {
     bonds_ = {file.tensor<int32_t>("bonds/index"), file.tensor<float>("bonds/distance2")};
     check_bonds(bonds_, scene_.main.count());
     bonds_ = bonds_.on(device_);
+  }
+  colour_trust_ = {};
+  if (file.has("colour_trust/turned")) {
+    colour_trust_ = {file.tensor<double>("colour_trust/taken_back"),
+                     file.tensor<double>("colour_trust/turned")};
+    const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
+    if (colour_trust_.turned.shape() != bodies || colour_trust_.taken_back.shape() != bodies)
+      throw InputError("checkpoint", "colour_trust", colour_trust_.turned.shape().to_string(),
+                       bodies.to_string());
   }
   views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");

@@ -128,6 +128,7 @@ class Trainer {
     // As the step found them, where it follows bodies to a new time.
     std::optional<Motion> motion;
     Tensor<int32_t> body;
+    ColourTrust colour_trust;
   };
   // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
   // again.
@@ -168,6 +169,7 @@ class Trainer {
   StepMeter meter_;
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
   Draws before_step_;
+  ColourTrust colour_trust_;  // while bodies are followed
   // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
   bool torn_ = false;
   std::atomic<bool> stop_soon_{false};

@@ -33,7 +33,7 @@ void Trainer::follow_again() {
   const Tracker tracker(track, options_.render, capture_);
   const int64_t last = motion.keys() - 1;
   for (int64_t key = 0; key <= last; ++key)
-    tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur);
+    tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur, colour_trust_);
   scene_.main_motion = motion.on(device_);
 }
 
@@ -42,16 +42,16 @@ void Trainer::follow(int64_t key) {
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
-  if (key == 1) tracker.solve(main, motion, 0, scene_.extent, track.steps, little_blur * track.blur);
+  if (key == 1)
+    tracker.solve(main, motion, 0, scene_.extent, track.steps, little_blur * track.blur, colour_trust_);
   if (key > 2) {
     const int64_t oldest = std::max<int64_t>(0, key - track.window);
     for (int k = 0; k < track.again; ++k) {
       const int64_t at = oldest + static_cast<int64_t>(random_.below(static_cast<int64_t>(key - oldest)));
-      tracker.solve(main, motion, at, scene_.extent, few_steps, little_blur * track.blur);
+      tracker.solve(main, motion, at, scene_.extent, few_steps, little_blur * track.blur, colour_trust_);
     }
   }
-  Tracker::predict(motion, key);
-  tracker.solve(main, motion, key, scene_.extent, track.steps, track.blur);
+  tracker.follow(main, motion, key, scene_.extent, colour_trust_);
   // What is behind stands where this one does until it is reached.
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     for (int64_t later = key + 1; later < motion.keys(); ++later) {

@@ -175,11 +175,25 @@ TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
     set_threads(threads);
     Motion motion = *at.scene.main_motion;
     Tracker::predict(motion, 1);
-    tracker.solve(at.scene.main, motion, 1, at.scene.extent, 3, options.blur);
+    tracker.solve(at.scene.main, motion, 1, at.scene.extent, 3, options.blur, {});
     found.insert({motion.rotation.values().begin(), motion.rotation.values().end()});
   }
   set_threads(0);
   EXPECT_EQ(found.size(), 1U);
+}
+
+// Colour is trusted where it takes back little of the turns that there were, and of none before there were
+// any.
+TEST(Tracker, TrustsColourThatTakesBackLittle) {
+  const auto holds = [](double taken_back, double turned) {
+    return ColourTrust{tensor_of(std::vector<double>{taken_back}), tensor_of(std::vector<double>{turned})}
+        .holds(0);
+  };
+  EXPECT_FALSE(ColourTrust().holds(0));
+  EXPECT_FALSE(holds(0, 0.01));
+  EXPECT_TRUE(holds(0.01, 0.2));
+  EXPECT_TRUE(holds(-0.1, 0.2));
+  EXPECT_FALSE(holds(0.1, 0.2));
 }
 
 TEST(Tracker, PredictsWhatGoesOnAsBefore) {

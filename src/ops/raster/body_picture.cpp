@@ -13,7 +13,7 @@ namespace traceflow::raster {
 namespace {
 
 constexpr int pose_size = 6;
-constexpr int channels = 4;  // silhouette and normal
+constexpr int channels = 7;  // silhouette, normal, colour
 
 struct SurfelAxes {
   Vec3<float> position, axis_u, axis_v, normal;  // world; the axes over their scales
@@ -106,7 +106,7 @@ class BodyTile {
     float* const to = picture_.jacobian.data() + pixel * params_ * channels;
     std::fill(by_transmittance_.begin(), by_transmittance_.end(), 0.0F);
     float transmittance = 1, silhouette = 0;
-    Vec3<float> normal(0);
+    Vec3<float> normal(0), colour(0);
     bool moves = false;  // what stands before the next hit
     for (const Listed& listed : listed_) {
       const Splat& splat = saved_.splats[listed.surfel];
@@ -115,21 +115,23 @@ class BodyTile {
       const float alpha = std::min(hit.opacity, options_.alpha_max);
       const float weight = transmittance * alpha;
       if (transmittance - weight < options_.transmittance_min) break;
-      const Vec3<float> n = load3<float>(splat.normal);
+      const Vec3<float> n = load3<float>(splat.normal), c = load3<float>(splat.colour);
       const float indicator = listed.body >= 0 ? 1.0F : 0.0F;
       moves = moves || listed.body >= 0;
-      if (moves) differentiate(listed, splat, hit, ray, {alpha, weight, indicator, n}, to);
+      if (moves) differentiate(listed, splat, hit, ray, {alpha, weight, indicator, n, c}, to);
       silhouette += weight * indicator;
       normal += weight * n;
+      colour += weight * c;
       transmittance -= weight;
     }
     picture_.silhouette[pixel] = silhouette;
     store3(picture_.normal.data() + 3 * pixel, normal);
+    store3(picture_.colour.data() + 3 * pixel, colour);
   }
 
   struct Hit {
     float alpha, weight, indicator;
-    Vec3<float> normal;
+    Vec3<float> normal, colour;
   };
 
   void differentiate(const Listed& listed, const Splat& splat, const PixelFootprint& at,
@@ -137,7 +139,10 @@ class BodyTile {
     const auto add = [&](int p, float by_weight) {
       float* const row = to + p * channels;
       row[0] += by_weight * hit.indicator;
-      for (int k = 0; k < 3; ++k) row[1 + k] += by_weight * hit.normal[k];
+      for (int k = 0; k < 3; ++k) {
+        row[1 + k] += by_weight * hit.normal[k];
+        row[4 + k] += by_weight * hit.colour[k];
+      }
       by_transmittance_[static_cast<size_t>(p)] -= by_weight;
     };
     // What stands before dims this hit.
@@ -189,6 +194,7 @@ void draw_bodies(const PosedSurfels& surfels, const Tensor<int32_t>& body, const
   const Shape image{camera.height, camera.width};
   picture.silhouette.reset(image);
   picture.normal.reset({camera.height, camera.width, 3});
+  picture.colour.reset({camera.height, camera.width, 3});
   picture.jacobian.reset({camera.height, camera.width, pose_size * pivot.dim(0), channels});
   const Saved& tiles = saved;
   parallel_blocks("raster: draw bodies", tiles.tiles(), 1, [&](int64_t tile, int64_t) {

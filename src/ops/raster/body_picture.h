@@ -2,16 +2,18 @@
 
 #include "ops/raster/raster.h"
 
-// What tracking sees of rigid bodies: where they cover the picture and how it is turned there, with exact
-// derivatives by their poses (forward mode: a few directions for many pixels).
+// What tracking sees of rigid bodies: where they cover the picture, how it is turned there and its colour,
+// with exact derivatives by their poses (forward mode: a few directions for many pixels).
 namespace traceflow::raster {
 
 struct BodyPicture {
   // Where a tile of 16×16 pixels has no carried surfel these are 0, as are their derivatives.
   Tensor<float> silhouette;  // H×W, Σ w over the surfels of all bodies
   Tensor<float> normal;      // H×W×3, world axes, Σ w n of every surfel, as raster::BasicOutput has it
-  // H×W×(6·B)×4: by ω_x, ω_y, ω_z (radians, about the body's pivot, world axes) and the shift s_x, s_y, s_z
-  // (scene units) of each body: of the silhouette and the three normal components.
+  Tensor<float> colour;      // H×W×3, Σ w c of every surfel, as raster::BasicOutput has it
+  // H×W×(6·B)×7: by ω_x, ω_y, ω_z (radians, about the body's pivot, world axes) and the shift s_x, s_y, s_z
+  // (scene units) of each body: of the silhouette, the three normal components and the three of the colour,
+  // whose dependence on the side that a surfel is seen from is left out.
   Tensor<float> jacobian;
 };
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "math/rotation_group.h"
 #include "raster_scenes.h"
 #include "support/gradients.h"
@@ -22,7 +24,11 @@ BodyScene body_scene(uint64_t seed, double opacity_max = 0.9) {
   options.opacity_max = opacity_max;
   BodyScene made{random_scene(seed, 40, 24, options), Tensor<int32_t>({options.count}),
                  Tensor<float>({2, 3})};
+  // Colours that are the same from every side.
+  const Tensor<double> sh = made.scene.surfels.sh;
+  made.scene.surfels.sh.reset({options.count, 1, 3});
   for (int64_t i = 0; i < options.count; ++i) {
+    std::copy_n(sh.row(i), 3, made.scene.surfels.sh.row(i));
     made.body[i] = static_cast<int32_t>(i % 3) - 1;
     made.scene.surfels.tint[i] = made.body[i] >= 0 ? 1 : 0;
   }
@@ -30,15 +36,18 @@ BodyScene body_scene(uint64_t seed, double opacity_max = 0.9) {
   return made;
 }
 
-// Silhouette and normals, H·W×4, by the reference.
+// Silhouette, normals and colour, H·W×7, by the reference.
 Tensor<double> reference_picture(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera,
                                  const Options& options) {
   BasicOutput<double> output;
   forward_reference(surfels, camera, options, output);
-  Tensor<double> result({output.alpha.size(), 4});
+  Tensor<double> result({output.alpha.size(), 7});
   for (int64_t i = 0; i < output.alpha.size(); ++i) {
     result(i, 0) = output.tint[i];
-    for (int k = 0; k < 3; ++k) result(i, k + 1) = output.normal[3 * i + k];
+    for (int k = 0; k < 3; ++k) {
+      result(i, k + 1) = output.normal[3 * i + k];
+      result(i, k + 4) = output.colour[3 * i + k];
+    }
   }
   return result;
 }
@@ -75,9 +84,12 @@ TEST(BodyPicture, IsThatOfTheReference) {
     Tensor<float> found(expected.shape());
     for (int64_t i = 0; i < picture.silhouette.size(); ++i) {
       found(i, 0) = picture.silhouette[i];
-      for (int k = 0; k < 3; ++k) found(i, k + 1) = picture.normal[3 * i + k];
+      for (int k = 0; k < 3; ++k) {
+        found(i, k + 1) = picture.normal[3 * i + k];
+        found(i, k + 4) = picture.colour[3 * i + k];
+      }
     }
-    testing::expect_close(found, expected, 1e-4, "silhouette and normal");
+    testing::expect_close(found, expected, 1e-4, "silhouette, normal and colour");
   }
 }
 
@@ -91,7 +103,7 @@ TEST(BodyPicture, JacobianAgreesWithCentralDifferencesOfTheReference) {
   for (uint64_t seed = 1; seed <= 6; ++seed) {
     const BodyScene at = body_scene(seed);
     const BodyPicture picture = drawn(at, options);
-    ASSERT_EQ(picture.jacobian.shape(), (Shape{24, 40, 12, 4}));
+    ASSERT_EQ(picture.jacobian.shape(), (Shape{24, 40, 12, 7}));
     for (int p = 0; p < 12; ++p) {
       Vec3<double> turn(0), shift(0);
       (p % 6 < 3 ? turn : shift)[p % 3] = step;
@@ -99,7 +111,7 @@ TEST(BodyPicture, JacobianAgreesWithCentralDifferencesOfTheReference) {
       const Tensor<double> below = picture_after(at, options, p / 6, -turn, -shift);
       for (int64_t i = 0; i < above.size(); ++i) {
         const double expected = (above[i] - below[i]) / (2 * step);
-        const double found = picture.jacobian[(i / 4 * 12 + p) * 4 + i % 4];
+        const double found = picture.jacobian[(i / 7 * 12 + p) * 7 + i % 7];
         ++compared;
         apart += std::abs(found - expected) > 2e-3 * (1 + std::abs(expected)) ? 1 : 0;
       }
@@ -112,7 +124,7 @@ TEST(BodyPicture, IsTheSameBytesAtAnyThreadCount) {
   const BodyScene at = body_scene(3);
   testing::expect_same_bytes_at_any_thread_count([&] {
     const BodyPicture picture = drawn(at, {});
-    return std::vector<Tensor<float>>{picture.silhouette, picture.normal, picture.jacobian};
+    return std::vector<Tensor<float>>{picture.silhouette, picture.normal, picture.colour, picture.jacobian};
   });
 }
 

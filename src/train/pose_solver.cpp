@@ -1,0 +1,369 @@
+#include "train/pose_solver.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "base/parallel.h"
+#include "math/rotation_group.h"
+#include "math/similarity_fit.h"
+#include "ops/deform/deform.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr int pose_size = 6;
+constexpr int channels = 7;  // silhouette, normal, colour
+constexpr double huber = 0.05;
+constexpr double blur_falls = 0.7;
+// A step turns a body by at most so many radians and shifts it by so many of its radii.
+constexpr double most_turn = 0.1, most_shift = 0.15;
+constexpr double relative_damping = 1e-3, least_damping = 1e-3;
+constexpr int tries = 3;
+constexpr double shorter = 0.4;
+
+// Gaussian, along both sides, the border repeated; pixels of `width` numbers. In place.
+void blur(Tensor<float>& image, int64_t height, int64_t width, int64_t numbers, double sigma) {
+  if (sigma < 0.3) return;
+  const auto reach = static_cast<int64_t>(std::ceil(2.5 * sigma));
+  std::vector<float> taps;
+  float sum = 0;
+  for (int64_t k = -reach; k <= reach; ++k) {
+    taps.push_back(static_cast<float>(std::exp(-0.5 * static_cast<double>(k * k) / (sigma * sigma))));
+    sum += taps.back();
+  }
+  for (float& tap : taps) tap /= sum;
+  Tensor<float> along(image.shape());
+  const auto pass = [&](const Tensor<float>& from, Tensor<float>& to, bool down) {
+    parallel_blocks("track: blur", height, 4, [&](int64_t begin, int64_t end) {
+      for (int64_t y = begin; y < end; ++y) {
+        for (int64_t x = 0; x < width; ++x) {
+          float* const sums = to.data() + (y * width + x) * numbers;
+          std::fill_n(sums, numbers, 0.0F);
+          for (int64_t k = -reach; k <= reach; ++k) {
+            const int64_t row = down ? std::clamp<int64_t>(y + k, 0, height - 1) : y;
+            const int64_t column = down ? x : std::clamp<int64_t>(x + k, 0, width - 1);
+            const float* const values = from.data() + (row * width + column) * numbers;
+            const float tap = taps[static_cast<size_t>(k + reach)];
+            for (int64_t n = 0; n < numbers; ++n) sums[n] += tap * values[n];
+          }
+        }
+      }
+    });
+  };
+  pass(image, along, false);
+  pass(along, image, true);
+}
+
+// Solves a x = b for a symmetric positive definite a (n×n), by elimination.
+std::vector<double> solve_symmetric(std::vector<double> a, std::vector<double> b) {
+  const size_t n = b.size();
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = i + 1; j < n; ++j) {
+      const double factor = a[j * n + i] / a[i * n + i];
+      for (size_t k = i; k < n; ++k) a[j * n + k] -= factor * a[i * n + k];
+      b[j] -= factor * b[i];
+    }
+  }
+  for (size_t i = n; i-- > 0;) {
+    for (size_t k = i + 1; k < n; ++k) b[i] -= a[i * n + k] * b[k];
+    b[i] /= a[i * n + i];
+  }
+  return b;
+}
+
+// The rotation that takes `from` nearest to `to`, given Σ to · fromᵀ.
+Mat3<double> rotation_of_moments(const Mat3<double>& moments) {
+  std::array<Vec3<double>, 6> from, to;
+  // Axes and their opposites: as points about the origin they have these moments.
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<size_t>(axis);
+    Vec3<double> unit(0);
+    unit[axis] = 1;
+    from[2 * k] = unit;
+    from[2 * k + 1] = -unit;
+    to[2 * k] = moments[axis];
+    to[2 * k + 1] = -moments[axis];
+  }
+  return fit_similarity(from, to).rotation;
+}
+
+void turn_prior(const raster::Output& picture, const Camera<float>& camera, const Tensor<uint8_t>& mask,
+                Tensor<float>& prior) {
+  constexpr double pull = 0.05;  // towards none
+  constexpr int rounds = 6;
+  constexpr int64_t least_pixels = 50;
+  const Mat3<double> to_camera(camera.camera_from_world);
+  Mat3<double> bias(1);
+  for (int round = 0; round < rounds; ++round) {
+    const double within = std::cos((round == 0 ? 25 : 15) * 0.017453292519943295);
+    Mat3<double> moments(0);
+    int64_t count = 0;
+    for (int64_t i = 0; i < picture.alpha.size(); ++i) {
+      if (picture.alpha[i] < 0.9F || (!mask.empty() && mask[i] != 0)) continue;
+      const Vec3<double> model = load3<double>(picture.normal.data() + 3 * i);
+      const Vec3<double> told = load3<double>(prior.data() + 3 * i);
+      if (dot(model, model) < 0.25 || dot(told, told) < 0.25) continue;
+      const Vec3<double> a = to_camera * normalize(model), b = to_camera * normalize(told);
+      if (!(dot(bias * a, b) > within)) continue;
+      moments += outerProduct(b, a);
+      ++count;
+    }
+    if (count < least_pixels) return;
+    bias = rotation_of_moments(moments + pull * static_cast<double>(count) * bias);
+  }
+  const Mat3<float> turn(transpose(to_camera) * transpose(bias) * to_camera);
+  for (int64_t i = 0; i < prior.size(); i += 3) store3(&prior[i], turn * load3<float>(&prior[i]));
+}
+
+// The root mean square distance of each body's surfels from its centre.
+std::vector<double> radii_of(const Surfels& main, const Motion& motion) {
+  std::vector<double> sum(static_cast<size_t>(motion.bodies())), count(sum.size());
+  for (int64_t i = 0; i < main.count(); ++i) {
+    const int32_t body = main.body[i];
+    if (body < 0) continue;
+    const Vec3<double> arm = load3<double>(main.position.row(i)) - load3<double>(motion.centre.row(body));
+    sum[static_cast<size_t>(body)] += dot(arm, arm);
+    count[static_cast<size_t>(body)] += 1;
+  }
+  for (size_t b = 0; b < sum.size(); ++b)
+    sum[b] = count[b] > 0 && sum[b] > 0 ? std::sqrt(sum[b] / count[b]) : 1;
+  return sum;
+}
+
+double robust_cost(const Tensor<float>& residuals) {
+  return ordered_sum<double>("track: cost", residuals.size(), [&](int64_t i) {
+    const double x = std::abs(static_cast<double>(residuals[i]));
+    return x < huber ? x * x / (2 * huber) : x - huber / 2;
+  });
+}
+
+// Adds Σ w J Jᵀ and −Σ w J r.
+void add_normal_equations(const Tensor<float>& residuals, const Tensor<float>& jacobian, size_t params,
+                          std::vector<double>& a, std::vector<double>& b) {
+  const int64_t pixels = residuals.size() / channels;
+  constexpr int64_t block = 512;
+  const auto blocks = static_cast<size_t>((pixels + block - 1) / block);
+  const size_t size = params * params + params;
+  std::vector<std::vector<double>> partial(blocks);
+  parallel_blocks("track: normal equations", pixels, block, [&](int64_t begin, int64_t end) {
+    std::vector<double>& sums = partial[static_cast<size_t>(begin / block)];
+    sums.assign(size, 0.0);
+    std::vector<double> row(params);
+    for (int64_t pixel = begin; pixel < end; ++pixel) {
+      for (int64_t c = 0; c < channels; ++c) {
+        const double value = residuals[pixel * channels + c];
+        bool any = false;
+        for (size_t p = 0; p < params; ++p) {
+          row[p] = jacobian[(pixel * static_cast<int64_t>(params) + static_cast<int64_t>(p)) * channels + c];
+          any = any || row[p] != 0;
+        }
+        if (!any) continue;
+        const double weight = 1 / std::max(huber, std::abs(value));
+        for (size_t p = 0; p < params; ++p) {
+          const double weighted = weight * row[p];
+          for (size_t q = 0; q <= p; ++q) sums[p * params + q] += weighted * row[q];
+          sums[params * params + p] -= weighted * value;
+        }
+      }
+    }
+  });
+  for (const std::vector<double>& sums : partial) {
+    for (size_t p = 0; p < params; ++p) {
+      for (size_t q = 0; q <= p; ++q) a[p * params + q] += sums[p * params + q];
+      b[p] += sums[params * params + p];
+    }
+  }
+}
+
+}  // namespace
+
+PoseSolver::PoseSolver(const Surfels& main, Motion& motion, int64_t key, const raster::Options& options,
+                       std::vector<TrackTarget> targets)
+    : main_(main),
+      motion_(motion),
+      key_(key),
+      options_(options),
+      targets_(std::move(targets)),
+      params_(static_cast<size_t>(pose_size * motion.bodies())),
+      radius_(radii_of(main, motion)),
+      saved_(motion::make_saved()),
+      pivot_({motion.bodies(), 3}),
+      colour_weight_(targets_.size()) {
+  options_.sort = raster::SortOrder::centre;  // as draw_bodies
+  // The low-pass widens surfels by a share of a pixel: by more than in training where pixels are larger.
+  options_.low_pass = options_.low_pass && std::none_of(targets_.begin(), targets_.end(),
+                                                        [](const TrackTarget& t) { return t.is_shrunk; });
+  deform::forward(main, nullptr, motion.time[key], {}, 0, field::Precision::fp32, still_, nullptr);
+  // The rasteriser's tint is then the silhouette.
+  still_.tint.resize({main.count()});
+  for (int64_t i = 0; i < main.count(); ++i) still_.tint[i] = main.body[i] >= 0 ? 1.0F : 0.0F;
+  pose();
+}
+
+void PoseSolver::pose() {
+  posed_ = still_;
+  motion::forward(motion_, main_.body, motion_.time[key_], {}, posed_, *saved_);
+  for (int64_t b = 0; b < motion_.bodies(); ++b) {
+    store3(pivot_.row(b), load3<float>(motion_.centre.row(b)) + load3<float>(&motion_.shift(b, key_, 0)));
+  }
+}
+
+void PoseSolver::turn_priors() {
+  for (TrackTarget& target : targets_) {
+    if (target.normal_prior.empty()) continue;
+    raster::forward(posed_, target.camera, options_, whole_, nullptr);
+    turn_prior(whole_, target.camera, target.mask, target.normal_prior);
+  }
+}
+
+// Where bodies with different weights meet, a pixel has the mean of what shows there.
+void PoseSolver::weigh_colour(const TrackWeights& weights) {
+  const bool any = std::any_of(weights.colour.begin(), weights.colour.end(), [](float w) { return w > 0; });
+  PosedSurfels weighted = posed_;
+  for (int64_t i = 0; any && i < main_.count(); ++i) {
+    const int32_t b = main_.body[i];
+    weighted.tint[i] = b >= 0 ? weights.colour[static_cast<size_t>(b)] : 0.0F;
+  }
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    const TrackTarget& target = targets_[k];
+    colour_weight_[k].reset(target.coverage.shape());
+    if (!any || target.colour.empty()) continue;
+    raster::forward(weighted, target.camera, options_, whole_, nullptr);
+    for (int64_t i = 0; i < whole_.tint.size(); ++i)
+      colour_weight_[k][i] = target.mask[i] != 0 ? whole_.tint[i] : 0.0F;
+  }
+}
+
+PoseSolver::Residuals PoseSolver::look(size_t at, const TrackWeights& weights, double sigma,
+                                       bool with_jacobian) {
+  const TrackTarget& target = targets_[at];
+  raster::forward(posed_, target.camera, options_, whole_, nullptr);
+  const int64_t pixels = whole_.tint.size();
+  Residuals r{Tensor<float>({pixels, channels}), {}};
+  const bool has_prior = !target.normal_prior.empty(), has_colour = !target.colour.empty();
+  const auto weight_of_normal = [&](int64_t i) {
+    if (!has_prior || target.mask[i] == 0) return 0.0F;
+    const Vec3<float> told = load3<float>(&target.normal_prior[3 * i]);
+    return dot(told, told) > 0 ? weights.normal : 0.0F;
+  };
+  for (int64_t i = 0; i < pixels; ++i) {
+    r.value(i, 0) = weights.silhouette * (whole_.tint[i] - target.coverage[i]);
+    const float by_normal = weight_of_normal(i), by_colour = colour_weight_[at][i];
+    for (int64_t k = 0; k < 3; ++k) {
+      if (by_normal > 0)
+        r.value(i, 1 + k) = by_normal * (whole_.normal[3 * i + k] - target.normal_prior[3 * i + k]);
+      if (has_colour) r.value(i, 4 + k) = by_colour * (whole_.colour[3 * i + k] - target.colour[3 * i + k]);
+    }
+  }
+  if (with_jacobian) {
+    raster::draw_bodies(posed_, main_.body, pivot_, target.camera, options_, picture_);
+    r.jacobian.swap(picture_.jacobian);
+    for (int64_t i = 0; i < pixels; ++i) {
+      const float by_normal = weight_of_normal(i), by_colour = colour_weight_[at][i];
+      float* row = r.jacobian.data() + i * static_cast<int64_t>(params_) * channels;
+      for (size_t p = 0; p < params_; ++p, row += channels) {
+        row[0] *= weights.silhouette;
+        for (int64_t k = 0; k < 3; ++k) {
+          row[1 + k] *= by_normal;
+          row[4 + k] *= by_colour;
+        }
+      }
+    }
+    blur(r.jacobian, target.camera.height, target.camera.width, static_cast<int64_t>(params_) * channels,
+         sigma);
+  }
+  blur(r.value, target.camera.height, target.camera.width, channels, sigma);
+  return r;
+}
+
+std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, double damping,
+                                     double& cost) {
+  std::vector<double> a(params_ * params_), b(params_);
+  cost = 0;
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    const Residuals r = look(k, weights, sigma, true);
+    cost += robust_cost(r.value);
+    add_normal_equations(r.value, r.jacobian, params_, a, b);
+  }
+  // Shifts in radii, so that both kinds of numbers are of one size.
+  const auto unit = [&](size_t p) { return p % pose_size < 3 ? 1.0 : radius_[p / pose_size]; };
+  for (size_t p = 0; p < params_; ++p) {
+    for (size_t q = 0; q <= p; ++q) {
+      a[p * params_ + q] *= unit(p) * unit(q);
+      a[q * params_ + p] = a[p * params_ + q];
+    }
+    b[p] *= unit(p);
+  }
+  for (size_t p = 0; p < params_; ++p) a[p * params_ + p] += relative_damping * a[p * params_ + p] + damping;
+  std::vector<double> found = solve_symmetric(a, b);
+  for (size_t p = 0; p < params_; ++p) {
+    const double most = p % pose_size < 3 ? most_turn : most_shift;
+    found[p] = std::clamp(found[p], -most, most) * unit(p);
+  }
+  return found;
+}
+
+// Turns and shifts the bodies: by ω (left) and s for each.
+void PoseSolver::take(const std::vector<double>& step) {
+  for (int64_t b = 0; b < motion_.bodies(); ++b) {
+    const double* const d = step.data() + pose_size * b;
+    float* const q = &motion_.rotation(b, key_, 0);
+    const Vec4<double> turned =
+        quaternion_product(quaternion_exp(Vec3<double>(d[0], d[1], d[2])), unit_quaternion(load4<double>(q)));
+    for (int c = 0; c < 4; ++c) q[c] = static_cast<float>(turned[c]);
+    add3(&motion_.shift(b, key_, 0), Vec3<double>(d[3], d[4], d[5]));
+  }
+  pose();
+}
+
+void PoseSolver::solve(const TrackWeights& weights, int steps, double first_blur) {
+  if (targets_.empty()) return;
+  weigh_colour(weights);
+  for (int k = 0; k < steps; ++k) {
+    const double sigma = first_blur * std::pow(blur_falls, k);
+    double before = 0;
+    std::vector<double> found = step(weights, sigma, least_damping, before);
+    const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
+    bool better = false;
+    for (int attempt = 0; attempt < tries && !better; ++attempt) {
+      take(found);
+      double after = 0;
+      for (size_t at = 0; at < targets_.size(); ++at)
+        after += robust_cost(look(at, weights, sigma, false).value);
+      better = after < before;
+      if (better) break;
+      motion_.rotation = rotation;
+      motion_.shift = shift;
+      for (double& number : found) number *= shorter;
+    }
+    if (!better) pose();
+  }
+}
+
+std::vector<Vec3<double>> PoseSolver::turns_by_colour() {
+  constexpr int steps = 3;
+  constexpr double sigma = 1;    // pixels
+  constexpr double damping = 1;  // what colour does not tell stays
+  const TrackWeights colour{0, 0, std::vector<float>(static_cast<size_t>(motion_.bodies()), 1.0F)};
+  const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
+  weigh_colour(colour);
+  for (int k = 0; k < steps; ++k) {
+    double cost = 0;
+    take(step(colour, sigma, damping, cost));
+  }
+  std::vector<Vec3<double>> turns;
+  for (int64_t b = 0; b < motion_.bodies(); ++b) {
+    const Vec4<double> from = unit_quaternion(load4<double>(&rotation(b, key_, 0)));
+    const Vec4<double> to = unit_quaternion(load4<double>(&motion_.rotation(b, key_, 0)));
+    turns.push_back(quaternion_log(quaternion_product(to, quaternion_conjugate(from))));
+  }
+  motion_.rotation = rotation;
+  motion_.shift = shift;
+  pose();
+  return turns;
+}
+
+}  // namespace traceflow

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "math/camera.h"
+#include "ops/motion/motion.h"
+#include "ops/raster/body_picture.h"
+#include "scene/surfels.h"
+
+namespace traceflow {
+
+// A view at the size for tracking.
+struct TrackTarget {
+  Camera<float> camera;
+  bool is_shrunk = false;
+  Tensor<float> colour;        // H×W×3
+  Tensor<float> coverage;      // H×W
+  Tensor<uint8_t> mask;        // H×W
+  Tensor<float> normal_prior;  // H×W×3 or empty
+};
+
+// Weights of what is compared: residuals are in [0, 1], normals unit.
+struct TrackWeights {
+  float silhouette = 0, normal = 0;
+  std::vector<float> colour;  // of each body
+};
+
+// Gauss–Newton on the poses of all bodies at one key of a motion, six numbers a body, on pictures of that
+// time. On the CPU; the same bytes at any thread count.
+class PoseSolver {
+ public:
+  // Keeps references. options: how pictures are drawn.
+  PoseSolver(const Surfels& main, Motion& motion, int64_t key, const raster::Options& options,
+             std::vector<TrackTarget> targets);
+
+  // Turns each target's priors, in the camera's axes, so that those of what stands still agree with the
+  // model.
+  void turn_priors();
+  // Steps on blurred residuals, blur in pixels, 0.7 of it at each step that follows; each step is taken where
+  // the cost falls, else shorter ones are tried.
+  void solve(const TrackWeights& weights, int steps, double first_blur);
+  // How colour alone would turn the bodies from where they are, which stay there: ω of each, radians.
+  std::vector<Vec3<double>> turns_by_colour();
+
+ private:
+  // One view's residuals and how they change.
+  struct Residuals {
+    Tensor<float> value;     // n×7: silhouette, normal, colour
+    Tensor<float> jacobian;  // n×P×7; empty where not asked for
+  };
+  void pose();
+  void weigh_colour(const TrackWeights& weights);
+  Residuals look(size_t target, const TrackWeights& weights, double blur, bool with_jacobian);
+  // The step that a view of all targets asks for, limited; the cost where they stand.
+  std::vector<double> step(const TrackWeights& weights, double blur, double damping, double& cost);
+  void take(const std::vector<double>& step);
+
+  const Surfels& main_;
+  Motion& motion_;
+  int64_t key_;
+  raster::Options options_;
+  std::vector<TrackTarget> targets_;
+  size_t params_;
+  std::vector<double> radius_;
+  PosedSurfels still_, posed_;
+  motion::SavedPtr saved_;
+  Tensor<float> pivot_;
+  std::vector<Tensor<float>> colour_weight_;  // of each target, H×W
+  raster::BodyPicture picture_;
+  raster::Output whole_;
+};
+
+}  // namespace traceflow
