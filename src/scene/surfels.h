@@ -4,6 +4,9 @@
 
 namespace traceflow {
 
+// Of a surfel that no body carries: the field may move it, or it stands still.
+inline constexpr int32_t moved_by_field = -1, stands_still = -2;
+
 // A set of N surfels as they are stored and trained, before activation (method §1.1). Also the shape of their
 // gradients and of Adam's moments. T is float in the program, double in references.
 template <class T>
@@ -14,8 +17,8 @@ struct BasicSurfels {
   Tensor<T> opacity_logit;  // N
   Tensor<T> sh;             // N×K×3, spherical harmonics, K = (degree + 1)²
   Tensor<T> tint_logit;     // N, specular tint; empty for the environment
-  // N, the body that carries it (scene/motion.h), -1 for none; empty where there are no bodies. Not trained:
-  // gradients and moments have none.
+  // N, the body that carries it (scene/motion.h), or one of the two below; empty where there are no bodies.
+  // Not trained: gradients and moments have none.
   Tensor<int32_t> body{};
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }

@@ -24,6 +24,8 @@ constexpr double label_margin = 1.0 / 120;
 // the image's width, in as many of the views that see it.
 constexpr double mask_margin = 1.0 / 80;
 constexpr double share_in_masks = 0.9;
+// Pictures are compared by means over squares of so many image widths to each side.
+constexpr double unrest_reach = 1.0 / 80;
 
 // Connected parts (8 neighbours) of a mask.
 struct Parts {
@@ -217,6 +219,60 @@ int64_t release_strays(const Capture& capture, const Motion& motion, float lates
     ++released;
   }
   return released;
+}
+
+void Unrest::look(const Surfels& main, const View& view, const ViewImages& images,
+                  const Tensor<float>& colour, const Tensor<float>& alpha, const Tensor<float>& depth) {
+  constexpr float behind = 1.04F;
+  const auto n = static_cast<size_t>(main.count());
+  sum.resize(n);
+  count.resize(n);
+  const int64_t height = view.camera.height, width = view.camera.width;
+  const int64_t reach = std::max<int64_t>(1, std::llround(unrest_reach * static_cast<double>(width)));
+  parallel_for("bodies: look for unrest", main.count(), [&](int64_t i) {
+    const Vec3<float> point = load3<float>(main.position.row(i));
+    if (main.body[i] >= 0 || !view.camera.sees(point)) return;
+    const Vec3<float> in_camera = view.camera.point_in_camera(point);
+    const Vec2<float> at = view.camera.project(in_camera);
+    const auto row = static_cast<int64_t>(at.y), column = static_cast<int64_t>(at.x);
+    if (in_camera.z * alpha(row, column) > behind * depth(row, column)) return;
+    Vec3<double> off(0);
+    double pixels = 0;
+    for (int64_t y = std::max<int64_t>(0, row - reach); y <= std::min(height - 1, row + reach); ++y) {
+      for (int64_t x = std::max<int64_t>(0, column - reach); x <= std::min(width - 1, column + reach); ++x) {
+        if (!images.mask.empty() && images.mask(y, x) != 0) return;
+        if (!images.known.empty() && images.known(y, x) == 0) return;
+        off += load3<double>(&colour(y, x, 0)) - load3<double>(&images.colour(y, x, 0));
+        ++pixels;
+      }
+    }
+    const Vec3<double> size = abs(off) / pixels;
+    const double most = std::max({size.x, size.y, size.z});
+    sum[static_cast<size_t>(i)] += most * most;
+    ++count[static_cast<size_t>(i)];
+  });
+}
+
+int64_t mark_still(const Unrest& unrest, Surfels& surfels) {
+  constexpr double medians = 3, least = 0.1;
+  std::vector<double> off(unrest.sum.size()), seen;
+  for (size_t i = 0; i < off.size(); ++i) {
+    if (unrest.count[i] == 0) continue;
+    off[i] = std::sqrt(unrest.sum[i] / unrest.count[i]);
+    seen.push_back(off[i]);
+  }
+  if (seen.empty()) return 0;
+  const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
+  std::nth_element(seen.begin(), middle, seen.end());
+  const double most = std::max(least, medians * *middle);
+  int64_t still = 0;
+  for (size_t i = 0; i < off.size(); ++i) {
+    int32_t& body = surfels.body[static_cast<int64_t>(i)];
+    if (body >= 0 || off[i] > most) continue;
+    body = stands_still;
+    ++still;
+  }
+  return still;
 }
 
 }  // namespace traceflow

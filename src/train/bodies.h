@@ -18,4 +18,18 @@ std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);
 // `latest`: they lay behind it, or beside it. surfels and motion on the CPU. Returns how many.
 int64_t release_strays(const Capture& capture, const Motion& motion, float latest, Surfels& surfels);
 
+// How far pictures are from the photographs where surfels show that no body carries.
+struct Unrest {
+  std::vector<double> sum;  // of squares, of each surfel
+  std::vector<int> count;   // of pictures
+
+  // Adds one picture (H×W×3, with alpha and Σ w z of H×W) on the CPU. main: as it stands at the view's time.
+  // What lies behind something, and what is beside a mask, is left out.
+  void look(const Surfels& main, const View& view, const ViewImages& images, const Tensor<float>& colour,
+            const Tensor<float>& alpha, const Tensor<float>& depth);
+};
+// Marks those that stand still: whose pictures are no farther off than three times the median, or 0.1.
+// Returns how many there are.
+int64_t mark_still(const Unrest& unrest, Surfels& surfels);
+
 }  // namespace traceflow

@@ -265,7 +265,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
     if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
   }
   if (finds_bodies) scene.main_motion = find_bodies(capture, scene.main);
-  if (options.deform.main && !scene.main_motion)
+  if (options.deform.main)
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
 
   if (options.specular == Specular::environment_gaussians) {

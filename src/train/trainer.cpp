@@ -52,12 +52,12 @@ int64_t count_in(const Safetensors& file, const std::string& key) {
   return static_cast<int64_t>(value);
 }
 
-// What a body carries stays as it is of itself, and away from what does not move with it.
-void leave_bodies(const Tensor<int32_t>& body, Tensor<int32_t>& bonds) {
+// Bonds are among what the field moves.
+void leave_others(const Tensor<int32_t>& body, Tensor<int32_t>& bonds) {
   for (int64_t i = 0; i < bonds.dim(0); ++i) {
     for (int64_t k = 0; k < bonds.dim(1); ++k) {
       int32_t& other = bonds(i, k);
-      if (other >= 0 && (body[i] >= 0 || body[other] >= 0)) other = -1;
+      if (other >= 0 && (body[i] != moved_by_field || body[other] != moved_by_field)) other = -1;
     }
   }
 }
@@ -204,7 +204,10 @@ LossTerms Trainer::step() {
   const Tracking now = tracking(iteration_);
   if (now.enters && now.goes_on) follow(now.key);
   constexpr int64_t strays_every = 5;  // times
-  if (now.enters && !now.goes_on) follow_again();
+  if (now.enters && !now.goes_on) {
+    follow_again();
+    let_stand();
+  }
   if (now.enters && (now.key % strays_every == 0 || !now.goes_on)) let_strays_go(now.key);
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
@@ -262,7 +265,7 @@ void Trainer::add_rigidity(const Frame& frame) {
   if (frame.main.count() == 0) return;
   if (bonds_.index.empty()) {
     Neighbours bonds = spread_neighbours(scene_.main.position.on(Device::cpu), bonds_each, bond_stride);
-    if (scene_.main_motion) leave_bodies(scene_.main.body.on(Device::cpu), bonds.index);
+    if (scene_.main_motion) leave_others(scene_.main.body.on(Device::cpu), bonds.index);
     bonds_ = bonds.on(device_);
   }
   grad_frame_.main_position.reset(frame.main.position.shape());
@@ -273,14 +276,15 @@ void Trainer::add_rigidity(const Frame& frame) {
 }
 
 void Trainer::control_density(int done) {
+  // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
+  if (tracking(done - 1).goes_on) return;
   // Where memory runs out in an update, that set is as it was; what follows an update asks for none.
   const auto tell = [&](events::DensityChanged change, bool reset) {
     change.iteration = done;
     change.opacity_reset = reset;
     density_changes_.push_back(std::move(change));
   };
-  // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
-  if (schedule_.densifies_main(done) && !tracking(done - 1).goes_on) {
+  if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
     const DensityLimits limits{{scene_.extent, cloud_radius_},
                                memory_.caps.main,

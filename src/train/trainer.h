@@ -90,6 +90,8 @@ class Trainer {
   void follow_again();
   // What lies behind a body may have been taken for a part of it: the times up to this one tell.
   void let_strays_go(int64_t key);
+  // What no body carries stands still, unless the pictures are far from the photographs there.
+  void let_stand();
   const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();

@@ -70,6 +70,26 @@ void Trainer::let_strays_go(int64_t key) {
   scene_.main.body = main.body.on(device_);
 }
 
+void Trainer::let_stand() {
+  constexpr size_t most_views = 40;
+  Surfels main = scene_.main.on(Device::cpu);
+  Unrest unrest;
+  const size_t step = std::max<size_t>(1, capture_.train.size() / most_views);
+  for (size_t k = 0; k < capture_.train.size(); k += step) {
+    const View& view = capture_.train[k];
+    FrameRequest request;
+    request.camera = view.camera;
+    request.time = view.time;
+    request.sh_degree_main = schedule_.sh_degree_main(iteration_);
+    request.deform_main = request.specular = false;
+    const Frame& frame = renderer_.forward(scene_, request, false);
+    unrest.look(main, view, *load_images(capture_, view), frame.colour.on(Device::cpu),
+                frame.raster.alpha.on(Device::cpu), frame.raster.depth.on(Device::cpu));
+  }
+  mark_still(unrest, main);
+  scene_.main.body = main.body.on(device_);
+}
+
 const View& Trainer::draw_tracked_view(const Tracking& now) {
   // Many views are of the first time, at which the points say how large a body is, and of the newest ones,
   // whose surface is the least known.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
 #include "base/parallel.h"
@@ -114,7 +115,7 @@ TEST(Bodies, AreTheThingsOfTheMask) {
 }
 
 TEST(Bodies, ThereAreNoneWithoutMasksOrWhereTheNetworkMovesSurfels) {
-  EXPECT_FALSE(Tumbling().scene.main_field);
+  EXPECT_TRUE(Tumbling().scene.main_motion);
   Tumbling at("network");
   EXPECT_FALSE(at.scene.main_motion);
   EXPECT_TRUE(at.scene.main_field);
@@ -166,6 +167,34 @@ TEST(Tracker, FollowsBodiesFromTimeToTime) {
   }
 }
 
+// While bodies are followed nothing is mirrored and nothing multiplies; behind that everything trains.
+TEST(Tracker, LeavesReflectionsAndTheNumberOfSurfelsAloneWhileBodiesAreFollowed) {
+  const Tumbling at;
+  TrainOptions options = preset("cpu");
+  options.iterations = 120;
+  options.initial.max_points = options.density.max_surfels = 1500;
+  options.environment_density.max_surfels = 400;
+  options.deform.track.map_each = 1;
+  options.deform.track.steps = options.deform.track.again = 1;
+  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "left_alone");
+  const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
+  const Scene first = trainer.scene();
+  const auto same = [](const Tensor<float>& a, const Tensor<float>& b) {
+    return std::ranges::equal(a.values(), b.values());
+  };
+  const auto rests = [&] {
+    const Surfels& now = trainer.scene().environment;
+    return now.count() == first.environment.count() && same(now.position, first.environment.position) &&
+           same(now.sh, first.environment.sh) && same(trainer.scene().main.tint_logit, first.main.tint_logit);
+  };
+  while (trainer.iteration() < options.iterations / 8 + keys - 1) trainer.step();
+  EXPECT_TRUE(rests());
+  EXPECT_EQ(trainer.scene().main.count(), first.main.count());
+  EXPECT_FALSE(same(trainer.scene().main.position, first.main.position));
+  while (trainer.iteration() < options.iterations) trainer.step();
+  EXPECT_FALSE(rests());
+}
+
 TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
   Tumbling at;
   const TrackOptions options;
@@ -208,6 +237,58 @@ TEST(Tracker, PredictsWhatGoesOnAsBefore) {
   EXPECT_NEAR(quaternion_log(load4<double>(&motion.rotation(0, 4, 0))).y, 0.4, 1e-6);
   EXPECT_NEAR(motion.shift(0, 4, 1), 2, 1e-6);
   EXPECT_EQ(motion.shift(0, 5, 1), motion.shift(0, 4, 1));
+}
+
+// A wall whose picture is right but for a square: what shows in the square moves. What is hidden, in a mask
+// or of a body does not vote.
+TEST(Bodies, WhatThePicturesMissIsLeftToTheField) {
+  constexpr int size = 80;
+  View view;
+  view.camera.width = view.camera.height = size;
+  view.camera.focal_x = view.camera.focal_y = size;
+  view.camera.centre_x = view.camera.centre_y = size / 2.0F;
+  ViewImages images;
+  images.colour.reset({size, size, 3});
+  images.mask.reset({size, size});
+  Tensor<float> colour({size, size, 3}), alpha({size, size}), depth({size, size});
+  alpha.fill(1);
+  depth.fill(2);
+  for (int64_t y = 20; y < 40; ++y) {
+    for (int64_t x = 20; x < 40; ++x) colour(y, x, 1) = 0.3F;
+  }
+  images.mask(30, 30) = 1;
+  // Two pixels between neighbours, a second wall behind the first.
+  constexpr int side = size / 2 - 1;
+  Surfels wall;
+  wall.position.reset({2 * side * side, 3});
+  wall.body.reset({2 * side * side});
+  wall.body.fill(moved_by_field);
+  const auto pixel_of = [](int64_t i) { return 2 + 2 * (i % (side * side) % side); };
+  const auto row_of = [](int64_t i) { return 2 + 2 * (i % (side * side) / side); };
+  for (int64_t i = 0; i < wall.position.dim(0); ++i) {
+    const float z = i < side * side ? 2.0F : 3.0F;
+    store3(wall.position.row(i), z / size *
+                                     Vec3<float>(static_cast<float>(pixel_of(i)) + 0.5F - size / 2.0F,
+                                                 static_cast<float>(row_of(i)) + 0.5F - size / 2.0F, size));
+  }
+  wall.body[side * side - 1] = 0;
+  Unrest unrest;
+  unrest.look(wall, view, images, colour, alpha, depth);
+  const int64_t still = mark_still(unrest, wall);
+  EXPECT_EQ(wall.body[side * side - 1], 0);
+  int64_t counted = 0;
+  for (int64_t i = 0; i < wall.position.dim(0); ++i) {
+    if (wall.body[i] == stands_still) ++counted;
+    const int64_t x = pixel_of(i), y = row_of(i);
+    const bool inside = x > 21 && x < 38 && y > 21 && y < 38, outside = x < 18 || x > 41 || y < 18 || y > 41;
+    const bool by_the_mask = std::abs(x - 30) < 2 && std::abs(y - 30) < 2;
+    if (i >= side * side || outside || by_the_mask) {
+      EXPECT_NE(wall.body[i], moved_by_field) << x << ' ' << y;
+    } else if (inside) {
+      EXPECT_EQ(wall.body[i], moved_by_field) << x << ' ' << y;
+    }
+  }
+  EXPECT_EQ(still, counted);
 }
 
 // A body that is moved off the masks loses its surfels; one that stays in them keeps them.

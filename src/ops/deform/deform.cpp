@@ -78,18 +78,18 @@ void pose_backward(const Tensor<int32_t>& subset, const PosedSurfels& posed, con
   }
 }
 
-// Leaves the residuals of all posed surfels, of which bodies carry some: theirs are zero. None where there
-// are none.
+// Leaves the residuals of all posed surfels, zeros where the field does not move them; none where it moves
+// none.
 void evaluate(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               int64_t count, field::Precision precision, Saved& kept, bool keep_for_backward) {
   const Device device = stored.device();
-  const bool some_are_carried = !stored.body.empty();
+  const bool chosen = !stored.body.empty();
   kept.moved.place(device).resize({0});
-  if (field != nullptr && some_are_carried)
-    list_where(device, "deform: free surfels", count, IsFree{rows_of(subset), stored.body.data()},
-               kept.moved);
-  const int64_t moved = some_are_carried ? kept.moved.size() : count;
-  if (field == nullptr || (some_are_carried && moved == 0)) {
+  if (field != nullptr && chosen)
+    list_where(device, "deform: surfels that the field moves", count,
+               IsMovedByField{rows_of(subset), stored.body.data()}, kept.moved);
+  const int64_t moved = chosen ? kept.moved.size() : count;
+  if (field == nullptr || (chosen && moved == 0)) {
     kept.points.resize({0, 3});
     kept.residuals.resize({});
     return;
@@ -97,9 +97,9 @@ void evaluate(const Surfels& stored, const Field* field, float time, const Tenso
   kept.points.place(device).resize({moved, 3});
   parallel_for(device, "deform gather", moved,
                Gather{rows_of(subset), rows_of(kept.moved), stored.position.data(), kept.points.data()});
-  Tensor<float>& outputs = some_are_carried ? kept.of_moved : kept.residuals;
+  Tensor<float>& outputs = chosen ? kept.of_moved : kept.residuals;
   field::forward(*field, kept.points, time, precision, outputs, keep_for_backward ? &kept.field : nullptr);
-  if (!some_are_carried) return;
+  if (!chosen) return;
   const int64_t columns = outputs.row_size();
   kept.residuals.place(device).reset({count, columns});
   parallel_for(

@@ -7,7 +7,7 @@
 // activations.
 //   position p + Δp · rotation q + Δr (not normalised here) · scale exp(log s + Δs) · opacity σ(o + Δo) ·
 //   tint σ(τ + Δτ)
-// The field does not move what a body carries (scene/motion.h): those residuals are zero.
+// Where there are bodies (scene/motion.h) the field moves what Surfels::body says; other residuals are zero.
 // Differentiable: every stored value and the field's parameters. The position enters the field detached. Runs
 // where the stored surfels are; the field is there too.
 namespace traceflow::deform {

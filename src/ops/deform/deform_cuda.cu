@@ -4,7 +4,7 @@
 
 namespace traceflow {
 
-template void cuda::for_each_index(const char*, int64_t, const FlagWhere<deform::IsFree>&);
+template void cuda::for_each_index(const char*, int64_t, const FlagWhere<deform::IsMovedByField>&);
 template void cuda::for_each_index(const char*, int64_t, const deform::Gather&);
 template void cuda::for_each_index(const char*, int64_t, const deform::SpreadResiduals&);
 template void cuda::for_each_index(const char*, int64_t, const deform::CollectResiduals&);

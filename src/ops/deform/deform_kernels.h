@@ -93,12 +93,12 @@ class AllFinite {
   float sum_ = 0;
 };
 
-// Whether no body carries posed surfel i.
-struct IsFree {
+// Whether the field moves posed surfel i.
+struct IsMovedByField {
   Rows rows;
   const int32_t* body;
 
-  TRACEFLOW_HD bool operator()(int64_t i) const { return body[rows.at(i)] < 0; }
+  TRACEFLOW_HD bool operator()(int64_t i) const { return body[rows.at(i)] == moved_by_field; }
 };
 
 // Where the field is evaluated. i: a posed surfel that it moves.
@@ -218,14 +218,14 @@ struct AddToStored {
   }
 };
 
-// Adds the residuals of one surfel that no body carries.
+// Adds the residuals of one surfel that the field moves.
 struct Displace {
   Residuals<const float> residuals;
-  const int32_t* body;  // null: there are none
+  const int32_t* body;  // null: it moves all
   AddToStored add;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    if (body == nullptr || body[i] < 0) add(residuals.load(i), i);
+    if (body == nullptr || body[i] == moved_by_field) add(residuals.load(i), i);
   }
 };
 

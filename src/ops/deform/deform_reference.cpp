@@ -52,12 +52,12 @@ Tensor<double> evaluate(const BasicField<double>* field, const Tensor<double>& p
   return residuals;
 }
 
-bool is_carried(const BasicSurfels<double>& stored, int64_t i) {
-  return !stored.body.empty() && stored.body[i] >= 0;
+bool field_moves(const BasicSurfels<double>& stored, int64_t i) {
+  return stored.body.empty() || stored.body[i] == moved_by_field;
 }
 
 Residuals residuals_of(const BasicSurfels<double>& stored, const Tensor<double>& residuals, int64_t i) {
-  return residuals.empty() || is_carried(stored, i)
+  return residuals.empty() || !field_moves(stored, i)
              ? Residuals(nullptr, 0)
              : Residuals(residuals.row(i), static_cast<int>(residuals.row_size()));
 }
@@ -116,7 +116,7 @@ void backward_reference(const BasicSurfels<double>& stored, const BasicField<dou
     grad_stored.opacity_logit[i] += grad[residual::opacity];
     if (stored.has_tint()) grad_stored.tint_logit[i] += grad[residual::tint];
     for (int64_t k = 0; k < sh_values; ++k) grad_stored.sh.row(i)[k] += grad_posed.sh.row(i)[k];
-    for (int64_t k = 0; !is_carried(stored, i) && k < grad_residuals.row_size() && k < residual::main_outputs;
+    for (int64_t k = 0; field_moves(stored, i) && k < grad_residuals.row_size() && k < residual::main_outputs;
          ++k) {
       grad_residuals(i, k) = grad[k];
     }

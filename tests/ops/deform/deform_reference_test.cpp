@@ -36,7 +36,7 @@ TEST(DeformReference, AddsResidualsAndActivates) {
 TEST(DeformReference, BackwardMatchesCentralDifferencesInEveryParameter) {
   for (const bool tint : {true, false}) {
     BasicSurfels<double> stored = convert<double>(testing::random_surfels(4, tint));
-    if (tint) stored.body = tensor_of(std::vector<int32_t>{-1, 0, -1, 1});
+    if (tint) stored.body = tensor_of(std::vector<int32_t>{-1, 0, -2, -1});
     const Tensor<double> points = stored.position;
     const int outputs = tint ? residual::main_outputs : residual::environment_outputs;
     BasicField<double> field = convert<double>(testing::random_field(smallest, outputs));
