@@ -14,7 +14,7 @@ namespace traceflow {
 // still at the times of the training views; nothing where no part has enough surfels.
 std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);
 
-// Lets carried surfels stand still that their body takes out of the masks of the views up to the time
+// Lets carried surfels go that their body takes out of the masks of the views up to the time
 // `latest`: they lay behind it, or beside it. surfels and motion on the CPU. Returns how many.
 int64_t release_strays(const Capture& capture, const Motion& motion, float latest, Surfels& surfels);
 

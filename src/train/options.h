@@ -211,7 +211,7 @@ struct DeformOptions {
   void visit(Visitor& v) {
     v.field("kind", kind, "",
             "How main surfels move: network (a residual field), or nodes (rigid bodies found in masks and "
-            "tracked, all else static; network where there are none).");
+            "tracked; of all else the field moves what is seen to move; network where there are none).");
     v.field("main", main, "", "The main surfels move.");
     v.field("environment", environment, "", "The environment moves.");
     v.group("track", track);

@@ -204,11 +204,9 @@ LossTerms Trainer::step() {
   const Tracking now = tracking(iteration_);
   if (now.enters && now.goes_on) follow(now.key);
   constexpr int64_t strays_every = 5;  // times
-  if (now.enters && !now.goes_on) {
-    follow_again();
-    let_stand();
-  }
+  if (now.enters && !now.goes_on) follow_again();
   if (now.enters && (now.key % strays_every == 0 || !now.goes_on)) let_strays_go(now.key);
+  if (now.enters && !now.goes_on) let_stand();
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
