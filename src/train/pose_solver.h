@@ -51,9 +51,10 @@ class PoseSolver {
   };
   void pose();
   void weigh_colour(const TrackWeights& weights);
-  Residuals look(size_t target, const TrackWeights& weights, double blur, bool with_jacobian);
+  // at: of a target. sigma: of the blur, pixels.
+  Residuals look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
   // The step that a view of all targets asks for, limited; the cost where they stand.
-  std::vector<double> step(const TrackWeights& weights, double blur, double damping, double& cost);
+  std::vector<double> step(const TrackWeights& weights, double sigma, double damping, double& cost);
   void take(const std::vector<double>& step);
 
   const Surfels& main_;
