@@ -17,7 +17,7 @@ struct BasicSurfels {
   Tensor<T> opacity_logit;  // N
   Tensor<T> sh;             // N×K×3, spherical harmonics, K = (degree + 1)²
   Tensor<T> tint_logit;     // N, specular tint; empty for the environment
-  // N, the body that carries it (scene/motion.h), or one of the two below; empty where there are no bodies.
+  // N, the body that carries it (scene/motion.h), or one of the two above; empty where there are no bodies.
   // Not trained: gradients and moments have none.
   Tensor<int32_t> body{};
 
