@@ -9,6 +9,7 @@
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "ops/deform/deform.h"
+#include "ops/raster/body_jacobian.h"
 
 namespace traceflow {
 
@@ -24,8 +25,28 @@ constexpr double relative_damping = 1e-3, least_damping = 1e-3;
 constexpr int tries = 3;
 constexpr double shorter = 0.4;
 
-// Gaussian, along both sides, the border repeated; pixels of `width` numbers. In place.
-void blur(Tensor<float>& image, int64_t height, int64_t width, int64_t numbers, double sigma) {
+// Pixels, half open.
+struct Box {
+  int64_t x0, y0, x1, y1;
+};
+
+// The smallest that holds every pixel with a number that is not 0.
+Box box_of(const Tensor<float>& image, int64_t height, int64_t width, int64_t numbers) {
+  Box box{width, height, 0, 0};
+  for (int64_t y = 0; y < height; ++y) {
+    for (int64_t x = 0; x < width; ++x) {
+      const float* const values = image.data() + (y * width + x) * numbers;
+      if (std::all_of(values, values + numbers, [](float v) { return v == 0; })) continue;
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), y + 1};
+    }
+  }
+  return box;
+}
+
+// Gaussian, along both sides, the border repeated; pixels of `numbers` numbers. In place. Derivatives are 0
+// in most of a picture: only what is near others is computed.
+void blur(Tensor<float>& image, Tensor<float>& along, int64_t height, int64_t width, int64_t numbers,
+          double sigma) {
   if (sigma < 0.3) return;
   const auto reach = static_cast<int64_t>(std::ceil(2.5 * sigma));
   std::vector<float> taps;
@@ -35,16 +56,21 @@ void blur(Tensor<float>& image, int64_t height, int64_t width, int64_t numbers, 
     sum += taps.back();
   }
   for (float& tap : taps) tap /= sum;
-  Tensor<float> along(image.shape());
-  const auto pass = [&](const Tensor<float>& from, Tensor<float>& to, bool down) {
-    parallel_blocks("track: blur", height, 4, [&](int64_t begin, int64_t end) {
-      for (int64_t y = begin; y < end; ++y) {
-        for (int64_t x = 0; x < width; ++x) {
+  along.resize(image.shape());
+  const Box box = box_of(image, height, width, numbers);
+  const int64_t left = std::max<int64_t>(0, box.x0 - reach), right = std::min(width, box.x1 + reach);
+  const int64_t top = std::max<int64_t>(0, box.y0 - reach), bottom = std::min(height, box.y1 + reach);
+  const auto pass = [&](const Tensor<float>& from, Tensor<float>& to, int64_t first, int64_t last,
+                        bool down) {
+    parallel_blocks("track: blur", last - first, 4, [&](int64_t begin, int64_t end) {
+      for (int64_t y = first + begin; y < first + end; ++y) {
+        for (int64_t x = left; x < right; ++x) {
           float* const sums = to.data() + (y * width + x) * numbers;
           std::fill_n(sums, numbers, 0.0F);
           for (int64_t k = -reach; k <= reach; ++k) {
             const int64_t row = down ? std::clamp<int64_t>(y + k, 0, height - 1) : y;
             const int64_t column = down ? x : std::clamp<int64_t>(x + k, 0, width - 1);
+            if (row < box.y0 || row >= box.y1) continue;
             const float* const values = from.data() + (row * width + column) * numbers;
             const float tap = taps[static_cast<size_t>(k + reach)];
             for (int64_t n = 0; n < numbers; ++n) sums[n] += tap * values[n];
@@ -53,8 +79,9 @@ void blur(Tensor<float>& image, int64_t height, int64_t width, int64_t numbers, 
       }
     });
   };
-  pass(image, along, false);
-  pass(along, image, true);
+  if (box.y0 >= box.y1) return;
+  pass(image, along, box.y0, box.y1, false);
+  pass(along, image, top, bottom, true);
 }
 
 // Solves a x = b for a symmetric positive definite a (n×n), by elimination.
@@ -191,8 +218,9 @@ PoseSolver::PoseSolver(const Surfels& main, Motion& motion, int64_t key, const r
       radius_(radii_of(main, motion)),
       saved_(motion::make_saved()),
       pivot_({motion.bodies(), 3}),
-      colour_weight_(targets_.size()) {
-  options_.sort = raster::SortOrder::centre;  // as draw_bodies
+      colour_weight_(targets_.size()),
+      blended_(raster::make_saved()) {
+  options_.sort = raster::SortOrder::centre;  // as body_jacobian asks
   // The low-pass widens surfels by a share of a pixel: by more than in training where pixels are larger.
   options_.low_pass = options_.low_pass && std::none_of(targets_.begin(), targets_.end(),
                                                         [](const TrackTarget& t) { return t.is_shrunk; });
@@ -237,12 +265,13 @@ void PoseSolver::weigh_colour(const TrackWeights& weights) {
   }
 }
 
-PoseSolver::Residuals PoseSolver::look(size_t at, const TrackWeights& weights, double sigma,
-                                       bool with_jacobian) {
+const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& weights, double sigma,
+                                              bool with_jacobian) {
   const TrackTarget& target = targets_[at];
-  raster::forward(posed_, target.camera, options_, whole_, nullptr);
+  raster::forward(posed_, target.camera, options_, whole_, blended_.get());
   const int64_t pixels = whole_.tint.size();
-  Residuals r{Tensor<float>({pixels, channels}), {}};
+  Residuals& r = residuals_;
+  r.value.reset({pixels, channels});
   const bool has_prior = !target.normal_prior.empty(), has_colour = !target.colour.empty();
   const auto weight_of_normal = [&](int64_t i) {
     if (!has_prior || target.mask[i] == 0) return 0.0F;
@@ -259,8 +288,7 @@ PoseSolver::Residuals PoseSolver::look(size_t at, const TrackWeights& weights, d
     }
   }
   if (with_jacobian) {
-    raster::draw_bodies(posed_, main_.body, pivot_, target.camera, options_, picture_);
-    r.jacobian.swap(picture_.jacobian);
+    raster::body_jacobian(posed_, main_.body, pivot_, target.camera, options_, *blended_, r.jacobian);
     for (int64_t i = 0; i < pixels; ++i) {
       const float by_normal = weight_of_normal(i), by_colour = colour_weight_[at][i];
       float* row = r.jacobian.data() + i * static_cast<int64_t>(params_) * channels;
@@ -272,10 +300,10 @@ PoseSolver::Residuals PoseSolver::look(size_t at, const TrackWeights& weights, d
         }
       }
     }
-    blur(r.jacobian, target.camera.height, target.camera.width, static_cast<int64_t>(params_) * channels,
-         sigma);
+    blur(r.jacobian, scratch_, target.camera.height, target.camera.width,
+         static_cast<int64_t>(params_) * channels, sigma);
   }
-  blur(r.value, target.camera.height, target.camera.width, channels, sigma);
+  blur(r.value, scratch_, target.camera.height, target.camera.width, channels, sigma);
   return r;
 }
 
@@ -284,7 +312,7 @@ std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, 
   std::vector<double> a(params_ * params_), b(params_);
   cost = 0;
   for (size_t k = 0; k < targets_.size(); ++k) {
-    const Residuals r = look(k, weights, sigma, true);
+    const Residuals& r = look(k, weights, sigma, true);
     cost += robust_cost(r.value);
     add_normal_equations(r.value, r.jacobian, params_, a, b);
   }

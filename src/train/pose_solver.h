@@ -5,7 +5,7 @@
 
 #include "math/camera.h"
 #include "ops/motion/motion.h"
-#include "ops/raster/body_picture.h"
+#include "ops/raster/raster.h"
 #include "scene/surfels.h"
 
 namespace traceflow {
@@ -47,12 +47,12 @@ class PoseSolver {
   // One view's residuals and how they change.
   struct Residuals {
     Tensor<float> value;     // n×7: silhouette, normal, colour
-    Tensor<float> jacobian;  // n×P×7; empty where not asked for
+    Tensor<float> jacobian;  // n×P×7; as it was where not asked for
   };
   void pose();
   void weigh_colour(const TrackWeights& weights);
-  // at: of a target. sigma: of the blur, pixels.
-  Residuals look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
+  // at: of a target. sigma: of the blur, pixels. Until the next call.
+  const Residuals& look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
   // The step that a view of all targets asks for, limited; the cost where they stand.
   std::vector<double> step(const TrackWeights& weights, double sigma, double damping, double& cost);
   void take(const std::vector<double>& step);
@@ -68,8 +68,10 @@ class PoseSolver {
   motion::SavedPtr saved_;
   Tensor<float> pivot_;
   std::vector<Tensor<float>> colour_weight_;  // of each target, H×W
-  raster::BodyPicture picture_;
   raster::Output whole_;
+  raster::SavedPtr blended_;
+  Residuals residuals_;
+  Tensor<float> scratch_;  // of the blur
 };
 
 }  // namespace traceflow
