@@ -4,8 +4,12 @@
 
 #include "../deform/deform_scene.h"
 #include "ops/motion/motion.h"
+#include "ops/motion/nodes.h"
 
 namespace traceflow::testing {
+
+// Before the first key of random_motion and random_nodes, on a key, between keys, behind the last one.
+inline constexpr float times[] = {0.05F, 0.3F, 0.42F, 0.97F};
 
 inline bool same_bytes(const Tensor<float>& a, const Tensor<float>& b) {
   return a.shape() == b.shape() &&
@@ -63,6 +67,41 @@ inline MotionPass run_motion(Device device, const Motion& motion, const Tensor<i
   motion::backward(there, body_there, time, subset_there, moved, *saved, grad_posed,
                    frozen ? nullptr : &grad_motion);
   return {moved.on(Device::cpu), grad_moved, grad_posed.on(Device::cpu), grad_motion.on(Device::cpu)};
+}
+
+// Nodes of bodies in turn, that turn and shift by much.
+inline Nodes random_nodes(int64_t count, int64_t bodies, int64_t keys, uint64_t seed = 6) {
+  Random random(seed);
+  Nodes nodes;
+  nodes.body.resize({count});
+  for (int64_t n = 0; n < count; ++n) nodes.body[n] = static_cast<int32_t>(n % bodies);
+  nodes.time.resize({keys});
+  for (int64_t k = 0; k < keys; ++k)
+    nodes.time[k] = 0.1F + 0.8F * static_cast<float>(k) / static_cast<float>(keys);
+  nodes.centre = random_tensor<float>({count, 3}, random, -1, 1);
+  nodes.radius = random_tensor<float>({count}, random, 0.4, 0.9);
+  nodes.turn = random_tensor<float>({count, keys, 3}, random, -1, 1);
+  nodes.shift = random_tensor<float>({count, keys, 3}, random, -1, 1);
+  return nodes;
+}
+
+// One forward and backward pass with a random gradient, on the host.
+struct NodesPass {
+  PosedSurfels bent, grad_bent, grad_posed;
+  Nodes grad_nodes;
+};
+inline NodesPass run_nodes(Device device, const Nodes& nodes, const Tensor<int32_t>& body, float time,
+                           const PosedSurfels& posed) {
+  const Nodes there = nodes.on(device);
+  const Tensor<int32_t> body_there = body.on(device);
+  PosedSurfels bent = posed.on(device);
+  const nodes::SavedPtr saved = nodes::make_saved();
+  nodes::forward(there, body_there, time, {}, bent, *saved);
+  const PosedSurfels grad_bent = random_gradient_like(posed);
+  PosedSurfels grad_posed = grad_bent.on(device);
+  Nodes grad_nodes = zeros_like<float>(there);
+  nodes::backward(there, body_there, time, {}, *saved, grad_posed, &grad_nodes);
+  return {bent.on(Device::cpu), grad_bent, grad_posed.on(Device::cpu), grad_nodes.on(Device::cpu)};
 }
 
 }  // namespace traceflow::testing

@@ -14,8 +14,6 @@ namespace {
 using namespace traceflow::testing;
 
 constexpr int64_t bodies = 3;
-// Before the first key, on a key, between keys, behind the last one.
-constexpr float times[] = {0.05F, 0.3F, 0.42F, 0.97F};
 
 TEST(MotionReference, BackwardMatchesCentralDifferencesInEveryParameter) {
   for (const float time : times) {

@@ -6,10 +6,10 @@
 namespace traceflow::raster::cuda_stage {
 namespace {
 
-constexpr int batch_splats = 32;
+constexpr int backward_batch = 32;
 constexpr int sums_used = 21;
 constexpr int sums_stored = sizeof(SplatGradient) / sizeof(float);
-static_assert(sums_stored <= cuda::warp_lanes && batch_splats == cuda::warp_lanes);
+static_assert(sums_stored <= cuda::warp_lanes && backward_batch == cuda::warp_lanes);
 
 // Which outputs a gradient is asked by: what nobody asks is left out of the loops.
 enum class Asked {
@@ -22,7 +22,7 @@ enum class Asked {
 struct GradientView {
   const float *colour, *alpha, *tint, *normal, *depth, *median_depth, *distortion;
 };
-struct PixelsView {
+struct KeptPixels {
   const float *transmittance, *alpha, *depth, *m, *m2, *inverse_z;
   const int32_t *last, *median;
 };
@@ -38,7 +38,7 @@ struct PixelGradient {
   float alpha = 0, m = 0, m2 = 0, inverse_z = 0;
   int last = -1, median_place = -1;
 
-  __device__ PixelGradient(const GradientView& g, const PixelsView& left, const Vec3<float>& background,
+  __device__ PixelGradient(const GradientView& g, const KeptPixels& left, const Vec3<float>& background,
                            int64_t i) {
     const auto value = [i](const float* from) { return from != nullptr ? from[i] : 0.0F; };
     if (g.colour != nullptr) colour = load3<float>(g.colour + 3 * i);
@@ -142,10 +142,10 @@ __device__ float transposed_sum(float (&value)[cuda::warp_lanes], int lane) {
 
 template <Asked asked>
 __global__ void __launch_bounds__(pixels_per_tile)
-    unblend_by_centre(SavedView saved, KernelOptions o, GradientView grad, PixelsView left,
+    unblend_by_centre(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
                       SplatGradient* gradients) {
-  __shared__ BatchSplat batch[batch_splats];
-  __shared__ float partial[warps_per_tile][batch_splats][sums_stored];
+  __shared__ BatchSplat batch[backward_batch];
+  __shared__ float partial[warps_per_tile][backward_batch][sums_stored];
   __shared__ unsigned written[warps_per_tile];
   __shared__ int last_place;
   const int tile = static_cast<int>(blockIdx.x);
@@ -163,9 +163,9 @@ __global__ void __launch_bounds__(pixels_per_tile)
   if (g.last >= 0) atomicMax(&last_place, g.last);
   __syncthreads();
 
-  for (int base = last_place / batch_splats * batch_splats; base >= 0 && last_place >= 0;
-       base -= batch_splats) {
-    const int here = last_place + 1 - base < batch_splats ? last_place + 1 - base : batch_splats;
+  for (int base = last_place / backward_batch * backward_batch; base >= 0 && last_place >= 0;
+       base -= backward_batch) {
+    const int here = last_place + 1 - base < backward_batch ? last_place + 1 - base : backward_batch;
     load_batch(saved, begin + static_cast<uint32_t>(base), here, batch);
     __syncthreads();
     unsigned mine = 0;
@@ -211,7 +211,7 @@ __global__ void __launch_bounds__(pixels_per_tile)
 // all, and for what is behind each. in_turn: one thread of a tile after the other, so that sums have a fixed
 // order.
 template <Asked asked>
-__global__ void unblend_by_hit(SavedView saved, KernelOptions o, GradientView grad, PixelsView left,
+__global__ void unblend_by_hit(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
                                SplatGradient* gradients, bool in_turn) {
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
@@ -264,7 +264,7 @@ __global__ void unblend_by_hit(SavedView saved, KernelOptions o, GradientView gr
 template <Asked asked>
 void unblend(const Options& options, const Saved& saved, const GradientView& grad) {
   const Saved::Pixels& p = saved.pixels;
-  const PixelsView left{p.transmittance.data(), p.alpha.data(), p.depth.data(), p.m.data(), p.m2.data(),
+  const KeptPixels left{p.transmittance.data(), p.alpha.data(), p.depth.data(), p.m.data(), p.m2.data(),
                         p.inverse_z.data(),     p.last.data(),  p.median.data()};
   Tensor<SplatGradient>& gradients = saved.scratch.gradients;
   gradients.place(Device::cuda).resize({saved.entries.size()});

@@ -6,13 +6,13 @@
 namespace traceflow::raster::cuda_stage {
 namespace {
 
-constexpr int batch_splats = 128;
-static_assert(batch_splats <= pixels_per_tile);
+constexpr int forward_batch = 128;
+static_assert(forward_batch <= pixels_per_tile);
 
 struct OutputView {
   float *colour, *alpha, *tint, *normal, *depth, *median_depth, *distortion;
 };
-struct PixelsView {
+struct LeftPixels {
   float *transmittance, *alpha, *depth, *m, *m2, *inverse_z;
   int32_t *last, *median;
 };
@@ -52,7 +52,7 @@ class Blend {
   __device__ bool ended() const { return ended_; }
 
   __device__ void store(const KernelOptions& o, int64_t i, const OutputView& out,
-                        const PixelsView& left) const {
+                        const LeftPixels& left) const {
     store3(out.colour + 3 * i, colour_ + transmittance_ * o.background);
     store3(out.normal + 3 * i, normal_);
     const bool has_median = transmittance_ <= 0.5F;
@@ -83,9 +83,9 @@ class Blend {
   bool ended_ = false;
 };
 
-__global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out, PixelsView left) {
-  __shared__ BatchSplat batch[batch_splats];
-  __shared__ unsigned touched[batch_splats];
+__global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out, LeftPixels left) {
+  __shared__ BatchSplat batch[forward_batch];
+  __shared__ unsigned touched[forward_batch];
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
   const uint32_t begin = saved.tile_begin[tile];
@@ -93,8 +93,8 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
 
   Blend blend;
   bool live = pixel.in_image;
-  for (uint32_t base = 0; base < count; base += batch_splats) {
-    const int here = static_cast<int>(count - base < batch_splats ? count - base : batch_splats);
+  for (uint32_t base = 0; base < count; base += forward_batch) {
+    const int here = static_cast<int>(count - base < forward_batch ? count - base : forward_batch);
     if (__syncthreads_or(live) == 0) {
       // Nobody looks at what is left of the list.
       for (uint32_t k = base + threadIdx.x; k < count; k += blockDim.x) {
@@ -132,7 +132,7 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
 }
 
 // sort = hit: each pixel takes its hits by their own depth, some at a time.
-__global__ void blend_by_hit(SavedView saved, KernelOptions o, OutputView out, PixelsView left) {
+__global__ void blend_by_hit(SavedView saved, KernelOptions o, OutputView out, LeftPixels left) {
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
   const uint32_t begin = saved.tile_begin[tile];
@@ -164,7 +164,7 @@ void blend(const Options& options, Output& output, Saved& saved) {
                        resized(output.depth, plane),     resized(output.median_depth, plane),
                        resized(output.distortion, plane)};
   Saved::Pixels& p = saved.pixels;
-  const PixelsView left{resized(p.transmittance, plane),
+  const LeftPixels left{resized(p.transmittance, plane),
                         resized(p.alpha, plane),
                         resized(p.depth, plane),
                         resized(p.m, plane),

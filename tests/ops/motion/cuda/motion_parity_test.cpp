@@ -24,6 +24,25 @@ TEST_F(MotionOnDevice, AgreesWithTheCpu) {
   }
 }
 
+TEST_F(MotionOnDevice, BendsAsTheCpu) {
+  const Nodes nodes = random_nodes(7, 2, 4);
+  const PosedSurfels posed = random_posed(700, 1);
+  const Tensor<int32_t> body = bodies_in_turn(700, 3);
+  const NodesPass expected = run_nodes(Device::cpu, nodes, body, 0.42F, posed);
+  const NodesPass found = run_nodes(Device::cuda, nodes, body, 0.42F, posed);
+  expect_close(found.bent.position, expected.bent.position, 5e-6, "position");
+  expect_close(found.bent.rotation, expected.bent.rotation, 5e-6, "rotation");
+  expect_close(found.grad_posed.position, expected.grad_posed.position, 1e-5, "by position");
+  expect_close(found.grad_posed.rotation, expected.grad_posed.rotation, 1e-5, "by rotation");
+  expect_close(found.grad_nodes.turn, expected.grad_nodes.turn, 1e-5, "by turn");
+  expect_close(found.grad_nodes.shift, expected.grad_nodes.shift, 1e-5, "by shift");
+  Nodes grad_here = zeros_like<float>(nodes), grad_there = grad_here.on(Device::cuda);
+  nodes::resist(nodes, {0.3, 0.01}, grad_here);
+  nodes::resist(nodes.on(Device::cuda), {0.3, 0.01}, grad_there);
+  expect_close(grad_there.turn.on(Device::cpu), grad_here.turn, 1e-5, "resistance by turn");
+  expect_close(grad_there.shift.on(Device::cpu), grad_here.shift, 1e-5, "resistance by shift");
+}
+
 TEST_F(MotionOnDevice, IsTheSameBytesTwice) {
   const Motion motion = random_motion(2, 4);
   const PosedSurfels posed = random_posed(3000, 2);
