@@ -6,6 +6,7 @@
 
 #include "ops/deform/deform.h"
 #include "ops/motion/motion.h"
+#include "ops/motion/nodes.h"
 #include "scene/rows.h"
 
 namespace traceflow::eval {
@@ -19,6 +20,7 @@ Surfels posed_rows(const show::Subject& subject, const std::vector<int32_t>& row
   for (const int32_t row : rows) edit.keep(row);
   const Scene& scene = subject.scene;
   Surfels stored = edited_rows(scene.main, PlacedEdit(edit, scene.device()));
+  if (scene.main_nodes) nodes::bend(*scene.main_nodes, stored.body, time, stored);
   if (scene.main_motion) motion::move(*scene.main_motion, stored.body, time, stored);
   const bool moves = subject.request.deform_main && scene.main_field;
   return moves ? deform::displaced(stored, *scene.main_field, time, subject.render.precision).on(Device::cpu)

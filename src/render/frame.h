@@ -77,6 +77,7 @@ struct Trainable {
   bool tint = true;
   bool main_field = true;
   bool main_motion = true;
+  bool main_nodes = true;
   bool environment = true;  // environment surfels, or the map
   bool environment_field = true;
   bool camera = true;  // its pose
@@ -88,6 +89,7 @@ struct SceneGradient {
   Surfels environment;
   Field main_field;
   Motion main_motion;
+  Nodes main_nodes;
   Field environment_field;
   EnvironmentMap environment_map;
   CameraGradient<float> camera;

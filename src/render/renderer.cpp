@@ -21,6 +21,7 @@ int stored_degree(const Surfels& surfels) { return surfels.count() > 0 ? sh_degr
 StoredRow stored_row(const Frame& frame) { return {frame.subset.empty() ? nullptr : frame.subset.data()}; }
 
 const Motion* motion_if(const Scene& scene) { return scene.main_motion ? &*scene.main_motion : nullptr; }
+const Nodes* nodes_if(const Scene& scene) { return scene.main_nodes ? &*scene.main_nodes : nullptr; }
 
 // Leaves the largest distance between posed and stored positions in the frame.
 void find_reach(const Surfels& stored, Frame& frame) {
@@ -55,6 +56,7 @@ void SceneGradient::reset(const Scene& scene) {
   like(environment, scene.environment);
   if (scene.main_field) like(main_field, *scene.main_field);
   if (scene.main_motion) like(main_motion, *scene.main_motion);
+  if (scene.main_nodes) like(main_nodes, *scene.main_nodes);
   if (scene.environment_field) like(environment_field, *scene.environment_field);
   if (scene.environment_map) {
     sized(environment_map.logit, scene.environment_map->logit.shape());
@@ -109,6 +111,8 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
   }
   frame_.reach.place(device).reset({1});
   if (field) find_reach(scene.main, frame_);
+  if (const Nodes* nodes = nodes_if(scene))
+    nodes::forward(*nodes, scene.main.body, request.time, frame_.subset, frame_.main, *nodes_saved_);
   if (motion)
     motion::forward(*motion, scene.main.body, request.time, frame_.subset, frame_.main, *motion_saved_);
   if (!request.cull) main_pose_ = pose;
@@ -245,8 +249,8 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
                   grad_trace_.colour);
   // Trace and reflect.
   if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, gradient);
-  if (frame_.main.count() == 0 ||
-      !(trainable.main || trainable.tint || trainable.main_field || trainable.main_motion))
+  if (frame_.main.count() == 0 || !(trainable.main || trainable.tint || trainable.main_field ||
+                                    trainable.main_motion || trainable.main_nodes))
     return;
 
   // With the geometry frozen only the tint's gradient is wanted (method §7.2).
@@ -282,6 +286,10 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   if (const Motion* motion = motion_if(scene)) {
     motion::backward(*motion, scene.main.body, request.time, frame_.subset, frame_.main, *motion_saved_,
                      grad_raster_input_.surfels, trainable.main_motion ? &gradient.main_motion : nullptr);
+  }
+  if (const Nodes* nodes = nodes_if(scene)) {
+    nodes::backward(*nodes, scene.main.body, request.time, frame_.subset, *nodes_saved_,
+                    grad_raster_input_.surfels, trainable.main_nodes ? &gradient.main_nodes : nullptr);
   }
   deform::backward(scene.main, field, request.time, frame_.subset, frame_.main, main_saved_,
                    grad_raster_input_.surfels, gradient.main,

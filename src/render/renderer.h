@@ -2,6 +2,7 @@
 
 #include "ops/deform/deform.h"
 #include "ops/motion/motion.h"
+#include "ops/motion/nodes.h"
 #include "render/frame.h"
 #include "render/reflection_map.h"
 #include "render/render_options.h"
@@ -59,6 +60,7 @@ class Renderer {
   std::optional<Pose> main_pose_, environment_pose_;  // of all of the last scene's surfels, in frame_
   deform::Saved main_saved_, environment_saved_;
   motion::SavedPtr motion_saved_ = motion::make_saved();
+  nodes::SavedPtr nodes_saved_ = nodes::make_saved();
   raster::SavedPtr raster_saved_ = raster::make_saved();
   // The carried surfels white, the others black.
   PosedSurfels carried_;

@@ -7,6 +7,7 @@
 #include "scene/environment_map.h"
 #include "scene/field.h"
 #include "scene/motion.h"
+#include "scene/nodes.h"
 #include "scene/normalisation.h"
 #include "scene/surfels.h"
 
@@ -25,6 +26,7 @@ struct Scene {
   Surfels environment;
   std::optional<Field> main_field;
   std::optional<Motion> main_motion;  // of the bodies that main.body names
+  std::optional<Nodes> main_nodes;    // of those of them that bend
   std::optional<Field> environment_field;
   std::optional<EnvironmentMap> environment_map;
   Specular specular = Specular::environment_gaussians;

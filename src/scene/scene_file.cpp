@@ -120,6 +120,39 @@ void get_motion(const Safetensors& file, Scene& scene) {
   scene.main_motion = std::move(motion);
 }
 
+void put_nodes(const Nodes& nodes, Safetensors& file) {
+  file.add("scene/nodes/body", nodes.body);
+  file.add("scene/nodes/time", nodes.time);
+  file.add("scene/nodes/centre", nodes.centre);
+  file.add("scene/nodes/radius", nodes.radius);
+  file.add("scene/nodes/turn", nodes.turn);
+  file.add("scene/nodes/shift", nodes.shift);
+}
+
+Nodes get_nodes(const Safetensors& file, int64_t bodies) {
+  Nodes nodes;
+  nodes.body = file.tensor<int32_t>("scene/nodes/body");
+  nodes.time = file.tensor<float>("scene/nodes/time");
+  const int64_t count = nodes.body.shape().rank() == 1 ? nodes.body.size() : -1;
+  const int64_t times = nodes.time.shape().rank() == 1 ? nodes.time.size() : -1;
+  bool fits =
+      count > 0 && times > 0 && std::is_sorted(nodes.time.data(), nodes.time.data() + nodes.time.size());
+  for (const int32_t body : nodes.body.values()) fits = fits && body >= 0 && body < bodies;
+  if (!fits) {
+    throw InputError(file.origin(), "scene/nodes",
+                     "shapes " + nodes.body.shape().to_string() + " and " + nodes.time.shape().to_string(),
+                     "N bodies from 0 to " + std::to_string(bodies - 1) + " and L ascending times");
+  }
+  nodes.centre = take(file, "scene/nodes/centre", {count, 3});
+  nodes.radius = take(file, "scene/nodes/radius", {count});
+  for (const float radius : nodes.radius.values()) {
+    if (!(radius > 0)) throw InputError(file.origin(), "scene/nodes/radius", number_text(radius), "above 0");
+  }
+  nodes.turn = take(file, "scene/nodes/turn", {count, times, 3});
+  nodes.shift = take(file, "scene/nodes/shift", {count, times, 3});
+  return nodes;
+}
+
 EnvironmentMap get_map(const JsonField& json, const Safetensors& file) {
   EnvironmentMap map;
   map.logit = file.tensor<float>("scene/map/logit");
@@ -152,6 +185,8 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
   if (json.has("main_field"))
     scene.main_field = get_field(json["main_field"], residual::main_outputs, "scene/main_field/", file);
   if (json.has("motion") && json["motion"].yes()) get_motion(file, scene);
+  if (scene.main_motion && json.has("nodes") && json["nodes"].yes())
+    scene.main_nodes = get_nodes(file, scene.main_motion->bodies());
   if (json.has("environment_field")) {
     scene.environment_field =
         get_field(json["environment_field"], residual::environment_outputs, "scene/environment_field/", file);
@@ -176,6 +211,8 @@ void put_scene(const Scene& scene, Safetensors& file) {
   if (scene.environment.count() > 0) put_surfels(scene.environment, "scene/environment/", file);
   json["motion"] = scene.main_motion.has_value();
   if (scene.main_motion) put_motion(*scene.main_motion, scene.main.body, file);
+  json["nodes"] = scene.main_nodes.has_value();
+  if (scene.main_nodes) put_nodes(*scene.main_nodes, file);
   if (scene.main_field) put_field(*scene.main_field, "scene/main_field/", file, json["main_field"]);
   if (scene.environment_field) {
     put_field(*scene.environment_field, "scene/environment_field/", file, json["environment_field"]);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -219,6 +220,54 @@ int64_t release_strays(const Capture& capture, const Motion& motion, float lates
     ++released;
   }
   return released;
+}
+
+Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, int64_t every) {
+  constexpr double radii = 0.6;  // of the distance between neighbours
+  std::vector<int32_t> body;
+  std::vector<float> centre, radius;
+  for (int32_t b = 0; b < motion.bodies(); ++b) {
+    std::vector<Vec3<double>> points, chosen;
+    for (int64_t i = 0; i < surfels.count(); ++i) {
+      if (surfels.body[i] == b && surfels.opacity_logit[i] > 0)
+        points.push_back(load3<double>(surfels.position.row(i)));
+    }
+    if (points.empty()) continue;
+    // The farthest from those chosen, beginning at the centre.
+    std::vector<double> off(points.size());
+    const Vec3<double> middle = load3<double>(motion.centre.row(b));
+    for (size_t k = 0; k < points.size(); ++k) off[k] = -glm::length(points[k] - middle);
+    for (int64_t n = 0; n < each; ++n) {
+      const auto next = static_cast<size_t>(std::max_element(off.begin(), off.end()) - off.begin());
+      if (n > 0 && !(off[next] > 0)) break;
+      chosen.push_back(points[next]);
+      for (size_t k = 0; k < points.size(); ++k) {
+        const double distance = glm::length(points[k] - points[next]);
+        off[k] = n == 0 ? distance : std::min(off[k], distance);
+      }
+    }
+    double spacing = 0;
+    for (const Vec3<double>& p : chosen) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Vec3<double>& q : chosen) {
+        if (&p != &q) nearest = std::min(nearest, glm::length(p - q));
+      }
+      if (chosen.size() > 1) spacing += nearest / static_cast<double>(chosen.size());
+    }
+    if (!(spacing > 0)) continue;
+    for (const Vec3<double>& p : chosen) {
+      body.push_back(b);
+      for (int c = 0; c < 3; ++c) centre.push_back(static_cast<float>(p[c]));
+      radius.push_back(static_cast<float>(radii * spacing));
+    }
+  }
+  std::vector<float> times;
+  for (int64_t k = 0; k < motion.keys(); k += every) times.push_back(motion.time[k]);
+  const auto n = static_cast<int64_t>(body.size()), l = static_cast<int64_t>(times.size());
+  Nodes nodes{tensor_of(body),   tensor_of(times),         Tensor<float>({n, 3}),
+              tensor_of(radius), Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3})};
+  std::copy(centre.begin(), centre.end(), nodes.centre.data());
+  return nodes;
 }
 
 void Unrest::look(const Surfels& main, const View& view, const ViewImages& images,

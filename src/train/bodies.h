@@ -4,6 +4,7 @@
 
 #include "capture/capture.h"
 #include "scene/motion.h"
+#include "scene/nodes.h"
 #include "scene/surfels.h"
 
 // Which surfels move together, by the capture's masks.
@@ -17,6 +18,10 @@ std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);
 // Lets carried surfels go that their body takes out of the masks of the views up to the time
 // `latest`: they lay behind it, or beside it. surfels and motion on the CPU. Returns how many.
 int64_t release_strays(const Capture& capture, const Motion& motion, float latest, Surfels& surfels);
+
+// Nodes that let bodies bend, up to `each` of every body: spread evenly over its surfels of an opacity above
+// one half, at rest at every `every`th time of the motion. surfels and motion on the CPU.
+Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, int64_t every);
 
 // How far pictures are from the photographs where surfels show that no body carries.
 struct Unrest {

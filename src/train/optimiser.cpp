@@ -11,7 +11,10 @@ optimize::AdamState zero_state(const Tensor<float>& parameter) {
           Tensor<float>(parameter.shape(), parameter.device()), 0};
 }
 
-// Of a field or a motion.
+// Of the rate of poses: those have been found when nodes begin.
+constexpr double node_rates = 4;
+
+// Of a field, a motion or nodes.
 template <class Parameters>
 std::vector<optimize::AdamState> zero_states(const Parameters& parameters) {
   std::vector<optimize::AdamState> states;
@@ -107,12 +110,15 @@ Optimiser::Optimiser(const Scene& scene) {
   environment_.reset_like(scene.environment);
   if (scene.main_field) main_field_ = zero_states(*scene.main_field);
   if (scene.main_motion) main_motion_ = zero_states(*scene.main_motion);
+  if (scene.main_nodes) begin(*scene.main_nodes);
   if (scene.environment_field) environment_field_ = zero_states(*scene.environment_field);
   if (scene.environment_map) {
     map_ = zero_state(scene.environment_map->logit);
     if (scene.environment_map->field) map_field_ = zero_states(*scene.environment_map->field);
   }
 }
+
+void Optimiser::begin(const Nodes& nodes) { main_nodes_ = zero_states(nodes); }
 
 void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
                      const Schedule& schedule, const RateOptions& rates, int iteration,
@@ -133,6 +139,12 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
     const double rate = schedule.motion_rate(iteration);
     step("main_motion.rotation", motion.rotation, gradient.main_motion.rotation, main_motion_[0], rate / 2);
     step("main_motion.shift", motion.shift, gradient.main_motion.shift, main_motion_[1], rate * scene.extent);
+  }
+  if (trainable.main_nodes && scene.main_nodes) {
+    Nodes& nodes = *scene.main_nodes;
+    const double rate = node_rates * schedule.motion_rate(iteration);
+    step("main_nodes.turn", nodes.turn, gradient.main_nodes.turn, main_nodes_[0], rate);
+    step("main_nodes.shift", nodes.shift, gradient.main_nodes.shift, main_nodes_[1], rate * scene.extent);
   }
   if (trainable.environment && scene.environment.count() > 0) {
     step_surfels(step, "environment", scene.environment, gradient.environment, environment_, position_rate,
@@ -165,6 +177,7 @@ void Optimiser::for_each(Self& self, F&& f) {
   surfels("main", self.main_);
   surfels("environment", self.environment_);
   fields("main_motion", self.main_motion_);
+  fields("main_nodes", self.main_nodes_);
   fields("main_field", self.main_field_);
   fields("environment_field", self.environment_field_);
   fields("map_field", self.map_field_);

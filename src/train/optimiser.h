@@ -61,6 +61,9 @@ class Optimiser {
   // What the last step left alone. Waits for the device.
   NonFiniteGradients left_alone() const { return notes_.report(); }
 
+  // Of nodes that the scene has got since.
+  void begin(const Nodes& nodes);
+
   SurfelMoments& main() { return main_; }
   SurfelMoments& environment() { return environment_; }
 
@@ -74,7 +77,7 @@ class Optimiser {
   static void for_each(Self& self, F&& f);
 
   SurfelMoments main_, environment_;
-  std::vector<optimize::AdamState> main_motion_;
+  std::vector<optimize::AdamState> main_motion_, main_nodes_;
   std::vector<optimize::AdamState> main_field_, environment_field_, map_field_;
   optimize::AdamState map_;
   StepNotes notes_;

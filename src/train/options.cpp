@@ -176,9 +176,19 @@ void TrackOptions::validate() const {
   check_not_negative(colour, "deform.track.colour");
 }
 
+void BendOptions::validate() const {
+  check_not_negative(nodes, "deform.bend.nodes");
+  check_option(nodes <= 64, "deform.bend.nodes", nodes, "64 or fewer");
+  check_option(every > 0, "deform.bend.every", every, "a positive number");
+  check_not_negative(misfit, "deform.bend.misfit");
+  check_not_negative(strain, "deform.bend.strain");
+  check_not_negative(haste, "deform.bend.haste");
+}
+
 void DeformOptions::validate() const {
   check_option(kind == "network" || kind == "nodes", "deform.kind", kind, "network or nodes");
   track.validate();
+  bend.validate();
   network.validate();
   environment_network.validate();
 }

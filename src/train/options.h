@@ -198,23 +198,46 @@ struct TrackOptions {
   void validate() const;
 };
 
+// How bodies bend that one rigid pose does not explain, by the silhouettes (deform.kind = nodes).
+struct BendOptions {
+  int nodes = 16;
+  int every = 3;
+  float misfit = 1.4F;
+  float strain = 0.01F;
+  float haste = 1e-5F;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("nodes", nodes, "nodes", "Nodes of a body that bends; 0: bodies are rigid.");
+    v.field("every", every, "times", "Nodes have a turn and a shift at one of so many times.");
+    v.field("misfit", misfit, "",
+            "Bodies bend where their silhouettes are off by so many times as much as at the first time.");
+    v.field("strain", strain, "", "Weight of the loss that keeps neighbouring nodes together.");
+    v.field("haste", haste, "", "Weight of the loss that keeps nodes slow.");
+  }
+  void validate() const;
+};
+
 // Which fields there are, and their networks (method §1.2, §9).
 struct DeformOptions {
   std::string kind = "network";
   bool main = true;
   bool environment = true;
   TrackOptions track;
+  BendOptions bend;
   NetworkOptions network;
   NetworkOptions environment_network;
 
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("kind", kind, "",
-            "How main surfels move: network (a residual field), or nodes (rigid bodies found in masks and "
-            "tracked; of all else the field moves what is seen to move; network where there are none).");
+            "How main surfels move: network (a residual field), or nodes (bodies found in masks and "
+            "tracked, which bend where they must; of all else the field moves what is seen to move; network "
+            "where there are none).");
     v.field("main", main, "", "The main surfels move.");
     v.field("environment", environment, "", "The environment moves.");
     v.group("track", track);
+    v.group("bend", bend);
     v.group("network", network);
     v.group("environment_network", environment_network);
   }

@@ -207,12 +207,14 @@ LossTerms Trainer::step() {
   if (now.enters && !now.goes_on) follow_again();
   if (now.enters && (now.key % strays_every == 0 || !now.goes_on)) let_strays_go(now.key);
   if (now.enters && !now.goes_on) let_stand();
+  if (now.enters && !now.goes_on && options_.deform.bend.nodes > 0) let_bend();
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
   request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);
   trainable.main_motion = trainable.main && scene_.main_motion && !now.goes_on;
+  trainable.main_nodes = trainable.main_motion && scene_.main_nodes;
   // Gradients through reflections hold back the rotation of a body, so it is followed without them.
   if (now.goes_on) {
     request.specular = false;
@@ -243,6 +245,11 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   gradient_.reset(scene_);
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   if (scene_.main_motion) motion::hold_first_key(gradient_.main_motion);
+  if (trainable.main_nodes) {
+    const BendOptions& bend = options_.deform.bend;
+    nodes::resist(*scene_.main_nodes, {bend.strain, bend.haste}, gradient_.main_nodes);
+    nodes::hold_first(gradient_.main_nodes);
+  }
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
   // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.
@@ -517,6 +524,7 @@ void Trainer::step_back() {
     views_ = before_step_.views;
     if (before_step_.motion) {
       scene_.main_motion = before_step_.motion;
+      scene_.main_nodes.reset();
       scene_.main.body = before_step_.body;
       colour_trust_ = before_step_.colour_trust;
     }

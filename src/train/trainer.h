@@ -92,6 +92,10 @@ class Trainer {
   void let_strays_go(int64_t key);
   // What no body carries stands still, unless the pictures are far from the photographs there.
   void let_stand();
+  // Gives bodies nodes, so that they may bend, where silhouettes get worse by much after the first time.
+  void let_bend();
+  // How far the bodies' silhouettes are off in a view, as a share of the mask's area.
+  double silhouette_misfit(const View& view);
   const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();

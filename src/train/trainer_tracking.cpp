@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "train/bodies.h"
 #include "train/trainer.h"
@@ -68,6 +69,41 @@ void Trainer::let_strays_go(int64_t key) {
   const Motion motion = scene_.main_motion->on(Device::cpu);
   release_strays(capture_, motion, motion.time[key], main);
   scene_.main.body = main.body.on(device_);
+}
+
+double Trainer::silhouette_misfit(const View& view) {
+  FrameRequest request;
+  request.camera = view.camera;
+  request.time = view.time;
+  request.deform_main = request.specular = false;
+  request.silhouette = true;
+  const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
+  const Tensor<float> silhouette = renderer_.forward(scene_, request, false).silhouette.on(Device::cpu);
+  double off = 0, area = 0;
+  for (int64_t i = 0; i < images->coverage.size(); ++i) {
+    off += std::abs(silhouette[i] - images->coverage[i]);
+    area += images->coverage[i];
+  }
+  return area > 0 ? off / area : 0;
+}
+
+void Trainer::let_bend() {
+  constexpr size_t most_views = 20;
+  std::vector<const View*> views;
+  for (const View& view : capture_.train) views.push_back(&view);
+  std::stable_sort(views.begin(), views.end(),
+                   [](const View* a, const View* b) { return a->time < b->time; });
+  const double first = silhouette_misfit(*views.front());
+  const size_t step = (views.size() + most_views - 1) / most_views;
+  double sum = 0, count = 0;
+  for (size_t k = 0; k < views.size(); k += step, ++count) sum += silhouette_misfit(*views[k]);
+  const BendOptions& bend = options_.deform.bend;
+  if (sum <= bend.misfit * first * count) return;
+  const Nodes nodes =
+      place_nodes(scene_.main_motion->on(Device::cpu), scene_.main.on(Device::cpu), bend.nodes, bend.every);
+  if (nodes.count() == 0) return;
+  scene_.main_nodes = nodes.on(device_);
+  optimiser_.begin(*scene_.main_nodes);
 }
 
 void Trainer::let_stand() {

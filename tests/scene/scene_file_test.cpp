@@ -50,6 +50,12 @@ Scene full_scene() {
   scene.main.body = tensor_of(std::vector<int32_t>{-1, 0, 1, 1, -1, 0, 0});
   scene.main_motion = still_motion(noise({2, 3}, random), tensor_of(std::vector<float>{0, 0.25F, 1}));
   for (float& v : scene.main_motion->shift.values()) v = static_cast<float>(random.normal());
+  scene.main_nodes = Nodes{tensor_of(std::vector<int32_t>{0, 1, 1}),
+                           tensor_of(std::vector<float>{0, 0.5F}),
+                           noise({3, 3}, random),
+                           tensor_of(std::vector<float>{1, 2, 3}),
+                           noise({3, 2, 3}, random),
+                           noise({3, 2, 3}, random)};
   return scene;
 }
 
@@ -65,6 +71,13 @@ std::vector<float> all_numbers(const Scene& scene) {
     scene.main_motion->for_each(take);
     take("", scene.main_motion->time);
     take("", scene.main_motion->centre);
+  }
+  if (scene.main_nodes) {
+    scene.main_nodes->for_each(take);
+    take("", scene.main_nodes->time);
+    take("", scene.main_nodes->centre);
+    take("", scene.main_nodes->radius);
+    for (const int32_t body : scene.main_nodes->body.values()) all.push_back(static_cast<float>(body));
   }
   for (const int32_t body : scene.main.body.values()) all.push_back(static_cast<float>(body));
   if (scene.environment_field) scene.environment_field->for_each(take);
@@ -112,6 +125,24 @@ TEST(SceneFile, AMissingOrMisshapenTensorIsNamed) {
     EXPECT_NE(std::string(error.what()).find("scene/main/opacity_logit"), std::string::npos) << error.what();
   }
   EXPECT_THROW(get_scene(Safetensors{}), InputError);
+}
+
+TEST(SceneFile, NodesThatFitNoBodyOrHaveNoSizeAreRefused) {
+  const auto says = [](auto&& spoil) {
+    Scene scene = full_scene();
+    spoil(*scene.main_nodes);
+    Safetensors file;
+    put_scene(scene, file);
+    return refusal_of([&] { get_scene(file); });
+  };
+  EXPECT_NE(says([](Nodes& nodes) { nodes.body[1] = 2; }).find("scene/nodes: found"), std::string::npos);
+  EXPECT_NE(says([](Nodes& nodes) { nodes.time[0] = 0.9F; }).find("ascending times"), std::string::npos);
+  EXPECT_EQ(says([](Nodes& nodes) { nodes.radius[2] = 0; }),
+            "safetensors: scene/nodes/radius: found 0, expected above 0");
+  EXPECT_NE(says([](Nodes& nodes) {
+              nodes.turn.resize({3, 1, 3});
+            }).find("scene/nodes/turn"),
+            std::string::npos);
 }
 
 // What get_scene says where one field of the scene's metadata is another.

@@ -9,6 +9,7 @@
 #include "capture/motion_truth.h"
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
+#include "ops/motion/nodes.h"
 #include "train/initialise.h"
 #include "train/small_run.h"
 #include "train/tracker.h"
@@ -209,6 +210,59 @@ TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
   }
   set_threads(0);
   EXPECT_EQ(found.size(), 1U);
+}
+
+// Nodes lie among the surfels of their bodies, apart from each other, and change nothing before they are
+// trained.
+TEST(Bodies, GetNodesThatAreSpreadOverThem) {
+  Tumbling at;
+  Surfels& main = at.scene.main;
+  main.opacity_logit.fill(1);
+  const Nodes nodes = place_nodes(*at.scene.main_motion, main, 12, 3);
+  ASSERT_EQ(nodes.count(), 24);
+  EXPECT_EQ(nodes.times(), (at.scene.main_motion->keys() + 2) / 3);
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    const Vec3<float> centre = load3<float>(nodes.centre.row(n));
+    bool is_surfel = false;
+    for (int64_t i = 0; i < main.count(); ++i)
+      is_surfel =
+          is_surfel || (main.body[i] == nodes.body[n] && load3<float>(main.position.row(i)) == centre);
+    EXPECT_TRUE(is_surfel);
+    for (int64_t m = 0; m < n; ++m) {
+      if (nodes.body[m] != nodes.body[n]) continue;
+      EXPECT_GT(glm::length(load3<float>(nodes.centre.row(m)) - centre), 0.5F * nodes.radius[n]);
+    }
+  }
+  Surfels bent = main;
+  nodes::bend(nodes, main.body, 0.7F, bent);
+  for (int64_t i = 0; i < main.position.size(); ++i) EXPECT_NEAR(bent.position[i], main.position[i], 1e-5);
+}
+
+// A thing that stretches and bends gets nodes; boxes that stand still and are rigid get none.
+TEST(Bodies, BendWhereSilhouettesGetWorse) {
+  const auto bends = [](SynthScene scene) {
+    const fs::path folder =
+        fs::path(::testing::TempDir()) / ("bends_" + std::to_string(::getpid()) + std::to_string(int(scene)));
+    SynthOptions made;
+    made.scene = scene;
+    made.frames = 24;
+    made.width = 120;
+    made.height = 68;
+    made.samples = 1;
+    made.points = 4000;
+    write_synthetic_capture(made, folder);
+    TrainOptions options = preset("cpu");
+    options.iterations = 400;
+    options.specular = Specular::none;
+    options.initial.max_points = options.density.max_surfels = 4000;
+    Trainer trainer(options, load_capture(folder, {}), folder / "run");
+    const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
+    while (trainer.iteration() <= options.iterations / 8 + (keys - 1) * options.deform.track.map_each)
+      trainer.step();
+    return trainer.scene().main_nodes.has_value();
+  };
+  EXPECT_TRUE(bends(SynthScene::soft));
+  EXPECT_FALSE(bends(SynthScene::balls));
 }
 
 // Colour is trusted where it takes back little of the turns that there were, and of none before there were

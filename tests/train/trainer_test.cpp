@@ -147,17 +147,22 @@ TEST(Trainer, AnotherSeedGivesOtherBytes) {
   EXPECT_NE(scene_bytes(first.scene()), scene_bytes(second.scene()));
 }
 
-// With a network that moves surfels, and with bodies, the second of whose times is entered after 9
-// iterations.
+// With a network that moves surfels, with bodies, the second of whose times is entered after 9 iterations,
+// and with bodies that bend from the last time on.
 class ResumedTrainer : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, ResumedTrainer, ::testing::Values("network", "nodes"));
+INSTANTIATE_TEST_SUITE_P(Kinds, ResumedTrainer, ::testing::Values("network", "nodes", "bend"));
 
 TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   TrainOptions options = small_run(40);
-  options.deform.kind = GetParam();
+  const bool bends = std::string(GetParam()) == "bend";
+  options.deform.kind = bends ? "nodes" : GetParam();
+  options.deform.bend.misfit = 0;
+  options.deform.bend.nodes = bends ? 5 : 0;
+  options.deform.track.map_each = bends ? 1 : 4;  // the last time is reached
   Trainer whole = make_trainer(options, "whole");
   EXPECT_EQ(whole.scene().main_motion.has_value(), options.deform.kind == "nodes");
   whole.run(never);
+  EXPECT_EQ(whole.scene().main_nodes.has_value(), bends);
 
   // Interrupt once in each phase.
   const fs::path run = fs::path(::testing::TempDir()) / ("resumed_" + std::to_string(::getpid()));
