@@ -36,7 +36,7 @@ void bend(const Nodes& nodes, const Tensor<int32_t>& body, float time, Surfels& 
 struct Stiffness {
   double strain = 0;  // Σ_m a_nm |R_n (c_m − c_n) + c_n + s_n − c_m − s_m|²/r_n² over others of the body,
                       // a_nm ∝ exp(−|c_m − c_n|²/8r_n²) with Σ a_nm = 1 (Sumner et al. 2007, E_reg)
-  double haste = 0;  // (|dω_n/dt|² + |ds_n/dt|²/r_n²): t in lengths of the film
+  double haste = 0;  // |dω_n/dt|² + |ds_n/dt|²/r_n², t in lengths of the film
 };
 // Adds the gradient of the term.
 void resist(const Nodes& nodes, const Stiffness& weights, Nodes& gradient);
