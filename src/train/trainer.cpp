@@ -245,11 +245,7 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   gradient_.reset(scene_);
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   if (scene_.main_motion) motion::hold_first_key(gradient_.main_motion);
-  if (trainable.main_nodes) {
-    const BendOptions& bend = options_.deform.bend;
-    nodes::resist(*scene_.main_nodes, {bend.strain, bend.haste}, gradient_.main_nodes);
-    nodes::hold_first(gradient_.main_nodes);
-  }
+  if (trainable.main_nodes) hold_nodes();
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
   // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.

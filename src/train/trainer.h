@@ -94,6 +94,8 @@ class Trainer {
   void let_stand();
   // Gives bodies nodes, so that they may bend, where silhouettes get worse by much after the first time.
   void let_bend();
+  // Adds to the nodes' gradient what holds them together, and none at the first time.
+  void hold_nodes();
   // How far the bodies' silhouettes are off in a view, as a share of the mask's area.
   double silhouette_misfit(const View& view);
   const View& draw_tracked_view(const Tracking& now);

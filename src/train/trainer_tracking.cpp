@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ops/motion/nodes.h"
 #include "train/bodies.h"
 #include "train/trainer.h"
 
@@ -85,6 +86,12 @@ double Trainer::silhouette_misfit(const View& view) {
     area += images->coverage[i];
   }
   return area > 0 ? off / area : 0;
+}
+
+void Trainer::hold_nodes() {
+  const BendOptions& bend = options_.deform.bend;
+  nodes::resist(*scene_.main_nodes, {bend.strain, bend.haste}, gradient_.main_nodes);
+  nodes::hold_first(gradient_.main_nodes);
 }
 
 void Trainer::let_bend() {
