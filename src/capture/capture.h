@@ -64,6 +64,9 @@ struct Capture {
 // InputError.
 Capture load_capture(const std::filesystem::path& path, const CaptureOptions& options);
 
+// Every time at which it has a view of either split, ascending.
+std::vector<float> times_of(const Capture& capture);
+
 // Decodes a view's pixels, or finds them in the cache, whose size is bounded. Safe to call from several
 // threads.
 std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View& view);

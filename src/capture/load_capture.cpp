@@ -440,4 +440,12 @@ Capture load_capture(const std::filesystem::path& path, const CaptureOptions& op
   return Assembly(path, options).finish();
 }
 
+std::vector<float> times_of(const Capture& capture) {
+  std::set<float> times;
+  for (const std::vector<View>* views : {&capture.train, &capture.test}) {
+    for (const View& view : *views) times.insert(view.time);
+  }
+  return {times.begin(), times.end()};
+}
+
 }  // namespace traceflow

@@ -4,9 +4,16 @@
 
 namespace traceflow {
 
+void TracksOptions::validate() const {
+  check_option(frames >= 1 && frames <= 1000, "render.tracks_frames", frames, "1 to 1000");
+  check_option(most >= 1 && most <= 2000, "render.tracks_most", most, "1 to 2000");
+  check_option(least_move >= 0 && least_move <= 1, "render.tracks_least_move", least_move, "0 to 1");
+}
+
 void RenderOptions::validate() const {
   check_option(depth_ratio >= 0 && depth_ratio <= 1, "render.depth_ratio", depth_ratio, "0 to 1");
   select.validate();
+  tracks.validate();
   raster_options(1).validate();
   trace_options(1).validate();
 }

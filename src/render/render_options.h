@@ -9,6 +9,15 @@
 
 namespace traceflow {
 
+// Which points the layer `tracks` follows, and how far back their paths go.
+struct TracksOptions {
+  int frames = 12;           // times of the capture
+  int most = 400;            // points
+  float least_move = 0.01F;  // extents
+
+  void validate() const;
+};
+
 // How a frame is made of a scene. Lengths are relative to the scene's extent, so that they mean the same in
 // every capture.
 struct RenderOptions {
@@ -26,6 +35,7 @@ struct RenderOptions {
   Vec3<float> specular_background{0};
   surface::SelectOptions select;
   field::Precision precision = field::Precision::fp32;
+  TracksOptions tracks;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -47,6 +57,11 @@ struct RenderOptions {
     v.field("specular_background", specular_background, "", "Colour behind the environment (method §5.4).");
     v.group("select", select);
     v.field("precision", precision, "", "Arithmetic of the fields' hidden layers: fp32 or bf16.");
+    v.field("tracks_frames", tracks.frames, "times",
+            "Layer tracks: times of the capture that a path goes back.");
+    v.field("tracks_most", tracks.most, "points", "Layer tracks: points that have a path, at most.");
+    v.field("tracks_least_move", tracks.least_move, "extents",
+            "Layer tracks: how far a point gets over the whole film, at least, to have a path.");
   }
   void validate() const;
 

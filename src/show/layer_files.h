@@ -18,8 +18,8 @@ class LayerFiles {
   LayerFiles(std::filesystem::path folder, std::vector<Layer> layers, ImageFormat format, double scale)
       : folder_(std::move(folder)), layers_(std::move(layers)), format_(format), scale_(scale) {}
 
-  // name may hold folders, which are made.
-  void write(const std::string& name, const Frame& frame);
+  // name may hold folders, which are made. tracks: for the layer of that name.
+  void write(const std::string& name, const Frame& frame, const Tracks& tracks = {});
 
  private:
   std::filesystem::path folder_;

@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "show/ellipses.h"
+#include "show/track_picture.h"
 
 namespace traceflow::show {
 
@@ -18,12 +19,14 @@ Tensor<float> divided(Tensor<float> depth, double scale) {
 }  // namespace
 
 bool has_colours(Layer layer) {
-  constexpr std::array<Layer, 5> colours = {Layer::rgb, Layer::diffuse, Layer::specular, Layer::normal,
-                                            Layer::surfels};
+  constexpr std::array<Layer, 6> colours = {Layer::rgb,    Layer::diffuse, Layer::specular,
+                                            Layer::normal, Layer::surfels, Layer::tracks};
   return std::find(colours.begin(), colours.end(), layer) != colours.end();
 }
 
-bool needs_reflections(Layer layer) { return layer == Layer::rgb || layer == Layer::specular; }
+bool needs_reflections(Layer layer) {
+  return layer == Layer::rgb || layer == Layer::specular || layer == Layer::tracks;
+}
 
 std::vector<Layer> parse_layers(const std::string& list) {
   std::vector<Layer> layers;
@@ -46,7 +49,7 @@ std::vector<Layer> parse_layers(const std::string& list) {
   return layers;
 }
 
-Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
+Tensor<float> layer_values(const Frame& frame, Layer layer, double scale, const Tracks& tracks) {
   switch (layer) {
     case Layer::rgb:
       return frame.colour.on(Device::cpu);
@@ -68,6 +71,8 @@ Tensor<float> layer_values(const Frame& frame, Layer layer, double scale) {
       return frame.raster.distortion.on(Device::cpu);
     case Layer::surfels:
       return surfel_ellipses(frame.main, frame.camera, frame.drawn_with);
+    case Layer::tracks:
+      return track_picture(frame, tracks);
   }
   return {};
 }

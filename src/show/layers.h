@@ -5,14 +5,27 @@
 #include <vector>
 
 #include "render/frame.h"
+#include "show/tracks.h"
 
 namespace traceflow::show {
 
 // The pictures that a frame is made of, as they are named in flags and folders.
-enum class Layer { rgb, diffuse, specular, tint, alpha, normal, depth, median_depth, distortion, surfels };
-inline constexpr std::array<const char*, 10> layer_names = {
-    "rgb",    "diffuse", "specular",     "tint",       "alpha",
-    "normal", "depth",   "median-depth", "distortion", "surfels"};
+enum class Layer {
+  rgb,
+  diffuse,
+  specular,
+  tint,
+  alpha,
+  normal,
+  depth,
+  median_depth,
+  distortion,
+  surfels,
+  tracks
+};
+inline constexpr std::array<const char*, 11> layer_names = {
+    "rgb",   "diffuse",      "specular",   "tint",    "alpha", "normal",
+    "depth", "median-depth", "distortion", "surfels", "tracks"};
 inline const char* to_string(Layer layer) { return layer_names[static_cast<size_t>(layer)]; }
 
 // Whether a layer's numbers are colours or normals (H×W×3), not one number a pixel.
@@ -25,9 +38,9 @@ std::vector<Layer> parse_layers(const std::string& list);
 
 // The layer's numbers, H×W or H×W×3: colours; α_spec; alpha; normals in world axes as blended, not
 // renormalised; depths along the camera's z in units of 1/`scale` scene units, so that the capture's scale
-// gives the capture's units; every surfel as an ellipse (show/ellipses.h). On the host, wherever the frame
-// is.
-Tensor<float> layer_values(const Frame& frame, Layer layer, double scale);
+// gives the capture's units; every surfel as an ellipse (show/ellipses.h); the colours with `tracks` over
+// them (show/track_picture.h), which no other layer needs. On the host, wherever the frame is.
+Tensor<float> layer_values(const Frame& frame, Layer layer, double scale, const Tracks& tracks = {});
 
 // H×W: |photograph − render|, the mean of the three channels. The photograph is H×W×3 on the host; where it
 // is not known (H×W, may be empty) the difference is 0.

@@ -90,6 +90,7 @@ Tensor<uint8_t> Painter::paint(Layer layer, const Tensor<float>& values) {
     case Layer::diffuse:
     case Layer::specular:
     case Layer::surfels:
+    case Layer::tracks:
       break;
   }
   if (options_.exposure == 0) return to_8bit(values);

@@ -79,6 +79,10 @@ TEST_F(Pictures, RenderWritesLayersUnderTheViewsNames) {
   EXPECT_EQ(at("specular", "left/a")(12, 16, 0), 0);
   EXPECT_EQ(at("distortion", "left/a")(12, 16), 0);
   EXPECT_EQ(at("diffuse", "left/a")(12, 16, 0), rgb(12, 16, 0));
+  const Tensor<float> tracks = at("tracks", "left/a");
+  ASSERT_EQ(tracks.shape(), rgb.shape());
+  EXPECT_TRUE(std::equal(rgb.values().begin(), rgb.values().end(), tracks.values().begin()))
+      << "nothing moves";
 }
 
 TEST_F(Pictures, RenderWritesPngsByDefault) {
@@ -142,6 +146,8 @@ TEST_F(Pictures, BadArgumentsGetOneLineAndExitCode2) {
       {{"render", path("none"), "-o", out}, "no such"},
       {{"render", path("."), "-o", out}, "checkpoint"},
       {{"render", ply, "--cameras", cameras, "-o", out, "--layers", "colour"}, "layers"},
+      {{"render", ply, "--cameras", cameras, "-o", out, "--layers", "tracks", "--tracks-frames", "0"},
+       "tracks_frames"},
       {{"render", ply, "--cameras", cameras, "-o", out, "--time", "nan"}, "time"},
       {{"render", ply, "--cameras", cameras, "-o", out, "--background", "1,1"}, "background"},
       {{"render", ply, "--cameras", ply, "-o", out}, "JSON"},

@@ -49,6 +49,15 @@ TEST(FreezeCamera, TakesATrainingViewWhereNothingTests) {
               testing::HasSubstr("as 000000, or its place in the train views, 0 to 0"));
 }
 
+TEST(FreezeCamera, TellsTheTimesOfTheCapture) {
+  NerfDsCapture fake(3);
+  fake.save();
+  ShotArguments arguments = freezing("000001_left", fake);
+  arguments.frames = 7;
+  EXPECT_THAT(choose_shots(arguments, LoadedScene{}).times, testing::ElementsAre(0, 0.5F, 1))
+      << "each once, though two cameras have it";
+}
+
 // At time 0 the right camera stands nearer to where the left one is at time 1.
 TEST(FreezeCamera, StandsBesideTheNearestPhotographOfItsSize) {
   NerfDsCapture fake(3);

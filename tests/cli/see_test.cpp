@@ -136,6 +136,37 @@ TEST_F(See, EvalLeavesTheSamePage) {
   EXPECT_EQ(eval, report);
 }
 
+TEST_F(See, RunsHavePathsOfWhatMoves) {
+  const std::vector<std::string> render = {"render",     path("run"),           "--layers",
+                                           "rgb,tracks", "--tracks-least-move", "0"};
+  const auto with = [](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return run_with(words);
+  };
+  const Outcome made = with(render, {"-o", path("paths")});
+  ASSERT_EQ(made.code, exit_done) << made.err;
+  bool differs = false;
+  for (const std::string& name : names_in(folder() / "paths/rgb")) {
+    const Tensor<uint8_t> rgb = read_png(folder() / "paths/rgb" / name);
+    const Tensor<uint8_t> tracks = read_png(folder() / "paths/tracks" / name);
+    ASSERT_EQ(rgb.shape(), tracks.shape());
+    differs = differs || !std::equal(rgb.values().begin(), rgb.values().end(), tracks.values().begin());
+  }
+  EXPECT_TRUE(differs);
+  ASSERT_EQ(run_with({"eval", path("run"), "--layers", "tracks"}).code, exit_done);
+  EXPECT_EQ(names_in(folder() / "run/eval/test/tracks"), names_in(folder() / "paths/tracks"));
+
+  // Cameras of one's own need no capture, and the paths do not either.
+  std::ofstream(folder() / "one.json")
+      << R"([{"width": 20, "height": 12, "position": [0, 0, -2], "fx": 20, "fy": 20,
+                                               "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "time": 0.5}])";
+  fs::rename(folder() / "capture", folder() / "moved");
+  const Outcome alone = with(render, {"-o", path("alone"), "--cameras", path("one.json")});
+  fs::rename(folder() / "moved", folder() / "capture");
+  EXPECT_EQ(alone.code, exit_done) << alone.err;
+  EXPECT_EQ(names_in(folder() / "alone/tracks").size(), 1U);
+}
+
 // What training refuses today, an old run may have been trained with: its scene is shown all the same.
 TEST_F(See, ARunOfOlderOptionsIsShown) {
   fs::copy(folder() / "run", folder() / "older", fs::copy_options::recursive);

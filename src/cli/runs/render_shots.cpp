@@ -67,6 +67,7 @@ class Chooser {
       captured(chosen);
     }
     for (show::Shot& shot : chosen.shots) shot.time = a_.time ? *a_.time : shot.time.value_or(0.0F);
+    if (capture_) chosen.times = times_of(*capture_);
     if (chosen.photographs.empty()) return chosen;
     chosen.capture = std::move(capture_);
     return chosen;

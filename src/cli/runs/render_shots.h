@@ -35,6 +35,7 @@ struct ChosenShots {
   // To compare with: one view for each shot, and where their pictures are. Else empty.
   std::vector<View> photographs;
   std::optional<Capture> capture;
+  std::vector<float> times;  // of the capture, ascending; empty where the cameras did not need it
   double frames_per_second = 30;
 };
 

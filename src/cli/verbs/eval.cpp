@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "base/atomic_file.h"
 #include "cli/runs/evaluation.h"
@@ -29,9 +31,13 @@ void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
   const std::filesystem::path folder = std::filesystem::path(a.evaluation.run) / "eval" / a.evaluation.split;
   std::filesystem::create_directories(folder);
   show::LayerFiles files(folder, layers, show::ImageFormat::png, evaluation.scale());
+  std::optional<show::TrackFollower> follower;
+  const show::Subject& subject = evaluation.subject();
+  if (std::find(layers.begin(), layers.end(), show::Layer::tracks) != layers.end())
+    follower.emplace(subject.scene, subject.request, subject.render, times_of(evaluation.capture()));
   show::ContactSheet sheet(a.sheet_width);
   evaluation.measure([&](const View& view, const ViewImages& images, const Frame& frame) {
-    files.write(view.id, frame);
+    files.write(view.id, frame, follower ? follower->at(subject.scene, view.time) : show::Tracks());
     const auto i = static_cast<size_t>(&view - views.data());
     if (!a.sheet.empty() && eval::among_spread(i, views.size(), static_cast<size_t>(a.sheet_views))) {
       sheet.add(images.colour, frame, images.known);

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
@@ -44,12 +46,12 @@ class Output {
         files_(a.output, layers_, a.format == "npy" ? show::ImageFormat::npy : show::ImageFormat::png, scale),
         video_(a.video, chosen.frames_per_second) {}
 
-  void add(size_t i, const Frame& frame) {
+  void add(size_t i, const Frame& frame, const show::Tracks& tracks) {
     const std::string& name = chosen_.shots[i].name;
-    if (!a_.output.empty()) files_.write(name, frame);
+    if (!a_.output.empty()) files_.write(name, frame, tracks);
     if (a_.video.empty() && !a_.shots.compare) return;
     Tensor<uint8_t> picture =
-        show::in_colour(painter_.paint(layers_[0], show::layer_values(frame, layers_[0], scale_)));
+        show::in_colour(painter_.paint(layers_[0], show::layer_values(frame, layers_[0], scale_, tracks)));
     if (a_.shots.compare) {
       const std::shared_ptr<const ViewImages> images = load_images(*chosen_.capture, chosen_.photographs[i]);
       picture = show::side_by_side(to_8bit(images->colour), picture);
@@ -75,8 +77,18 @@ class Output {
   show::Painter painter_;
 };
 
+// The capture's times, where it is there.
+std::vector<float> times_for_tracks(const RenderArguments& a, const LoadedScene& scene,
+                                    const ChosenShots& chosen) {
+  const bool is_there =
+      scene.run && (!a.shots.capture.empty() || std::filesystem::exists(scene.run->capture_folder));
+  if (!chosen.times.empty() || !is_there) return chosen.times;
+  return times_of(capture_of(scene, a.shots.capture, a.shots.downscale));
+}
+
 // Renders until the end or Ctrl-C; how many shots it came to.
-size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, Output& output) {
+size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject,
+            const show::TrackFollower* follower, Output& output) {
   const std::atomic<bool>& stop = stop_on_signals();
   const auto start = std::chrono::steady_clock::now();
   CountProgress progress = CountProgress::for_stderr();
@@ -86,7 +98,8 @@ size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, 
     FrameRequest request = subject.request;
     request.camera = shots[done].camera;
     request.time = *shots[done].time;
-    output.add(done, renderer.forward(subject.scene, request));
+    output.add(done, renderer.forward(subject.scene, request),
+               follower != nullptr ? follower->at(subject.scene, request.time) : show::Tracks());
     ++done;
     progress.show({"", "frames", static_cast<int64_t>(done), static_cast<int64_t>(shots.size())},
                   std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -98,7 +111,7 @@ size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject, 
 
 void run_render(const RenderArguments& a, const OptionArguments& options, const DeviceArguments& devices) {
   a.check();
-  show::parse_layers(a.layers);
+  const std::vector<show::Layer> layers = show::parse_layers(a.layers);
   LoadedScene scene = load_scene(a.scene, a.environment);
   show::Subject& subject = scene.subject;
   options.apply(option_fields(subject.render));
@@ -109,8 +122,11 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
   if (!subject.warning.empty()) std::cerr << subject.warning << std::endl;
   subject.scene.move_to(devices.choose());
 
+  std::optional<show::TrackFollower> follower;
+  if (std::find(layers.begin(), layers.end(), show::Layer::tracks) != layers.end())
+    follower.emplace(subject.scene, subject.request, subject.render, times_for_tracks(a, scene, chosen));
   Output output(a, chosen, subject.scene.normalisation.scale);
-  const size_t done = take(chosen.shots, subject, output);
+  const size_t done = take(chosen.shots, subject, follower ? &*follower : nullptr, output);
   std::string where = a.output;
   if (!a.video.empty()) where += (where.empty() ? "" : " and ") + a.video;
   if (done < chosen.shots.size()) {
@@ -133,7 +149,7 @@ void add_render(CLI::App& program) {
   add_shot_arguments(*verb, a->shots);
   verb->add_option("--layers", a->layers,
                    "Of rgb, diffuse, specular, tint, alpha, normal, depth, median-depth, distortion, "
-                   "surfels, with commas between; or all")
+                   "surfels, tracks, with commas between; or all")
       ->capture_default_str();
   verb->add_option("--format", a->format, "png for the eye or npy (float32)")
       ->check(CLI::IsMember({"png", "npy"}))
