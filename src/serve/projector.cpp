@@ -95,17 +95,24 @@ void Projector::greet(const Stage& stage) { audience_.greet_with(hello_text(stag
 
 void Projector::scene_changed(Device device) {
   posed_ = false;
+  follower_.reset();
   if (device == Device::cuda) forget();
 }
 
 void Projector::forget() {
   renderer_ = nullptr;
+  follower_.reset();
   posed_ = false;
 }
 
 Renderer& Projector::renderer(const Stage& stage) {
   if (!renderer_) renderer_ = std::make_unique<Renderer>(stage.render);
   return *renderer_;
+}
+
+show::Tracks Projector::tracks(const FrameRequest& request, const Stage& stage) {
+  if (!follower_) follower_.emplace(stage.scene, stage.request, stage.render, setting_.times);
+  return follower_->at(stage.scene, request.time);
 }
 
 void Projector::answer(const Job& job, const Stage& stage) {
@@ -158,8 +165,9 @@ Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request
   const Frame& frame = renderer(stage).forward(stage.scene, request);
   posed_ = true;
   if (!difference) {
+    const show::Tracks paths = layer == show::Layer::tracks ? tracks(request, stage) : show::Tracks();
     return show::in_colour(
-        painter.paint(layer, show::layer_values(frame, layer, stage.scene.normalisation.scale)));
+        painter.paint(layer, show::layer_values(frame, layer, stage.scene.normalisation.scale, paths)));
   }
   const std::shared_ptr<const ViewImages> images = photograph(*photo);
   const int64_t width = request.camera.width, height = request.camera.height;

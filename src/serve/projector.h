@@ -40,11 +40,14 @@ class Projector {
   Tensor<uint8_t> picture(const Look& look, const FrameRequest& request, const Stage& stage,
                           show::Painter& painter);
   Renderer& renderer(const Stage& stage);
+  show::Tracks tracks(const FrameRequest& request, const Stage& stage);
+
   Audience& audience_;
   Setting setting_;
   std::unique_ptr<Renderer> renderer_;
-  bool posed_ = false;                          // the renderer has seen the scene as it is now
-  std::map<uint64_t, show::Painter> painters_;  // of every page, whose ranges follow what it sees
+  std::optional<show::TrackFollower> follower_;  // of the scene as it is now, once a page wants paths
+  bool posed_ = false;                           // the renderer has seen the scene as it is now
+  std::map<uint64_t, show::Painter> painters_;   // of every page, whose ranges follow what it sees
 };
 
 }  // namespace traceflow::serve

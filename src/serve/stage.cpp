@@ -19,10 +19,11 @@ std::vector<CapturedCamera> cameras_of(const std::vector<View>& views, const Sce
 
 Setting make_setting(std::string source, std::string name, const Capture* capture,
                      const SceneNormalisation& scene) {
-  Setting setting{std::move(source), std::move(name), capture, {}, {}};
+  Setting setting{std::move(source), std::move(name), capture, {}, {}, {}};
   if (capture == nullptr) return setting;
   setting.train = cameras_of(capture->train, capture->normalisation, scene);
   setting.test = cameras_of(capture->test, capture->normalisation, scene);
+  setting.times = times_of(*capture);
   return setting;
 }
 

@@ -31,6 +31,7 @@ struct Setting {
   std::string name;                  // of the run's folder or the file
   const Capture* capture = nullptr;  // photographs; null where there are none
   std::vector<CapturedCamera> train, test;
+  std::vector<float> times;  // of the capture, ascending
 };
 
 // capture: may be null; else it outlives the setting, and its cameras are taken to the scene's units.

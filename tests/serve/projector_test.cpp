@@ -153,6 +153,45 @@ TEST(Projector, EveryLayerIsAPictureOfItsOwn) {
   EXPECT_TRUE(s.page.of("refused").empty());
 }
 
+// All surfels, opaque, on one body that goes to the right.
+Scene moving(const Scene& scene, const std::vector<float>& times) {
+  Scene result = scene;
+  result.main.opacity_logit.fill(3);
+  result.main.body.reset({result.main.count()});
+  result.main_motion = still_motion(Tensor<float>(Shape{1, 3}), tensor_of(times));
+  for (int64_t k = 0; k < result.main_motion->keys(); ++k)
+    result.main_motion->shift(0, k, 0) = 0.5F * result.main_motion->time[k];
+  return result;
+}
+
+TEST(Projector, DrawsThePathsOfWhatMoves) {
+  Screening s("paths");
+  const auto bytes = [&](const std::string& layer, double time, const Stage& stage) {
+    json message = at_photo(static_cast<int64_t>(s.page.all().size()) + 1, layer);
+    message["time"] = time;
+    s.page.say(message);
+    s.page.say({{"type", "still"}, {"id", 1}, {"width", 40}, {"height", 24}});
+    while (const auto job = s.audience.next()) {
+      s.projector.answer(*job, stage);
+      s.page.see_frames();
+    }
+    return s.page.of("still").back().picture;
+  };
+  EXPECT_EQ(bytes("tracks", 0.5, s.stage()), bytes("rgb", 0.5, s.stage())) << "nothing moves yet";
+
+  s.projector.forget();
+  const Scene scene = moving(s.trainer.scene(), times_of(s.trainer.capture()));
+  const Stage as_is = s.stage();
+  const Stage stage{scene, as_is.render, as_is.request, as_is.iteration};
+  const std::string early = bytes("tracks", 0.25, stage), late = bytes("tracks", 1, stage);
+  EXPECT_NE(late, bytes("rgb", 1, stage));
+  EXPECT_NE(early, late);
+  EXPECT_EQ(bytes("tracks", 0.25, stage), early) << "what was seen since does not matter";
+  // A scene that has changed has other paths.
+  s.projector.scene_changed(Device::cpu);
+  EXPECT_EQ(bytes("tracks", 0.5, s.stage()), bytes("rgb", 0.5, s.stage()));
+}
+
 TEST(Projector, ExposureAndMapsChangeThePicture) {
   Screening s("exposure");
   const auto picture_with = [&](const char* layer, double exposure, const char* map) {

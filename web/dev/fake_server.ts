@@ -18,7 +18,7 @@ let log = training.begin();
 const past = source === 'training' ? Number(PAST) : 1e9;
 while (source !== 'ply' && !training.over && training.iteration < past) log = [...log, ...training.advance()];
 
-const colours = ['rgb', 'diffuse', 'specular', 'normal', 'surfels', 'difference'];
+const colours = ['rgb', 'diffuse', 'specular', 'normal', 'surfels', 'tracks', 'difference'];
 const numbers = ['tint', 'alpha', 'depth', 'median-depth', 'distortion'];
 const hello: Hello = {
   type: 'hello',

@@ -141,6 +141,10 @@ function pixel(s: Sample, { layer, exposure, map }: Wanted, x: number, y: number
       const cell = Math.sin(s.depth * 90 + x * 0.2) * Math.sin(y * 0.25) > 0.2 ? 1 : 0.55;
       return scale(s.colour, cell * gain);
     }
+    case 'tracks': {
+      const is_dot = s.hit && x % 12 < 2 && y % 12 < 2;
+      return is_dot ? turbo((x % 240) / 240) : scale(s.colour, gain);
+    }
     case 'photograph':
       return scale(add(s.colour, [noise, noise, noise]), 1.04);
     default:

@@ -35,7 +35,7 @@ function Layers() {
           <label key={name} class="layer" data-testid={`layer-${name}`}>
             <input type="radio" name="layer" checked={layer.value === name} onChange={() => (layer.value = name)} />
             <span>{title(name)}</span>
-            {i < 10 && <kbd>{(i + 1) % 10}</kbd>}
+            {name === 'tracks' ? <kbd>M</kbd> : i < 10 && <kbd>{(i + 1) % 10}</kbd>}
           </label>
         ))}
       </div>

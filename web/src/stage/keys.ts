@@ -44,6 +44,7 @@ export const key_list: { title: string; keys: Key[] }[] = [
     title: 'Seeing',
     keys: [
       { shown: '1 … 9, 0', does: 'layers' },
+      { shown: 'M', does: 'paths of what moves, on and off' },
       { shown: 'Space', does: 'play or pause' },
       { shown: ', .', does: 'one instant back, on' },
       { shown: '[ ]', does: 'captured camera before, after' },
@@ -81,6 +82,14 @@ const arrows: Record<string, [number, number]> = {
   ArrowDown: [0, 1],
 };
 
+// Back to the layer before.
+let without_tracks = 'rgb';
+function toggle_tracks(): void {
+  if (!hello.value?.layers.some((l) => l.name === 'tracks')) return;
+  if (layer.value !== 'tracks') without_tracks = layer.value;
+  layer.value = layer.value === 'tracks' ? without_tracks : 'tracks';
+}
+
 const actions: Record<string, () => void> = {
   '+': () => zoom_by(0.9),
   '=': () => zoom_by(0.9),
@@ -96,6 +105,7 @@ const actions: Record<string, () => void> = {
   c: () => {
     if (photo.value) comparison.value = order[(order.indexOf(comparison.value) + 1) % order.length] ?? 'render';
   },
+  m: toggle_tracks,
   t: toggle_rays,
   x: unpin_all,
   k: add_keyframe,

@@ -78,6 +78,18 @@ describe('looking at a run', { skip: !available('view') }, () => {
     await page.context().close();
   });
 
+  test('M lays the paths of what moves over the picture and takes them away', async () => {
+    const { page } = await open(browser, served.address);
+    const before = await glimpse(page);
+    await then_rest(page, () => page.keyboard.press('m'));
+    assert.ok(await page.getByTestId('layer-tracks').getByRole('radio').isChecked());
+    assert.ok(difference(await glimpse(page), before) > 0.05);
+    await then_rest(page, () => page.keyboard.press('m'));
+    assert.ok(await page.getByTestId('layer-rgb').getByRole('radio').isChecked());
+    assert.ok(difference(await glimpse(page), before) < 0.05);
+    await page.context().close();
+  });
+
   test('a drag turns the view, reset takes it back, and latency is measured', async () => {
     const { page } = await open(browser, served.address);
     const start = await glimpse(page);
