@@ -13,6 +13,7 @@
 #include "train/bodies.h"
 #include "train/common_view.h"
 #include "train/sightings.h"
+#include "train/true_poses.h"
 
 namespace traceflow {
 
@@ -122,6 +123,15 @@ Vec2<float> robust_range(std::vector<float> values) {
   std::sort(values.begin(), values.end());
   const size_t cut = values.size() / 200;
   return {values[cut], values[values.size() - 1 - cut]};
+}
+
+void take_true_poses(const Capture& capture, Scene& scene) {
+  const std::optional<MotionTruth> truth = load_motion_truth(capture);
+  if (!truth) {
+    throw InputError(capture.folder.string(), "truth/motion", "none", "the true motion",
+                     "leave deform.track.true_poses off");
+  }
+  if (scene.main_motion) set_true_poses(*truth, capture.normalisation, scene.main, *scene.main_motion);
 }
 
 }  // namespace
@@ -265,6 +275,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
     if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
   }
   if (finds_bodies) scene.main_motion = find_bodies(capture, scene.main);
+  if (options.deform.track.true_poses) take_true_poses(capture, scene);
   if (options.deform.main)
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
 

@@ -180,6 +180,7 @@ struct TrackOptions {
   float silhouette = 0.5F;
   float normal = 0.3F;
   float colour = 0.3F;
+  bool true_poses = false;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -194,6 +195,8 @@ struct TrackOptions {
     v.field("normal", normal, "", "Weight of the residual of normals.");
     v.field("colour", colour, "",
             "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
+    v.field("true_poses", true_poses, "",
+            "Take poses from the capture's true motion: the bound of what following can find, for tests.");
   }
   void validate() const;
 };

@@ -213,8 +213,9 @@ LossTerms Trainer::step() {
   FrameRequest request = request_for(view);
   request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);
-  trainable.main_motion = trainable.main && scene_.main_motion && !now.goes_on;
-  trainable.main_nodes = trainable.main_motion && scene_.main_nodes;
+  const bool bodies_move = trainable.main && scene_.main_motion && !now.goes_on;
+  trainable.main_motion = bodies_move && !options_.deform.track.true_poses;
+  trainable.main_nodes = bodies_move && scene_.main_nodes;
   // Gradients through reflections hold back the rotation of a body, so it is followed without them.
   if (now.goes_on) {
     request.specular = false;

@@ -29,6 +29,7 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
 }
 
 void Trainer::follow_again() {
+  if (options_.deform.track.true_poses) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
@@ -40,6 +41,7 @@ void Trainer::follow_again() {
 }
 
 void Trainer::follow(int64_t key) {
+  if (options_.deform.track.true_poses) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;

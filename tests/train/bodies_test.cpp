@@ -10,6 +10,7 @@
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "ops/motion/nodes.h"
+#include "support/refusal.h"
 #include "train/initialise.h"
 #include "train/small_run.h"
 #include "train/tracker.h"
@@ -166,6 +167,47 @@ TEST(Tracker, FollowsBodiesFromTimeToTime) {
               0.6 * rotation_angle_deg(expected.rotation))
         << body;
   }
+}
+
+// Poses from the truth carry each true point where it truly is, before the first iteration and after the last.
+TEST(TruePoses, CarryTruePointsAndStay) {
+  const Tumbling at;
+  const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
+  TrainOptions options = preset("cpu");
+  options.iterations = 60;
+  options.initial.max_points = options.density.max_surfels = 1500;
+  options.environment_density.max_surfels = 400;
+  options.deform.track.map_each = 1;
+  options.deform.track.true_poses = true;
+  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "true_poses");
+  const auto farthest_miss = [&] {
+    const Motion& motion = *trainer.scene().main_motion;
+    double most = 0;
+    for (const int32_t body : {0, 1}) {
+      const int32_t thing = thing_of(at, *truth, body);
+      const auto from = true_points(at.capture, *truth, thing, 0);
+      const Vec3<double> centre = load3<double>(motion.centre.row(body));
+      for (int64_t key = 0; key < motion.keys(); ++key) {
+        const auto to = true_points(at.capture, *truth, thing, key);
+        const Vec3<double> shift = load3<double>(&motion.shift(body, key, 0));
+        const Mat3<double> turn = rotation_from_quaternion(load4<double>(&motion.rotation(body, key, 0)));
+        for (size_t i = 0; i < from.size(); ++i)
+          most = std::max(most, length(turn * (from[i] - centre) + centre + shift - to[i]));
+      }
+    }
+    return most;
+  };
+  EXPECT_LT(farthest_miss(), 1e-4 * at.capture.extent);
+  while (trainer.iteration() < options.iterations) trainer.step();
+  EXPECT_LT(farthest_miss(), 1e-4 * at.capture.extent);
+
+  const fs::path bare = fs::path(::testing::TempDir()) / ("bare_" + std::to_string(::getpid()));
+  fs::copy(tumbling(), bare, fs::copy_options::recursive);
+  fs::remove_all(bare / "truth");
+  const Capture without = load_capture(bare, {});
+  Random random(1);
+  EXPECT_NE(refusal_of([&] { initial_scene(without, options, random); }).find("truth/motion"),
+            std::string::npos);
 }
 
 // While bodies are followed nothing is mirrored and nothing multiplies; behind that everything trains.
