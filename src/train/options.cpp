@@ -84,7 +84,6 @@ TrainOptions cpu_preset() {
 
 TrainOptions demo_preset() {
   TrainOptions o = cpu_preset();
-  o.deform.kind = "network";  // the boxes that turn in its capture are in no mask
   o.iterations = 6000;
   o.density.max_surfels = 16000;
   o.initial.max_points = 8000;

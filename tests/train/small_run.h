@@ -34,6 +34,7 @@ inline const fs::path& capture_folder() {
 
 inline TrainOptions small_run(int iterations) {
   TrainOptions o = preset("demo");
+  o.deform.kind = "network";
   o.iterations = iterations;
   o.schedule.length = 40;
   o.schedule.deform_from = 4;
