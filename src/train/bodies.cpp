@@ -10,6 +10,7 @@
 
 #include "base/parallel.h"
 #include "ops/motion/motion.h"
+#include "scene/neighbours.h"
 
 namespace traceflow {
 
@@ -150,6 +151,32 @@ Tensor<uint8_t> widened(const Tensor<uint8_t>& mask, int64_t margin) {
     }
   }
   return wide;
+}
+
+// Takes marks away until most neighbours of every marked point are marked too. The surface of a thing of its
+// own has no rim and stays; scattered marks go, and a part of a larger surface, as a shadow marks, goes from
+// its rim inwards.
+void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
+  constexpr int neighbours = 16;
+  constexpr double share = 0.6;
+  if (points.dim(0) == 0) return;
+  const Tensor<int32_t> nearest = nearest_neighbours(points, neighbours).index;
+  for (bool changes = true; changes;) {
+    changes = false;
+    const std::vector<char> before = marked;
+    for (int64_t i = 0; i < points.dim(0); ++i) {
+      char& mark = marked[static_cast<size_t>(i)];
+      if (mark == 0) continue;
+      int around = 0;
+      for (int k = 0; k < neighbours; ++k) {
+        const int32_t other = nearest(i, k);
+        around += other >= 0 ? before[static_cast<size_t>(other)] : 0;
+      }
+      if (around >= share * neighbours) continue;
+      mark = 0;
+      changes = true;
+    }
+  }
 }
 
 }  // namespace
@@ -314,11 +341,22 @@ int64_t mark_still(const Unrest& unrest, Surfels& surfels) {
   const auto middle = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / 2);
   std::nth_element(seen.begin(), middle, seen.end());
   const double most = std::max(least, medians * *middle);
+
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    if (surfels.body[i] < 0) rows.push_back(i);
+  }
+  Tensor<float> points({static_cast<int64_t>(rows.size()), 3});
+  std::vector<char> moves(rows.size());
+  for (size_t k = 0; k < rows.size(); ++k) {
+    store3(points.row(static_cast<int64_t>(k)), load3<float>(surfels.position.row(rows[k])));
+    moves[k] = off[static_cast<size_t>(rows[k])] > most ? 1 : 0;
+  }
+  keep_things(points, moves);
   int64_t still = 0;
-  for (size_t i = 0; i < off.size(); ++i) {
-    int32_t& body = surfels.body[static_cast<int64_t>(i)];
-    if (body >= 0 || off[i] > most) continue;
-    body = stands_still;
+  for (size_t k = 0; k < rows.size(); ++k) {
+    if (moves[k] != 0) continue;
+    surfels.body[rows[k]] = stands_still;
     ++still;
   }
   return still;

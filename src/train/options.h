@@ -176,6 +176,7 @@ struct TrackOptions {
   int steps = 8;
   int again = 3;
   int window = 10;
+  int rounds = 4;
   float blur = 2;
   float silhouette = 0.5F;
   float normal = 0.3F;
@@ -190,6 +191,9 @@ struct TrackOptions {
     v.field("steps", steps, "", "Gauss-Newton steps for the poses of a new time.");
     v.field("again", again, "times", "Recent times whose poses are solved again before each new one.");
     v.field("window", window, "times", "How far back these lie at most.");
+    v.field(
+        "rounds", rounds, "",
+        "All poses are solved again at the end of each of so many parts of the run, depths held; 0: not.");
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");

@@ -9,6 +9,7 @@
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "ops/deform/deform.h"
+#include "ops/motion/nodes.h"
 #include "ops/raster/body_jacobian.h"
 
 namespace traceflow {
@@ -207,8 +208,8 @@ void add_normal_equations(const Tensor<float>& residuals, const Tensor<float>& j
 
 }  // namespace
 
-PoseSolver::PoseSolver(const Surfels& main, Motion& motion, int64_t key, const raster::Options& options,
-                       std::vector<TrackTarget> targets)
+PoseSolver::PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key,
+                       const raster::Options& options, std::vector<TrackTarget> targets)
     : main_(main),
       motion_(motion),
       key_(key),
@@ -225,6 +226,7 @@ PoseSolver::PoseSolver(const Surfels& main, Motion& motion, int64_t key, const r
   options_.low_pass = options_.low_pass && std::none_of(targets_.begin(), targets_.end(),
                                                         [](const TrackTarget& t) { return t.is_shrunk; });
   deform::forward(main, nullptr, motion.time[key], {}, 0, field::Precision::fp32, still_, nullptr);
+  if (nodes != nullptr) nodes::forward(*nodes, main.body, motion.time[key], {}, still_, *nodes::make_saved());
   // The rasteriser's tint is then the silhouette.
   still_.tint.resize({main.count()});
   for (int64_t i = 0; i < main.count(); ++i) still_.tint[i] = main.body[i] >= 0 ? 1.0F : 0.0F;
@@ -308,7 +310,7 @@ const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& wei
 }
 
 std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, double damping,
-                                     double& cost) {
+                                     bool depth_is_held, double& cost) {
   std::vector<double> a(params_ * params_), b(params_);
   cost = 0;
   for (size_t k = 0; k < targets_.size(); ++k) {
@@ -326,12 +328,27 @@ std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, 
     b[p] *= unit(p);
   }
   for (size_t p = 0; p < params_; ++p) a[p * params_ + p] += relative_damping * a[p * params_ + p] + damping;
+  if (depth_is_held && targets_.size() == 1) hold_depth(a);
   std::vector<double> found = solve_symmetric(a, b);
   for (size_t p = 0; p < params_; ++p) {
     const double most = p % pose_size < 3 ? most_turn : most_shift;
     found[p] = std::clamp(found[p], -most, most) * unit(p);
   }
   return found;
+}
+
+void PoseSolver::hold_depth(std::vector<double>& matrix) const {
+  constexpr double stiffness = 1e3;  // beside what pictures tell
+  const Vec3<double> eye(targets_[0].camera.position);
+  for (size_t body = 0; body < radius_.size(); ++body) {
+    const Vec3<double> ray = normalize(load3<double>(pivot_.row(static_cast<int64_t>(body))) - eye);
+    const size_t shift = pose_size * body + 3;
+    const auto at = [&](size_t p, size_t q) -> double& { return matrix[(shift + p) * params_ + shift + q]; };
+    const double weight = stiffness * (at(0, 0) + at(1, 1) + at(2, 2));
+    for (size_t p = 0; p < 3; ++p) {
+      for (size_t q = 0; q < 3; ++q) at(p, q) += weight * ray[static_cast<int>(p)] * ray[static_cast<int>(q)];
+    }
+  }
 }
 
 // Turns and shifts the bodies: by ω (left) and s for each.
@@ -347,13 +364,13 @@ void PoseSolver::take(const std::vector<double>& step) {
   pose();
 }
 
-void PoseSolver::solve(const TrackWeights& weights, int steps, double first_blur) {
+void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
   if (targets_.empty()) return;
   weigh_colour(weights);
-  for (int k = 0; k < steps; ++k) {
-    const double sigma = first_blur * std::pow(blur_falls, k);
+  for (int k = 0; k < steps.count; ++k) {
+    const double sigma = steps.blur * std::pow(blur_falls, k);
     double before = 0;
-    std::vector<double> found = step(weights, sigma, least_damping, before);
+    std::vector<double> found = step(weights, sigma, least_damping, steps.hold_depth, before);
     const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
     bool better = false;
     for (int attempt = 0; attempt < tries && !better; ++attempt) {
@@ -380,7 +397,7 @@ std::vector<Vec3<double>> PoseSolver::turns_by_colour() {
   weigh_colour(colour);
   for (int k = 0; k < steps; ++k) {
     double cost = 0;
-    take(step(colour, sigma, damping, cost));
+    take(step(colour, sigma, damping, false, cost));
   }
   std::vector<Vec3<double>> turns;
   for (int64_t b = 0; b < motion_.bodies(); ++b) {

@@ -6,6 +6,7 @@
 #include "math/camera.h"
 #include "ops/motion/motion.h"
 #include "ops/raster/raster.h"
+#include "scene/nodes.h"
 #include "scene/surfels.h"
 
 namespace traceflow {
@@ -26,20 +27,26 @@ struct TrackWeights {
   std::vector<float> colour;  // of each body
 };
 
+// How poses are solved.
+struct PoseSteps {
+  int count = 0;
+  double blur = 0;          // of the first step, pixels; 0.7 of it at each step that follows
+  bool hold_depth = false;  // bodies stay as far away as they are, where one camera sees them
+};
+
 // Gauss–Newton on the poses of all bodies at one key of a motion, six numbers a body, on pictures of that
 // time. On the CPU; the same bytes at any thread count.
 class PoseSolver {
  public:
-  // Keeps references. options: how pictures are drawn.
-  PoseSolver(const Surfels& main, Motion& motion, int64_t key, const raster::Options& options,
-             std::vector<TrackTarget> targets);
+  // Keeps references. nodes: null where bodies are rigid. options: how pictures are drawn.
+  PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key,
+             const raster::Options& options, std::vector<TrackTarget> targets);
 
   // Turns each target's priors, in the camera's axes, so that those of what stands still agree with the
   // model.
   void turn_priors();
-  // Steps on blurred residuals, blur in pixels, 0.7 of it at each step that follows; each step is taken where
-  // the cost falls, else shorter ones are tried.
-  void solve(const TrackWeights& weights, int steps, double first_blur);
+  // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
+  void solve(const TrackWeights& weights, const PoseSteps& steps);
   // How colour alone would turn the bodies from where they are, which stay there: ω of each, radians.
   std::vector<Vec3<double>> turns_by_colour();
 
@@ -54,7 +61,10 @@ class PoseSolver {
   // at: of a target. sigma: of the blur, pixels. Until the next call.
   const Residuals& look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
   // The step that a view of all targets asks for, limited; the cost where they stand.
-  std::vector<double> step(const TrackWeights& weights, double sigma, double damping, double& cost);
+  std::vector<double> step(const TrackWeights& weights, double sigma, double damping, bool depth_is_held,
+                           double& cost);
+  // Adds to the normal equations' matrix, of shifts in radii, what keeps bodies as far from the camera.
+  void hold_depth(std::vector<double>& matrix) const;
   void take(const std::vector<double>& step);
 
   const Surfels& main_;

@@ -94,14 +94,15 @@ TrackTarget Tracker::target_of(const View& view) const {
   return target;
 }
 
-PoseSolver Tracker::solver(const Surfels& main, Motion& motion, int64_t key, float extent) const {
+PoseSolver Tracker::solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key,
+                           float extent) const {
   std::vector<TrackTarget> targets;
   for (const View& view : capture_.train) {
     if (view.time != motion.time[key]) continue;
     TrackTarget target = target_of(view);
     if (!target.coverage.empty()) targets.push_back(std::move(target));
   }
-  PoseSolver solver(main, motion, key, render_.raster_options(extent), std::move(targets));
+  PoseSolver solver(main, nodes, motion, key, render_.raster_options(extent), std::move(targets));
   solver.turn_priors();
   return solver;
 }
@@ -113,16 +114,16 @@ TrackWeights Tracker::weights(const Motion& motion, const ColourTrust& trust) co
   return weights;
 }
 
-void Tracker::solve(const Surfels& main, Motion& motion, int64_t key, float extent, int steps, double blur,
-                    const ColourTrust& trust) const {
-  solver(main, motion, key, extent).solve(weights(motion, trust), steps, blur);
+void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
+                    const PoseSteps& steps, const ColourTrust& trust) const {
+  solver(main, nodes, motion, key, extent).solve(weights(motion, trust), steps);
 }
 
 void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,
                      ColourTrust& trust) const {
   predict(motion, key);
-  PoseSolver solver = this->solver(main, motion, key, extent);
-  solver.solve(weights(motion, {}), options_.steps, options_.blur);
+  PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
+  solver.solve(weights(motion, {}), {options_.steps, options_.blur});
   if (options_.colour == 0) return;
   if (trust.turned.empty()) {
     trust.turned.reset({motion.bodies()});
@@ -137,7 +138,7 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   constexpr double little_blur = 1;  // pixels
   const TrackWeights all = weights(motion, trust);
   const bool any = std::any_of(all.colour.begin(), all.colour.end(), [](float weight) { return weight > 0; });
-  if (any) solver.solve(all, options_.steps / 2, little_blur);
+  if (any) solver.solve(all, {options_.steps / 2, little_blur});
 }
 
 }  // namespace traceflow

@@ -35,13 +35,13 @@ class Tracker {
   // Predicts and finds the poses of a new key, and learns whether colour is to be trusted. main, motion: on
   // the CPU.
   void follow(const Surfels& main, Motion& motion, int64_t key, float extent, ColourTrust& trust) const;
-  // Finds the poses of a key from where they are. blur: of the first step, pixels.
-  void solve(const Surfels& main, Motion& motion, int64_t key, float extent, int steps, double blur,
-             const ColourTrust& trust) const;
+  // Finds the poses of a key from where they are. nodes: null where bodies are rigid.
+  void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
+             const PoseSteps& steps, const ColourTrust& trust) const;
 
  private:
   TrackTarget target_of(const View& view) const;
-  PoseSolver solver(const Surfels& main, Motion& motion, int64_t key, float extent) const;
+  PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent) const;
   TrackWeights weights(const Motion& motion, const ColourTrust& trust) const;
 
   TrackOptions options_;

@@ -154,7 +154,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
-      before_step_{random_, views_, -1, {}, {}, {}} {
+      before_step_{random_, views_, -1, {}, {}, {}, {}} {
   density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
@@ -202,12 +202,7 @@ const View& Trainer::draw_view() {
 LossTerms Trainer::step() {
   density_changes_.clear();
   const Tracking now = tracking(iteration_);
-  if (now.enters && now.goes_on) follow(now.key);
-  constexpr int64_t strays_every = 5;  // times
-  if (now.enters && !now.goes_on) follow_again();
-  if (now.enters && (now.key % strays_every == 0 || !now.goes_on)) let_strays_go(now.key);
-  if (now.enters && !now.goes_on) let_stand();
-  if (now.enters && !now.goes_on && options_.deform.bend.nodes > 0) let_bend();
+  follow_bodies(now);
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
@@ -375,9 +370,10 @@ std::string Trainer::tell_iteration() {
     tell_measured();
     stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
-  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}};
-  if (tracking(iteration_).enters) {
+  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}, {}};
+  if (const Tracking now = tracking(iteration_); now.enters || now.refines) {
     before_step_.motion = scene_.main_motion;
+    before_step_.nodes = scene_.main_nodes;
     before_step_.body = scene_.main.body;
     before_step_.colour_trust = colour_trust_;
   }
@@ -521,7 +517,7 @@ void Trainer::step_back() {
     views_ = before_step_.views;
     if (before_step_.motion) {
       scene_.main_motion = before_step_.motion;
-      scene_.main_nodes.reset();
+      scene_.main_nodes = before_step_.nodes;
       scene_.main.body = before_step_.body;
       colour_trust_ = before_step_.colour_trust;
     }

@@ -79,14 +79,18 @@ class Trainer {
   Scene begin(InitialScene made);
   // Where the run is while bodies are tracked (deform.kind = nodes).
   struct Tracking {
-    bool goes_on;  // the film has not been followed to its end
-    bool enters;   // this iteration begins with a new time
-    int64_t key;   // the newest time
+    bool goes_on = false;  // the film has not been followed to its end
+    bool enters = false;   // this iteration begins with a new time
+    bool refines = false;  // this iteration begins with all poses solved again, depths held
+    int64_t key = 0;       // the newest time
   };
   Tracking tracking(int iteration) const;
+  // What an iteration does to bodies before it trains.
+  void follow_bodies(const Tracking& now);
   // Follows bodies to a new time.
   void follow(int64_t key);
-  // Finds the poses of all times but the first again, when the film has been followed to its end.
+  // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
+  // get better.
   void follow_again();
   // What lies behind a body may have been taken for a part of it: the times up to this one tell.
   void let_strays_go(int64_t key);
@@ -133,8 +137,9 @@ class Trainer {
     Random random;
     ViewOrder views;
     int iteration;
-    // As the step found them, where it follows bodies to a new time.
+    // As the step found them, where it solves poses.
     std::optional<Motion> motion;
+    std::optional<Nodes> nodes;
     Tensor<int32_t> body;
     ColourTrust colour_trust;
   };

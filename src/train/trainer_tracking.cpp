@@ -17,15 +17,31 @@ constexpr double little_blur = 0.35;
 }  // namespace
 
 Trainer::Tracking Trainer::tracking(int iteration) const {
-  if (!scene_.main_motion) return {false, false, 0};
+  if (!scene_.main_motion) return {};
   const TrackOptions& track = options_.deform.track;
   constexpr int least_share = 8;  // of a run, for the warm-up
   const int64_t keys = scene_.main_motion->keys();
   const int since = iteration - std::min(track.warm_up, options_.iterations / least_share);
-  if (since < 0) return {true, false, 0};
+  if (since < 0) return {.goes_on = true};
   const int64_t key = 1 + since / track.map_each;
-  if (key >= keys) return {false, key == keys && since % track.map_each == 0, keys - 1};
-  return {true, since % track.map_each == 0, key};
+  if (key < keys) return {.goes_on = true, .enters = since % track.map_each == 0, .key = key};
+  Tracking now{.enters = key == keys && since % track.map_each == 0, .key = keys - 1};
+  if (track.rounds == 0 || now.enters) return now;
+  // What was followed a moment ago is not known better yet.
+  const int part = std::max(1, options_.iterations / track.rounds);
+  const int64_t followed = iteration - since + (keys - 1) * track.map_each;
+  now.refines = iteration % part == 0 && 2 * (iteration - followed) >= part;
+  return now;
+}
+
+void Trainer::follow_bodies(const Tracking& now) {
+  constexpr int64_t strays_every = 5;  // times
+  const bool has_come_to_the_end = now.enters && !now.goes_on;
+  if (now.enters && now.goes_on) follow(now.key);
+  if (now.refines || has_come_to_the_end) follow_again();
+  if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);
+  if (has_come_to_the_end) let_stand();
+  if (has_come_to_the_end && options_.deform.bend.nodes > 0) let_bend();
 }
 
 void Trainer::follow_again() {
@@ -34,9 +50,11 @@ void Trainer::follow_again() {
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
-  const int64_t last = motion.keys() - 1;
-  for (int64_t key = 0; key <= last; ++key)
-    tracker.solve(main, motion, key, scene_.extent, few_steps, little_blur * track.blur, colour_trust_);
+  std::optional<Nodes> nodes;
+  if (scene_.main_nodes) nodes = scene_.main_nodes->on(Device::cpu);
+  const PoseSteps steps{few_steps, little_blur * track.blur, tracking(iteration_).refines};
+  for (int64_t key = 0; key < motion.keys(); ++key)
+    tracker.solve(main, nodes ? &*nodes : nullptr, motion, key, scene_.extent, steps, colour_trust_);
   scene_.main_motion = motion.on(device_);
 }
 
@@ -47,12 +65,14 @@ void Trainer::follow(int64_t key) {
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
   if (key == 1)
-    tracker.solve(main, motion, 0, scene_.extent, track.steps, little_blur * track.blur, colour_trust_);
+    tracker.solve(main, nullptr, motion, 0, scene_.extent, {track.steps, little_blur * track.blur},
+                  colour_trust_);
   if (key > 2) {
     const int64_t oldest = std::max<int64_t>(0, key - track.window);
     for (int k = 0; k < track.again; ++k) {
       const int64_t at = oldest + static_cast<int64_t>(random_.below(static_cast<int64_t>(key - oldest)));
-      tracker.solve(main, motion, at, scene_.extent, few_steps, little_blur * track.blur, colour_trust_);
+      tracker.solve(main, nullptr, motion, at, scene_.extent, {few_steps, little_blur * track.blur},
+                    colour_trust_);
     }
   }
   tracker.follow(main, motion, key, scene_.extent, colour_trust_);

@@ -169,7 +169,8 @@ TEST(Tracker, FollowsBodiesFromTimeToTime) {
   }
 }
 
-// Poses from the truth carry each true point where it truly is, before the first iteration and after the last.
+// Poses from the truth carry each true point where it truly is, before the first iteration and after the
+// last.
 TEST(TruePoses, CarryTruePointsAndStay) {
   const Tumbling at;
   const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
@@ -247,7 +248,7 @@ TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
     set_threads(threads);
     Motion motion = *at.scene.main_motion;
     Tracker::predict(motion, 1);
-    tracker.solve(at.scene.main, motion, 1, at.scene.extent, 3, options.blur, {});
+    tracker.solve(at.scene.main, nullptr, motion, 1, at.scene.extent, {3, options.blur}, {});
     found.insert({motion.rotation.values().begin(), motion.rotation.values().end()});
   }
   set_threads(0);
@@ -353,7 +354,9 @@ TEST(Bodies, WhatThePicturesMissIsLeftToTheField) {
     for (int64_t x = 20; x < 40; ++x) colour(y, x, 1) = 0.3F;
   }
   images.mask(30, 30) = 1;
-  // Two pixels between neighbours, a second wall behind the first.
+  colour(60, 60, 1) = 1.5F;  // a few surfels of the wall alone
+  // Two pixels between neighbours, a second wall behind the first, and a thing before it that the pictures
+  // miss.
   constexpr int side = size / 2 - 1;
   Surfels wall;
   wall.position.reset({2 * side * side, 3});
@@ -362,7 +365,8 @@ TEST(Bodies, WhatThePicturesMissIsLeftToTheField) {
   const auto pixel_of = [](int64_t i) { return 2 + 2 * (i % (side * side) % side); };
   const auto row_of = [](int64_t i) { return 2 + 2 * (i % (side * side) / side); };
   for (int64_t i = 0; i < wall.position.dim(0); ++i) {
-    const float z = i < side * side ? 2.0F : 3.0F;
+    const bool in_square = pixel_of(i) >= 20 && pixel_of(i) < 40 && row_of(i) >= 20 && row_of(i) < 40;
+    const float z = i >= side * side ? 3.0F : in_square ? 1.5F : 2.0F;
     store3(wall.position.row(i), z / size *
                                      Vec3<float>(static_cast<float>(pixel_of(i)) + 0.5F - size / 2.0F,
                                                  static_cast<float>(row_of(i)) + 0.5F - size / 2.0F, size));

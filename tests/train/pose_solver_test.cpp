@@ -90,7 +90,7 @@ TEST(PoseSolver, ColourTakesBackTheTurnOfAMirrorAndNotOfATexture) {
   for (const bool mirrors : {false, true}) {
     Motion motion = turned_by(true_turn);
     const Tensor<float> rotation = motion.rotation;
-    PoseSolver solver(surfels, motion, 0, {}, {picture_of(surfels, true_turn, mirrors)});
+    PoseSolver solver(surfels, nullptr, motion, 0, {}, {picture_of(surfels, true_turn, mirrors)});
     const Vec3<double> turn = solver.turns_by_colour()[0];
     const Vec3<double> expected = mirrors ? -true_turn : Vec3<double>(0);
     EXPECT_LT(length(turn - expected), 0.2 * length(true_turn)) << mirrors;
@@ -103,11 +103,28 @@ TEST(PoseSolver, ABallIsSeenToTurnByItsColourAlone) {
   const Surfels surfels = ball();
   for (const float colour : {0.0F, 1.0F}) {
     Motion motion = turned_by(Vec3<double>(0));
-    PoseSolver solver(surfels, motion, 0, {}, {picture_of(surfels, true_turn, false)});
-    solver.solve({0.5F, 0.3F, {colour}}, 8, 2);
+    PoseSolver solver(surfels, nullptr, motion, 0, {}, {picture_of(surfels, true_turn, false)});
+    solver.solve({0.5F, 0.3F, {colour}}, {8, 2});
     const Vec3<double> found = quaternion_log(unit_quaternion(load4<double>(&motion.rotation(0, 0, 0))));
     const Vec3<double> expected = colour > 0 ? true_turn : Vec3<double>(0);
     EXPECT_LT(length(found - expected), 0.2 * length(true_turn)) << colour;
+  }
+}
+
+// A ball that is too far away and beside its place comes back to both, or with its depth held to its place
+// beside alone.
+TEST(PoseSolver, HoldsTheDepthAndNothingElse) {
+  const Surfels surfels = ball();
+  const Vec3<double> ray = normalize(centre + Vec3<double>(0.06, 0, 0.2));
+  for (const bool holds : {false, true}) {
+    Motion motion = turned_by(Vec3<double>(0));
+    store3(&motion.shift(0, 0, 0), Vec3<double>(0.06, 0, 0.2));
+    PoseSolver solver(surfels, nullptr, motion, 0, {}, {picture_of(surfels, Vec3<double>(0), false)});
+    solver.solve({0.5F, 0.3F, {0.0F}}, {20, 4, holds});
+    const Vec3<double> shift = load3<double>(&motion.shift(0, 0, 0));
+    const double along = dot(centre + shift, ray) - dot(centre, ray);
+    EXPECT_NEAR(along, holds ? dot(Vec3<double>(0.06, 0, 0.2), ray) : 0.0, holds ? 0.005 : 0.03);
+    EXPECT_LT(std::abs(shift.x), 0.02) << holds;
   }
 }
 
