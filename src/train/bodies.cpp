@@ -153,9 +153,8 @@ Tensor<uint8_t> widened(const Tensor<uint8_t>& mask, int64_t margin) {
   return wide;
 }
 
-// Takes marks away until most neighbours of every marked point are marked too. The surface of a thing of its
-// own has no rim and stays; scattered marks go, and a part of a larger surface, as a shadow marks, goes from
-// its rim inwards.
+// Removes a mark while too few of the point's neighbours are marked. The surface of a separate object keeps
+// its marks; scattered ones go, and a part of a larger surface, as a shadow marks, shrinks from its edge.
 void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
   constexpr int neighbours = 16;
   constexpr double share = 0.6;

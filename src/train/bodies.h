@@ -33,9 +33,8 @@ struct Unrest {
   void look(const Surfels& main, const View& view, const ViewImages& images, const Tensor<float>& colour,
             const Tensor<float>& alpha, const Tensor<float>& depth);
 };
-// Marks those that stand still: whose pictures are no farther off than three times the median, or 0.1, and
-// those of which fewer than ten of the 16 nearest neighbours move: they are no thing of their own.
-// Returns how many there are. Runs on the CPU.
+// Marks the surfels that stand still: those whose pictures are no farther off than three times the median or
+// 0.1, and those of whose 16 nearest neighbours fewer than ten move. Returns their number. On the CPU.
 int64_t mark_still(const Unrest& unrest, Surfels& surfels);
 
 }  // namespace traceflow

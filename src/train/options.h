@@ -191,16 +191,15 @@ struct TrackOptions {
     v.field("steps", steps, "", "Gauss-Newton steps for the poses of a new time.");
     v.field("again", again, "times", "Recent times whose poses are solved again before each new one.");
     v.field("window", window, "times", "How far back these lie at most.");
-    v.field(
-        "rounds", rounds, "",
-        "All poses are solved again at the end of each of so many parts of the run, depths held; 0: not.");
+    v.field("rounds", rounds, "",
+            "Equal parts of the run, at whose ends all poses are solved again, depths held; 0: never.");
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");
     v.field("colour", colour, "",
             "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
     v.field("true_poses", true_poses, "",
-            "Take poses from the capture's true motion: the bound of what following can find, for tests.");
+            "Take poses from the capture's true motion, for tests: an upper bound for tracking.");
   }
   void validate() const;
 };

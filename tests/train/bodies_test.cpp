@@ -336,8 +336,9 @@ TEST(Tracker, PredictsWhatGoesOnAsBefore) {
   EXPECT_EQ(motion.shift(0, 5, 1), motion.shift(0, 4, 1));
 }
 
-// A wall whose picture is right but for a square: what shows in the square moves. What is hidden, in a mask
-// or of a body does not vote.
+// A wall, and a square before it that the pictures miss: the square moves. What is hidden, in a mask or of a
+// body does not vote; parts of the wall that the pictures miss too stand still, since the wall goes on around
+// them.
 TEST(Bodies, WhatThePicturesMissIsLeftToTheField) {
   constexpr int size = 80;
   View view;
@@ -354,7 +355,10 @@ TEST(Bodies, WhatThePicturesMissIsLeftToTheField) {
     for (int64_t x = 20; x < 40; ++x) colour(y, x, 1) = 0.3F;
   }
   images.mask(30, 30) = 1;
-  colour(60, 60, 1) = 1.5F;  // a few surfels of the wall alone
+  colour(60, 60, 1) = 1.5F;  // a few surfels of the wall
+  for (int64_t y = 10; y < 30; ++y) {
+    for (int64_t x = 50; x < 70; ++x) colour(y, x, 1) = 0.3F;  // a part of the wall, as in a shadow
+  }
   // Two pixels between neighbours, a second wall behind the first, and a thing before it that the pictures
   // miss.
   constexpr int side = size / 2 - 1;
