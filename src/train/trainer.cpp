@@ -12,7 +12,6 @@
 #include "base/version.h"
 #include "files/options_json.h"
 #include "ops/loss/rigidity.h"
-#include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
 #include "scene/scene_file.h"
 #include "train/continuation.h"
@@ -240,7 +239,7 @@ LossTerms Trainer::step() {
 void Trainer::learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable) {
   gradient_.reset(scene_);
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
-  if (scene_.main_motion) motion::hold_first_key(gradient_.main_motion);
+  if (trainable.main_motion) share_among_keys();
   if (trainable.main_nodes) hold_nodes();
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});

@@ -98,6 +98,8 @@ class Trainer {
   void let_stand();
   // Gives bodies nodes, so that they may bend, where silhouettes get worse by much after the first time.
   void let_bend();
+  // Spreads the gradient of poses over times that are near; none at the first.
+  void share_among_keys();
   // Adds to the nodes' gradient what holds them together, and none at the first time.
   void hold_nodes();
   // How far the bodies' silhouettes are off in a view, as a share of the mask's area.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 #include "train/bodies.h"
 #include "train/trainer.h"
@@ -108,6 +109,17 @@ double Trainer::silhouette_misfit(const View& view) {
     area += images->coverage[i];
   }
   return area > 0 ? off / area : 0;
+}
+
+void Trainer::share_among_keys() {
+  // A time is seen once in as many iterations as there are views. Poses that lag or lie too far do so for
+  // long.
+  constexpr float widest = 4;  // keys
+  constexpr float share_of_film = 0.05F;
+  Motion& gradient = gradient_.main_motion;
+  const float width = std::min(widest, share_of_film * static_cast<float>(gradient.keys()));
+  motion::spread_over_keys(*scene_.main_motion, width, gradient);
+  motion::hold_first_key(gradient);
 }
 
 void Trainer::hold_nodes() {

@@ -239,6 +239,31 @@ TEST(Tracker, LeavesReflectionsAndTheNumberOfSurfelsAloneWhileBodiesAreFollowed)
   EXPECT_FALSE(rests());
 }
 
+TEST(Tracker, AViewMovesThePosesOfTimesNearItButNotTheFirst) {
+  const Tumbling at;
+  TrainOptions options = preset("cpu");
+  options.iterations = 120;
+  options.initial.max_points = options.density.max_surfels = 1500;
+  options.environment_density.max_surfels = 400;
+  options.deform.track.map_each = 1;
+  options.deform.track.steps = options.deform.track.again = 1;
+  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "shared");
+  const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
+  // All poses are solved again at the end of following, and trained from there on.
+  while (trainer.iteration() < options.iterations / 8 + keys) trainer.step();
+  const Motion before = *trainer.scene().main_motion;
+  trainer.step();
+  const Motion& after = *trainer.scene().main_motion;
+  std::vector<int64_t> moved;
+  for (int64_t key = 0; key < keys; ++key) {
+    if (after.shift(0, key, 0) != before.shift(0, key, 0)) moved.push_back(key);
+  }
+  // One view of the step before, whose momentum lasts, and one of this one.
+  EXPECT_GE(moved.size(), 5U);
+  EXPECT_LE(moved.size(), 14U);
+  EXPECT_EQ(std::count(moved.begin(), moved.end(), 0), 0);
+}
+
 TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
   Tumbling at;
   const TrackOptions options;

@@ -1,5 +1,7 @@
 #include "ops/motion/motion.h"
 
+#include <utility>
+
 #include "base/parallel.h"
 #include "ops/motion/motion_kernels.h"
 #include "primitives/sums.h"
@@ -78,6 +80,18 @@ void backward(const Motion& motion, const Tensor<int32_t>& body, float time, con
 void hold_first_key(Motion& gradient) {
   parallel_for(gradient.device(), "motion: hold the first key", gradient.bodies(),
                HoldFirstKey{gradient.keys(), gradient.rotation.data(), gradient.shift.data()});
+}
+
+void spread_over_keys(const Motion& motion, float width, Motion& gradient) {
+  static thread_local Tensor<float> spread;
+  for (Tensor<float>* const numbers : {&gradient.rotation, &gradient.shift}) {
+    spread.place(gradient.device()).resize(numbers->shape());
+    const float* const rotation = numbers == &gradient.rotation ? motion.rotation.data() : nullptr;
+    parallel_for(
+        gradient.device(), "motion: spread over keys", gradient.bodies() * gradient.keys(),
+        SpreadOverKeys{numbers->data(), rotation, gradient.keys(), numbers->dim(2), width, spread.data()});
+    std::swap(*numbers, spread);
+  }
 }
 
 void move(const Motion& motion, const Tensor<int32_t>& body, float time, Surfels& surfels) {

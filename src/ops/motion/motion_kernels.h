@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "math/sh_rotation.h"
@@ -127,6 +128,32 @@ struct HoldFirstKey {
   TRACEFLOW_HD void operator()(int64_t i) const {
     for (int k = 0; k < 4; ++k) rotation[4 * keys * i + k] = 0;
     for (int k = 0; k < 3; ++k) shift[3 * keys * i + k] = 0;
+  }
+};
+
+// i: a body's key.
+struct SpreadOverKeys {
+  const float* from;
+  const float* rotation;  // of the motion, where these are gradients by it; else null
+  int64_t keys, numbers;
+  float width;
+  float* to;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const int64_t key = i % keys, first = i - key;
+    const auto reach = static_cast<int64_t>(3 * width);
+    const int64_t begin = key > reach ? key - reach : 0, end = key + reach < keys ? key + reach + 1 : keys;
+    float* const sum = to + numbers * i;
+    for (int64_t k = 0; k < numbers; ++k) sum[k] = 0;
+    for (int64_t other = begin; other < end; ++other) {
+      const float distance = static_cast<float>(other - key) / width;
+      float share = std::exp(-0.5F * distance * distance);
+      // q and −q are the same rotation.
+      if (rotation != nullptr &&
+          dot(load4<float>(rotation + 4 * i), load4<float>(rotation + 4 * (first + other))) < 0)
+        share = -share;
+      for (int64_t k = 0; k < numbers; ++k) sum[k] += share * from[numbers * (first + other) + k];
+    }
   }
 };
 

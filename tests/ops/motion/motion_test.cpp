@@ -158,6 +158,45 @@ TEST(Motion, HoldsTheFirstKeyAndNoOther) {
   }
 }
 
+TEST(Motion, SpreadsAGradientOverKeysAsAGaussian) {
+  constexpr int64_t keys = 30, at = 11;
+  constexpr float width = 2.5F;
+  Motion motion = random_motion(2, keys);
+  for (int64_t key = 0; key < keys; ++key) {
+    for (int k = 0; k < 4; ++k)
+      motion.rotation(1, key, k) = (key % 2 == 0 ? 1.0F : -1.0F) * static_cast<float>(k + 1);
+  }
+  Motion gradient = zeros_like<float>(motion);
+  gradient.shift(0, at, 1) = 2;
+  gradient.rotation(1, at, 3) = 5;
+  motion::spread_over_keys(motion, width, gradient);
+  for (int64_t key = 0; key < keys; ++key) {
+    const double distance = static_cast<double>(key - at);
+    const double share = std::abs(distance) > 7 ? 0 : std::exp(-distance * distance / (2.0 * width * width));
+    EXPECT_NEAR(gradient.shift(0, key, 1), 2 * share, 1e-6);
+    // Every second key holds the same rotation as the negative quaternion.
+    EXPECT_NEAR(gradient.rotation(1, key, 3), (key % 2 == at % 2 ? 5 : -5) * share, 1e-6);
+    EXPECT_EQ(gradient.shift(1, key, 1), 0);
+    EXPECT_EQ(gradient.shift(0, key, 0), 0);
+    EXPECT_EQ(gradient.rotation(0, key, 3), 0);
+  }
+}
+
+// Spreading is symmetric, and goes downhill with any gradient.
+TEST(Motion, ASpreadGradientGoesDownhill) {
+  const Motion motion = random_motion(bodies, 25);
+  for (const float width : {0.2F, 1.0F, 4.0F}) {
+    Motion gradient = random_motion(bodies, 25);
+    const Motion before = gradient;
+    motion::spread_over_keys(motion, width, gradient);
+    double along = 0;
+    for (int64_t i = 0; i < before.shift.size(); ++i) along += double{before.shift[i]} * gradient.shift[i];
+    for (int64_t i = 0; i < before.rotation.size(); ++i)
+      along += double{before.rotation[i]} * gradient.rotation[i];
+    EXPECT_GT(along, 0) << width;
+  }
+}
+
 TEST(Motion, IsTheSameBytesAtAnyThreadCount) {
   const Motion motion = random_motion(bodies, 4);
   const PosedSurfels posed = random_posed(9000, 2);

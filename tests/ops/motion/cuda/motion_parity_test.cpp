@@ -24,6 +24,15 @@ TEST_F(MotionOnDevice, AgreesWithTheCpu) {
   }
 }
 
+TEST_F(MotionOnDevice, SpreadsGradientsAsTheCpu) {
+  const Motion motion = random_motion(2, 25);
+  Motion here = random_motion(2, 25), there = here.on(Device::cuda);
+  motion::spread_over_keys(motion, 2.5F, here);
+  motion::spread_over_keys(motion.on(Device::cuda), 2.5F, there);
+  expect_close(there.rotation.on(Device::cpu), here.rotation, 1e-5, "rotation");
+  expect_close(there.shift.on(Device::cpu), here.shift, 1e-5, "shift");
+}
+
 TEST_F(MotionOnDevice, BendsAsTheCpu) {
   const Nodes nodes = random_nodes(7, 2, 4);
   const PosedSurfels posed = random_posed(700, 1);
