@@ -112,8 +112,7 @@ double Trainer::silhouette_misfit(const View& view) {
 }
 
 void Trainer::share_among_keys() {
-  // A time is seen once in as many iterations as there are views. Poses that lag or lie too far do so for
-  // long.
+  // Errors of poses last over many keys, and a view tells only that of its own time.
   constexpr float widest = 4;  // keys
   constexpr float share_of_film = 0.05F;
   Motion& gradient = gradient_.main_motion;

@@ -212,14 +212,20 @@ TEST(TruePoses, CarryTruePointsAndStay) {
 }
 
 // While bodies are followed nothing is mirrored and nothing multiplies; behind that everything trains.
-TEST(Tracker, LeavesReflectionsAndTheNumberOfSurfelsAloneWhileBodiesAreFollowed) {
-  const Tumbling at;
+// Few surfels, followed by a step a time.
+TrainOptions little_following() {
   TrainOptions options = preset("cpu");
   options.iterations = 120;
   options.initial.max_points = options.density.max_surfels = 1500;
   options.environment_density.max_surfels = 400;
   options.deform.track.map_each = 1;
   options.deform.track.steps = options.deform.track.again = 1;
+  return options;
+}
+
+TEST(Tracker, LeavesReflectionsAndTheNumberOfSurfelsAloneWhileBodiesAreFollowed) {
+  const Tumbling at;
+  const TrainOptions options = little_following();
   Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "left_alone");
   const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
   const Scene first = trainer.scene();
@@ -241,12 +247,7 @@ TEST(Tracker, LeavesReflectionsAndTheNumberOfSurfelsAloneWhileBodiesAreFollowed)
 
 TEST(Tracker, AViewMovesThePosesOfTimesNearItButNotTheFirst) {
   const Tumbling at;
-  TrainOptions options = preset("cpu");
-  options.iterations = 120;
-  options.initial.max_points = options.density.max_surfels = 1500;
-  options.environment_density.max_surfels = 400;
-  options.deform.track.map_each = 1;
-  options.deform.track.steps = options.deform.track.again = 1;
+  const TrainOptions options = little_following();
   Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "shared");
   const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
   // All poses are solved again at the end of following, and trained from there on.

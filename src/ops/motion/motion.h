@@ -35,9 +35,9 @@ void backward(const Motion& motion, const Tensor<int32_t>& body, float time, con
 // the same; the points that it began with say how large it is as long as its first pose stands.
 void hold_first_key(Motion& gradient);
 
-// Convolves a gradient of `motion` in place with exp(−d²/2w²) along each body's keys, d apart; width w > 0,
-// in keys. A view's gradient is by two keys; errors of poses are alike over many, and steps against a
-// gradient so spread still go downhill.
+// Convolves a gradient of `motion` in place with exp(−d²/2w²), cut off at 3w, along each body's keys, d
+// apart; width w > 0, in keys. A view's gradient is by at most two neighbouring keys, so that a step against
+// the spread one still goes downhill.
 void spread_over_keys(const Motion& motion, float width, Motion& gradient);
 
 // Moves stored surfels in place to where they are at a time. Not differentiable.
