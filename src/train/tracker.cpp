@@ -116,7 +116,9 @@ TrackWeights Tracker::weights(const Motion& motion, const ColourTrust& trust) co
 
 void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
                     const PoseSteps& steps, const ColourTrust& trust) const {
-  solver(main, nodes, motion, key, extent).solve(weights(motion, trust), steps);
+  PoseSteps held = steps;
+  held.hold_depth = steps.hold_depth || key == 0;
+  solver(main, nodes, motion, key, extent).solve(weights(motion, trust), held);
 }
 
 void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,

@@ -265,6 +265,28 @@ TEST(Tracker, AViewMovesThePosesOfTimesNearItButNotTheFirst) {
   EXPECT_EQ(std::count(moved.begin(), moved.end(), 0), 0);
 }
 
+// At the first time bodies turn and shift, but stay as far from the camera as the points say; later ones come
+// nearer or go away.
+TEST(Tracker, KeepsBodiesAtTheirFirstDistance) {
+  const Tumbling at;
+  TrainOptions options = little_following();
+  options.deform.track.steps = 8;
+  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "first_distance");
+  const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
+  const Motion before = *trainer.scene().main_motion;
+  while (trainer.iteration() < options.iterations / 8 + keys) trainer.step();
+  const Motion& after = *trainer.scene().main_motion;
+  const auto changed = [&](int64_t key) {
+    const auto camera = std::ranges::find(at.capture.train, after.time[key], &View::time)->camera;
+    const Vec3<float> centre = load3<float>(before.centre.row(0));
+    const float now = length(centre + load3<float>(&after.shift(0, key, 0)) - camera.position);
+    return std::abs(now / length(centre - camera.position) - 1);
+  };
+  EXPECT_NE(after.shift(0, 0, 0), before.shift(0, 0, 0));
+  EXPECT_LT(changed(0), 1e-3F);
+  EXPECT_GT(changed(keys / 2), 2e-3F);
+}
+
 TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
   Tumbling at;
   const TrackOptions options;
