@@ -35,8 +35,8 @@ class Tracker {
   // Predicts and finds the poses of a new key, and learns whether colour is to be trusted. main, motion: on
   // the CPU.
   void follow(const Surfels& main, Motion& motion, int64_t key, float extent, ColourTrust& trust) const;
-  // Finds the poses of a key from where they are. At the first key bodies stay as far away as they are: the
-  // points say how far. nodes: null where bodies are rigid.
+  // Finds the poses of a key from where they are. At the first key, where one camera sees it, bodies stay as
+  // far from that camera as the points are. nodes: null where bodies are rigid.
   void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
              const PoseSteps& steps, const ColourTrust& trust) const;
 

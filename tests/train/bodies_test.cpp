@@ -265,8 +265,8 @@ TEST(Tracker, AViewMovesThePosesOfTimesNearItButNotTheFirst) {
   EXPECT_EQ(std::count(moved.begin(), moved.end(), 0), 0);
 }
 
-// At the first time bodies turn and shift, but stay as far from the camera as the points say; later ones come
-// nearer or go away.
+// At the first time a body shifts across the picture, and its distance from the camera stays; at a later time
+// the distance changes.
 TEST(Tracker, KeepsBodiesAtTheirFirstDistance) {
   const Tumbling at;
   TrainOptions options = little_following();
