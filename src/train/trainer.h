@@ -169,10 +169,11 @@ class Trainer {
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
-  Neighbours bonds_;          // of the main surfels, for loss.rigidity; empty until wanted
-  Tensor<float> grad_rest_;   // dL/d(stored positions) of that term
-  float cloud_radius_;        // of the capture's points
-  float environment_radius_;  // half the diagonal of the box that the environment began in
+  static constexpr int bonds_each = 8;  // of a surfel
+  Neighbours bonds_;                    // of the main surfels, for loss.rigidity; empty until wanted
+  Tensor<float> grad_rest_;             // dL/d(stored positions) of that term
+  float cloud_radius_;                  // of the capture's points
+  float environment_radius_;            // half the diagonal of the box that the environment began in
   ViewOrder views_;
   Health health_;
   Renderer renderer_;

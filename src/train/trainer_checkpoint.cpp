@@ -1,0 +1,145 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "files/options_json.h"
+#include "scene/scene_file.h"
+#include "train/continuation.h"
+#include "train/trainer.h"
+
+// What a checkpoint holds of a run, and how a run goes on from it.
+namespace traceflow {
+
+namespace {
+
+template <size_t count>
+Tensor<double> row_of(const std::array<double, count>& values) {
+  Tensor<double> row(Shape{static_cast<int64_t>(count)});
+  std::copy(values.begin(), values.end(), row.data());
+  return row;
+}
+
+// A count that the checkpoint holds as metadata.
+int64_t count_in(const Safetensors& file, const std::string& key) {
+  const double value = file.number(key);
+  if (value > 1e9 || value != std::floor(value)) {
+    throw InputError("checkpoint", key, file.text(key), "a whole number up to 1e9");
+  }
+  return static_cast<int64_t>(value);
+}
+
+// each: bonds of a surfel.
+void check_bonds(const Neighbours& bonds, int64_t surfels, int64_t each) {
+  bool fits = bonds.index.shape() == Shape{surfels, each} && bonds.distance2.shape() == bonds.index.shape();
+  for (const int32_t j : bonds.index.values()) fits = fits && j >= -1 && j < surfels;
+  if (!fits) {
+    throw InputError("checkpoint", "bonds", bonds.index.shape().to_string(),
+                     Shape{surfels, each}.to_string());
+  }
+}
+
+}  // namespace
+
+Safetensors Trainer::checkpoint() const {
+  Safetensors file;
+  put_scene(scene_, file);
+  optimiser_.put(file);
+  main_density_.put(file);
+  environment_density_.put(file);
+  if (!bonds_.index.empty()) {
+    file.add("bonds/index", bonds_.index);
+    file.add("bonds/distance2", bonds_.distance2);
+  }
+  if (!colour_trust_.turned.empty()) {
+    file.add("colour_trust/taken_back", colour_trust_.taken_back);
+    file.add("colour_trust/turned", colour_trust_.turned);
+  }
+  file.add("views/order", views_.order());
+  Tensor<int64_t> random(Shape{4});
+  for (size_t i = 0; i < 4; ++i) random[static_cast<int64_t>(i)] = std::bit_cast<int64_t>(random_.state()[i]);
+  file.add("random", random);
+  const Health::State health = health_.state();
+  file.add("health", row_of<3>({health.smoothed, health.best, static_cast<double>(health.steps)}));
+  file.metadata["iteration"] = std::to_string(iteration_);
+  file.metadata["views_next"] = std::to_string(views_.next());
+  file.metadata["options"] = options_to_json(options_);
+  file.metadata["capture"] = capture_.name;
+  file.metadata["capture_folder"] = capture_folder_;
+  file.metadata["environment_radius"] = fmt::format("{}", environment_radius_);
+  put_views(capture_, file);
+  put_caps(memory_.caps, file);
+  put_arithmetic(device_, file);
+  put_version(file);
+  return file;
+}
+
+void Trainer::resume() {
+  std::string note;
+  const Safetensors file = read_checkpoint(run_, note);
+  Scene scene = get_scene(file);
+  check_views(file, scene.normalisation, capture_);
+  scene.move_to(device_);
+  scene_ = std::move(scene);
+  optimiser_ = Optimiser(scene_);
+  optimiser_.get(file);
+  main_density_ = DensityControl("main", options_.density, scene_.main.count(), device_);
+  main_density_.get(file);
+  environment_density_ =
+      DensityControl("environment", options_.environment_density, scene_.environment.count(), device_);
+  environment_density_.get(file);
+  bonds_ = {};
+  if (file.has("bonds/index")) {
+    bonds_ = {file.tensor<int32_t>("bonds/index"), file.tensor<float>("bonds/distance2")};
+    check_bonds(bonds_, scene_.main.count(), bonds_each);
+    bonds_ = bonds_.on(device_);
+  }
+  colour_trust_ = {};
+  if (file.has("colour_trust/turned")) {
+    colour_trust_ = {file.tensor<double>("colour_trust/taken_back"),
+                     file.tensor<double>("colour_trust/turned")};
+    const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
+    if (colour_trust_.turned.shape() != bodies || colour_trust_.taken_back.shape() != bodies)
+      throw InputError("checkpoint", "colour_trust", colour_trust_.turned.shape().to_string(),
+                       bodies.to_string());
+  }
+  views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));
+  const Tensor<int64_t> random = file.tensor<int64_t>("random");
+  const Tensor<double> health = file.tensor<double>("health");
+  if (random.size() != 4 || health.size() != 3) {
+    throw InputError("checkpoint", "random", random.shape().to_string(), "4 words of state");
+  }
+  Random::State state{};
+  for (size_t i = 0; i < 4; ++i) state[i] = std::bit_cast<uint64_t>(random[static_cast<int64_t>(i)]);
+  random_.set_state(state);
+  health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
+  iteration_ = static_cast<int>(count_in(file, "iteration"));
+  seconds_ = file.number("train_seconds");
+  // Drawn with as many surfels as there was memory for then.
+  const bool tells_radius = file.metadata.contains("environment_radius");
+  environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;
+  standing_ = health_.sound() ? Standing::sound : Standing::unsound;
+  keep_caps(file);
+  for (const std::string& other : {other_arithmetic(file, device_), other_version(file)}) {
+    if (!other.empty()) warn(other);
+  }
+  if (note.empty()) return;
+  // Last: a run that is not resumed keeps its files as they are.
+  warn(note);
+  set_damaged_aside(run_);
+}
+
+// What is free now is no measure for a run that began with more, or it would end in other bytes.
+void Trainer::keep_caps(const Safetensors& file) {
+  const std::optional<SurfelCaps> caps = caps_to_keep(file, options_);
+  if (!caps) return;
+  memory_ = with_caps(memory_, {options_, device_, largest_view(capture_)}, *caps);
+  const int64_t available = available_bytes(device_);
+  if (memory_.forecast_bytes <= available) return;
+  const auto mebibytes = [](int64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; };
+  warn("the run may take " + mebibytes(memory_.forecast_bytes) + ", as when it began, and " +
+       mebibytes(available) + " are free now; --memory-budget makes it smaller, and its end another");
+}
+
+}  // namespace traceflow
