@@ -1,5 +1,6 @@
 #include "scene/rows.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "base/parallel.h"
@@ -53,7 +54,13 @@ Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
 
 void append_rows(Surfels& surfels, const Surfels& more) {
   if (more.count() == 0) return;
-  require(surfels.body.empty() && more.body.empty(), "sets that are joined are carried by no bodies", "");
+  require(surfels.body.empty() == more.body.empty(), "bodies carry both sets or neither", "");
+  if (!more.body.empty()) {
+    Tensor<int32_t> body({surfels.count() + more.count()});
+    std::ranges::copy(surfels.body.values(), body.data());
+    std::ranges::copy(more.body.values(), body.data() + surfels.count());
+    surfels.body = std::move(body);
+  }
   std::vector<const Tensor<float>*> added;
   more.for_each([&](const char*, const Tensor<float>& tensor) { added.push_back(&tensor); });
   size_t group = 0;

@@ -130,6 +130,28 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
   return change;
 }
 
+events::DensityChanged DensityControl::add(Surfels& surfels, SurfelMoments& moments, const Surfels& more) {
+  const Device device = surfels.device();
+  RowEdit edit;
+  for (int64_t i = 0; i < surfels.count(); ++i) edit.keep(i);
+  for (int64_t i = 0; i < more.count(); ++i) edit.add(0);
+  const PlacedEdit placed(edit, device);
+  Surfels joined = surfels.on(Device::cpu);
+  append_rows(joined, more);
+  joined = joined.on(device);
+  SurfelMoments joined_moments = moments.edited(placed);
+  Tensor<float> sum = edited_rows(sum_, placed, true), seen = edited_rows(seen_, placed, true);
+  surfels = std::move(joined);
+  moments = std::move(joined_moments);
+  sum_ = std::move(sum);
+  seen_ = std::move(seen);
+  events::DensityChanged change;
+  change.set = set_;
+  change.added = more.count();
+  change.count = surfels.count();
+  return change;
+}
+
 void DensityControl::reset_opacity(Surfels& surfels, SurfelMoments& moments) const {
   const float ceiling = std::log(options_.opacity_reset / (1 - options_.opacity_reset));
   parallel_for(surfels.device(), "density: lower opacity", surfels.count(),

@@ -41,6 +41,9 @@ class DensityControl {
   events::DensityChanged update(Surfels& surfels, SurfelMoments& moments, const DensityLimits& limits,
                                 Random& random);
 
+  // Adds new surfels, which are on the CPU; their statistics and moments start from zero.
+  events::DensityChanged add(Surfels& surfels, SurfelMoments& moments, const Surfels& more);
+
   // Lowers every opacity to at most options.opacity_reset and clears that group's moments.
   void reset_opacity(Surfels& surfels, SurfelMoments& moments) const;
 

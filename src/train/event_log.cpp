@@ -69,6 +69,7 @@ Json to_json(const events::DensityChanged& e) {
           {"set", e.set},
           {"cloned", e.cloned},
           {"split", e.split},
+          {"added", e.added},
           {"pruned_transparent", e.pruned_transparent},
           {"pruned_large", e.pruned_large},
           {"opacity_reset", e.opacity_reset},

@@ -65,6 +65,7 @@ struct DensityChanged {
   std::string set;  // "main" or "environment"
   int64_t cloned = 0;
   int64_t split = 0;
+  int64_t added = 0;  // for surface that came into view
   int64_t pruned_transparent = 0;
   int64_t pruned_large = 0;
   bool opacity_reset = false;

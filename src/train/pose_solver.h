@@ -45,6 +45,9 @@ class PoseSolver {
   // Turns each target's priors, in the camera's axes, so that those of what stands still agree with the
   // model.
   void turn_priors();
+  const std::vector<TrackTarget>& targets() const { return targets_; }
+  // How pictures are drawn.
+  const raster::Options& drawing() const { return options_; }
   // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
   void solve(const TrackWeights& weights, const PoseSteps& steps);
   // How colour alone would turn the bodies from where they are, which stay there: ω of each, radians.

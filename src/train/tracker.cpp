@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "math/rotation_group.h"
+#include "scene/rows.h"
 
 namespace traceflow {
 
@@ -141,6 +142,19 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   const TrackWeights all = weights(motion, trust);
   const bool any = std::any_of(all.colour.begin(), all.colour.end(), [](float weight) { return weight > 0; });
   if (any) solver.solve(all, {options_.steps / 2, little_blur});
+}
+
+Surfels Tracker::new_surface(const Surfels& main, Motion& motion, int64_t key, float extent,
+                             const NewSurfaceStart& start, int64_t limit) const {
+  const PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
+  Surfels all = main;
+  for (const TrackTarget& target : solver.targets()) {
+    const int64_t left = limit - (all.count() - main.count());
+    append_rows(all, traceflow::new_surface(target, motion, key, all, solver.drawing(), start, left));
+  }
+  RowEdit made;
+  for (int64_t i = main.count(); i < all.count(); ++i) made.keep(i);
+  return edited_rows(all, PlacedEdit(made, Device::cpu));
 }
 
 }  // namespace traceflow

@@ -5,6 +5,7 @@
 #include "capture/capture.h"
 #include "render/render_options.h"
 #include "scene/scene.h"
+#include "train/new_surface.h"
 #include "train/options.h"
 #include "train/pose_solver.h"
 
@@ -39,6 +40,10 @@ class Tracker {
   // far from that camera as the points are. nodes: null where bodies are rigid.
   void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
              const PoseSteps& steps, const ColourTrust& trust) const;
+
+  // Surfels for surface that comes into view at a key, at most `limit` (train/new_surface.h).
+  Surfels new_surface(const Surfels& main, Motion& motion, int64_t key, float extent,
+                      const NewSurfaceStart& start, int64_t limit) const;
 
  private:
   TrackTarget target_of(const View& view) const;

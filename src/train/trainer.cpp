@@ -113,6 +113,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       memory_(plan_memory({options_, device, largest_view(capture_)})),
       targets_(device, memory_.image_bytes),
       scene_(scene_on(device, begin(initial_scene(capture_, within(options, memory_.caps), random_)))),
+      initial_main_count_(scene_.main.count()),
       optimiser_(scene_),
       main_density_("main", options.density, scene_.main.count(), device),
       environment_density_("environment", options.environment_density, scene_.environment.count(), device),
@@ -170,7 +171,7 @@ const View& Trainer::draw_view() {
 LossTerms Trainer::step() {
   density_changes_.clear();
   const Tracking now = tracking(iteration_);
-  follow_bodies(now);
+  const Surfels new_surface = follow_bodies(now);
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
@@ -201,7 +202,7 @@ LossTerms Trainer::step() {
   if (learns) learn(frame, request, trainable);
   ++iteration_;
   non_finite_ = learns ? optimiser_.left_alone() : NonFiniteGradients{};
-  control_density(iteration_);
+  control_density(iteration_, new_surface);
   return terms;
 }
 
@@ -240,15 +241,19 @@ void Trainer::add_rigidity(const Frame& frame) {
                  means_.add(LossMeans::rigidity, options_.loss.rigidity));
 }
 
-void Trainer::control_density(int done) {
-  // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
-  if (tracking(done - 1).goes_on) return;
+void Trainer::control_density(int done, const Surfels& new_surface) {
   // Where memory runs out in an update, that set is as it was; what follows an update asks for none.
   const auto tell = [&](events::DensityChanged change, bool reset) {
     change.iteration = done;
     change.opacity_reset = reset;
     density_changes_.push_back(std::move(change));
   };
+  if (new_surface.count() > 0) {
+    tell(main_density_.add(scene_.main, optimiser_.main(), new_surface), false);
+    bonds_ = {};
+  }
+  // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
+  if (tracking(done - 1).goes_on) return;
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
     const DensityLimits limits{{scene_.extent, cloud_radius_},

@@ -85,10 +85,12 @@ class Trainer {
     int64_t key = 0;       // the newest time
   };
   Tracking tracking(int iteration) const;
-  // What an iteration does to bodies before it trains.
-  void follow_bodies(const Tracking& now);
+  // What an iteration does to bodies before it trains. Surfels for surface that has come into view.
+  Surfels follow_bodies(const Tracking& now);
   // Follows bodies to a new time.
   void follow(int64_t key);
+  // Surfels for surface of bodies that has come into view at the newest time.
+  Surfels new_surface(int64_t key) const;
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
@@ -112,7 +114,7 @@ class Trainer {
   void add_rigidity(const Frame& frame);
   // Everything of a step that follows a loss that is a number.
   void learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable);
-  void control_density(int done);
+  void control_density(int done, const Surfels& new_surface);
   void tell_start();
   void warn(const std::string& text) { stream_.emit(events::Warning{iteration_, text}); }
   void keep_caps(const Safetensors& file);
@@ -167,6 +169,7 @@ class Trainer {
   Targets targets_;
   int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
   Scene scene_;
+  int64_t initial_main_count_;  // those behind it are new surface, while bodies are followed
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
   static constexpr int bonds_each = 8;  // of a surfel

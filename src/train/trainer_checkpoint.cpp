@@ -67,6 +67,7 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["options"] = options_to_json(options_);
   file.metadata["capture"] = capture_.name;
   file.metadata["capture_folder"] = capture_folder_;
+  file.metadata["initial_main_count"] = std::to_string(initial_main_count_);
   file.metadata["environment_radius"] = fmt::format("{}", environment_radius_);
   put_views(capture_, file);
   put_caps(memory_.caps, file);
@@ -116,6 +117,9 @@ void Trainer::resume() {
   health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
   iteration_ = static_cast<int>(count_in(file, "iteration"));
   seconds_ = file.number("train_seconds");
+  initial_main_count_ = file.metadata.contains("initial_main_count")
+                            ? static_cast<int64_t>(count_in(file, "initial_main_count"))
+                            : scene_.main.count();
   // Drawn with as many surfels as there was memory for then.
   const bool tells_radius = file.metadata.contains("environment_radius");
   environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;

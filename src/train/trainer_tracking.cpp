@@ -35,14 +35,19 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
   return now;
 }
 
-void Trainer::follow_bodies(const Tracking& now) {
+Surfels Trainer::follow_bodies(const Tracking& now) {
   constexpr int64_t strays_every = 5;  // times
+  Surfels made;
   const bool has_come_to_the_end = now.enters && !now.goes_on;
-  if (now.enters && now.goes_on) follow(now.key);
+  if (now.enters && now.goes_on) {
+    follow(now.key);
+    made = new_surface(now.key);
+  }
   if (now.refines || has_come_to_the_end) follow_again();
   if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);
   if (has_come_to_the_end) let_stand();
   if (has_come_to_the_end && options_.deform.bend.nodes > 0) let_bend();
+  return made;
 }
 
 void Trainer::follow_again() {
@@ -88,10 +93,26 @@ void Trainer::follow(int64_t key) {
   health_.expect_fall();
 }
 
+Surfels Trainer::new_surface(int64_t key) const {
+  const InitialOptions& initial = options_.initial;
+  const NewSurfaceStart start{.tint = initial.tint_in_mask > 0 ? initial.tint_in_mask : initial.tint};
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  return Tracker(options_.deform.track, options_.render, capture_)
+      .new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, start,
+                   memory_.caps.main - scene_.main.count());
+}
+
 void Trainer::let_strays_go(int64_t key) {
   Surfels main = scene_.main.on(Device::cpu);
   const Motion motion = scene_.main_motion->on(Device::cpu);
+  const Tensor<int32_t> carried = main.body;
   release_strays(capture_, motion, motion.time[key], main);
+  // A point stands where it was found; new surface was made to move, and is nothing without its body.
+  constexpr float unseen = -8;
+  for (int64_t i = initial_main_count_; i < main.count(); ++i) {
+    if (main.body[i] != carried[i]) main.opacity_logit[i] = unseen;
+  }
+  scene_.main.opacity_logit = main.opacity_logit.on(device_);
   scene_.main.body = main.body.on(device_);
 }
 

@@ -27,6 +27,16 @@ TEST(AppendRows, PutsTheSecondSetAfterTheFirst) {
   EXPECT_EQ(s.sh.shape(), (Shape{5, 4, 3}));
 }
 
+TEST(AppendRows, BodiesCarryBothSetsOrNeither) {
+  Surfels s = numbered(2, 0), more = numbered(1, 100);
+  s.body = tensor_of(std::vector<int32_t>{0, -1});
+  EXPECT_THROW(append_rows(s, more), InternalError);
+  more.body = tensor_of(std::vector<int32_t>{1});
+  append_rows(s, more);
+  EXPECT_EQ(std::vector<int32_t>(s.body.values().begin(), s.body.values().end()),
+            (std::vector<int32_t>{0, -1, 1}));
+}
+
 TEST(AppendRows, AnEmptySetAddsNothing) {
   Surfels s = numbered(2, 0);
   append_rows(s, numbered(0, 0));

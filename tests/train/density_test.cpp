@@ -133,6 +133,25 @@ TEST(Density, NewSurfelsHaveZeroMomentsAndOldOnesKeepTheirs) {
   });
 }
 
+TEST(Density, SurfelsThatAreAddedBeginAnewBehindTheOthers) {
+  Set set(3, 0.001F, 0.5F);
+  DensityControl control("main", options(), 3);
+  signal(control, 3, {1});
+  const events::DensityChanged change = control.add(set.surfels, set.moments, Set(2, 0.002F, 0.9F).surfels);
+  EXPECT_EQ(change.added, 2);
+  EXPECT_EQ(change.count, 5);
+  ASSERT_EQ(set.surfels.count(), 5);
+  EXPECT_EQ(set.surfels.position(2, 0), 2);
+  EXPECT_EQ(set.surfels.position(4, 0), 1);
+  EXPECT_EQ(set.surfels.log_scale(3, 0), std::log(0.002F));
+  EXPECT_EQ(set.moments.position.first(2, 0), 1);
+  EXPECT_EQ(set.moments.position.first(3, 0), 0);
+  EXPECT_EQ(set.moments.position.second(4, 0), 0);
+  // What was learnt of the others still counts.
+  Random random(1);
+  EXPECT_EQ(control.update(set.surfels, set.moments, {size, 1000}, random).cloned, 1);
+}
+
 TEST(Density, PrunesTheFaintTheOversizedAndTheBroken) {
   Set set(6, 0.02F, 0.5F);
   set.surfels.opacity_logit[1] = -10;

@@ -82,7 +82,7 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
                         90,
                         60});
     log(full);
-    log(events::DensityChanged{8, "main", 1, 2, 3, 4, true, false, 96});
+    log(events::DensityChanged{8, "main", 1, 2, 5, 3, 4, true, false, 96});
     log(events::PhaseEntered{9, "joint"});
     log(events::Evaluated{9, "test", 5, 20.25, 0.75, 1.5});
     log(events::Warning{9, "a \"quoted\"\nline"});
@@ -99,8 +99,9 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
   EXPECT_EQ(written[1],
             json::parse(R"({"event":"step","iteration":7,"iterations":10,"phase":"specular","loss":0.5,
       "terms":{"l1":0.25,"ssim":1.5},"psnr":21.5,"seconds":3.0,"rate":2.5,"surfels":{"main":100,"environment":20},"memory_bytes":1048576})"));
-  EXPECT_EQ(written[2],
-            json::parse(R"({"event":"density_changed","iteration":8,"set":"main","cloned":1,"split":2,
+  EXPECT_EQ(
+      written[2],
+      json::parse(R"({"event":"density_changed","iteration":8,"set":"main","cloned":1,"split":2,"added":5,
       "pruned_transparent":3,"pruned_large":4,"opacity_reset":true,"at_cap":false,"count":96})"));
   EXPECT_EQ(written[3], json::parse(R"({"event":"phase_entered","iteration":9,"phase":"joint"})"));
   EXPECT_EQ(written[4],

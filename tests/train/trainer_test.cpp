@@ -161,8 +161,13 @@ TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   options.deform.track.map_each = bends ? 1 : 4;  // the last time is reached
   Trainer whole = make_trainer(options, "whole");
   EXPECT_EQ(whole.scene().main_motion.has_value(), options.deform.kind == "nodes");
+  int64_t added = 0;
+  whole.stream().listen([&](const events::Event& event) {
+    if (const auto* change = std::get_if<events::DensityChanged>(&event)) added += change->added;
+  });
   whole.run(never);
   EXPECT_EQ(whole.scene().main_nodes.has_value(), bends);
+  EXPECT_EQ(added > 0, whole.scene().main_motion.has_value());
 
   // Interrupt once in each phase.
   const fs::path run = fs::path(::testing::TempDir()) / ("resumed_" + std::to_string(::getpid()));

@@ -100,6 +100,7 @@ export class Training {
       set,
       cloned,
       split,
+      added: 0,
       pruned_transparent: transparent,
       pruned_large: large,
       opacity_reset: reset,

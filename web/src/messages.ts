@@ -255,6 +255,7 @@ export type TrainingEvent =
       set: 'main' | 'environment';
       cloned: number;
       split: number;
+      added?: number; // for surface that came into view; older logs tell none
       pruned_transparent: number;
       pruned_large: number;
       opacity_reset: boolean;

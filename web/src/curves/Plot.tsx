@@ -91,10 +91,10 @@ const last_until = (values: readonly (number | null)[], at: number): number | nu
 // Bars go up for what was added and down for what was taken away, so their scale must hold the sums.
 function data_of(chart: Chart): uPlot.AlignedData {
   if (!chart.bars) return [chart.x, ...chart.lines.map((line) => line.values)];
-  const { cloned, split, transparent, large } = chart.bars;
-  const up = cloned.map((n, i) => n + (split[i] ?? 0));
+  const { cloned, split, added, transparent, large } = chart.bars;
+  const up = cloned.map((n, i) => n + (split[i] ?? 0) + (added[i] ?? 0));
   const down = transparent.map((n, i) => -n - (large[i] ?? 0));
-  return [chart.x, up, down, down, down];
+  return [chart.x, up, up, up, down, down];
 }
 
 type Newest = { current: { chart: Chart; phases: Phase[] } };

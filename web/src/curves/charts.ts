@@ -108,6 +108,7 @@ function changes(density: Density): Chart {
     lines: [
       { name: 'Cloned', colour: 3, values: density.cloned, hidden: true },
       { name: 'Split', colour: 2, values: density.split, hidden: true },
+      { name: 'New surface', colour: 5, values: density.added, hidden: true },
       { name: 'Pruned, transparent', colour: 7, values: density.transparent, hidden: true },
       { name: 'Pruned, large', colour: 4, values: density.large, hidden: true },
     ],

@@ -46,7 +46,7 @@ export function bands_plugin(phases: () => Phase[], marks: () => number[]): uPlo
   };
 }
 
-// Changes of density as bars: cloned and split upwards, pruned downwards.
+// Changes of density as bars: cloned, split and added upwards, pruned downwards.
 export function bars_plugin(density: () => Density | undefined): uPlot.Plugin {
   return {
     hooks: {
@@ -68,14 +68,16 @@ export function bars_plugin(density: () => Density | undefined): uPlot.Plugin {
           ctx.fillRect(x - width / 2, Math.min(a, b), width, Math.abs(b - a));
         };
         bars.iteration.forEach((_, i) => {
-          const [cloned = 0, split = 0, transparent = 0, large = 0] = [
+          const [cloned = 0, split = 0, added = 0, transparent = 0, large = 0] = [
             bars.cloned[i],
             bars.split[i],
+            bars.added[i],
             bars.transparent[i],
             bars.large[i],
           ];
           bar(i, 0, cloned, 3);
           bar(i, cloned, cloned + split, 2);
+          bar(i, cloned + split, cloned + split + added, 5);
           bar(i, 0, -transparent, 7);
           bar(i, -transparent, -transparent - large, 4);
         });

@@ -18,6 +18,7 @@ export interface Density {
   iteration: number[];
   cloned: number[];
   split: number[];
+  added: number[];
   transparent: number[];
   large: number[];
   resets: number[]; // iterations
@@ -36,7 +37,7 @@ export interface Series {
   held_out: { iteration: number[]; psnr: number[] };
 }
 
-const no_density = (): Density => ({ iteration: [], cloned: [], split: [], transparent: [], large: [], resets: [] });
+const no_density = (): Density => ({ iteration: [], cloned: [], split: [], added: [], transparent: [], large: [], resets: [] });
 
 export function series_of(events: readonly TrainingEvent[]): Series {
   const steps: Steps = {
@@ -89,6 +90,7 @@ function add_density(density: Density, event: Extract<TrainingEvent, { event: 'd
   density.iteration.push(event.iteration);
   density.cloned.push(event.cloned);
   density.split.push(event.split);
+  density.added.push(event.added ?? 0);
   density.transparent.push(event.pruned_transparent);
   density.large.push(event.pruned_large);
   if (event.opacity_reset) density.resets.push(event.iteration);

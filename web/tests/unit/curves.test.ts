@@ -56,6 +56,7 @@ test('changes of density are kept by set and cause', () => {
       set: 'environment',
       cloned: 1,
       split: 2,
+      added: 5,
       pruned_transparent: 3,
       pruned_large: 4,
       opacity_reset: true,
@@ -63,8 +64,8 @@ test('changes of density are kept by set and cause', () => {
       count: 9,
     },
   ]);
-  const { iteration, cloned, split, transparent, large, resets } = density.environment;
-  assert.deepEqual([iteration, cloned, split, transparent, large, resets], [[80], [1], [2], [3], [4], [80]]);
+  const { iteration, cloned, split, added, transparent, large, resets } = density.environment;
+  assert.deepEqual([iteration, cloned, split, added, transparent, large, resets], [[80], [1], [2], [5], [3], [4], [80]]);
   assert.deepEqual(density.main.iteration, []);
 });
 

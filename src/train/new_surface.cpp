@@ -1,0 +1,174 @@
+#include "train/new_surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "math/activation.h"
+#include "math/rotation_group.h"
+#include "math/spherical_harmonics.h"
+#include "ops/deform/deform.h"
+#include "ops/motion/motion.h"
+#include "scene/rows.h"
+
+namespace traceflow {
+
+namespace {
+
+// Shares of a pixel: that the mask covers where surface is missing, that bodies cover there at most, and that
+// a body covers where its surface is known.
+constexpr float in_mask = 0.95F, uncovered = 0.5F, known = 0.7F;
+constexpr int most_rings = 6;
+// How far the surface may come nearer or go away from one pixel to the next, as a share of its distance.
+constexpr float most_step = 0.05F;
+constexpr float least_facing = 0.2F;  // cosine
+constexpr float pixels_per_scale = 0.6F;
+
+struct SurfacePoint {
+  int32_t body = -1;
+  Vec3<float> position{0}, normal{0};  // world
+};
+
+struct Film {
+  const Camera<float>& camera;
+  std::vector<SurfacePoint> points;  // of each pixel
+
+  Vec3<float> ray(int64_t pixel) const {
+    return camera.ray_in_world(static_cast<float>(pixel % camera.width) + 0.5F,
+                               static_cast<float>(pixel / camera.width) + 0.5F);
+  }
+};
+
+// The quaternion that turns z to a unit vector.
+Vec4<double> turn_z_to(const Vec3<double>& normal) {
+  const Vec3<double> axis(-normal.y, normal.x, 0);
+  const double sine = length(axis);
+  if (sine < 1e-9) return normal.z > 0 ? Vec4<double>(1, 0, 0, 0) : Vec4<double>(0, 1, 0, 0);
+  return quaternion_exp(std::atan2(sine, normal.z) / sine * axis);
+}
+
+Vec3<double> rotate(const Vec4<double>& q, const Vec3<double>& v) {
+  const Vec4<double> r =
+      quaternion_product(quaternion_product(q, Vec4<double>(0, v.x, v.y, v.z)), quaternion_conjugate(q));
+  return {r[1], r[2], r[3]};
+}
+
+// Draws the bodies alone: points of the pixels that they cover. The pixels that the mask covers in vain.
+std::vector<int64_t> draw_bodies(const TrackTarget& target, const Motion& motion, int64_t key,
+                                 const Surfels& surfels, const raster::Options& options, Film& film) {
+  PosedSurfels posed;
+  deform::forward(surfels, nullptr, motion.time[key], {}, 0, field::Precision::fp32, posed, nullptr);
+  motion::forward(motion, surfels.body, motion.time[key], {}, posed, *motion::make_saved());
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    if (surfels.body[i] < 0) posed.opacity[i] = 0;
+  }
+  posed.tint.resize({surfels.count()});
+  const int64_t pixels = target.coverage.size();
+  film.points.resize(static_cast<size_t>(pixels));
+  std::vector<int64_t> missing;
+  raster::Output picture;
+  for (int32_t body = 0; body < motion.bodies(); ++body) {
+    // The rasteriser's tint is then the share of this body.
+    for (int64_t i = 0; i < surfels.count(); ++i) posed.tint[i] = surfels.body[i] == body ? 1.0F : 0.0F;
+    raster::forward(posed, film.camera, options, picture, nullptr);
+    for (int64_t at = 0; at < pixels; ++at) {
+      if (body == 0 && target.coverage[at] >= in_mask && picture.alpha[at] < uncovered) missing.push_back(at);
+      if (picture.tint[at] < known || target.mask[at] == 0) continue;
+      const Vec3<float> normal = load3<float>(&picture.normal[3 * at]);
+      if (!(length(normal) > 0)) continue;
+      film.points[static_cast<size_t>(at)] = {body, film.camera.position + picture.depth[at] * film.ray(at),
+                                              normalize(normal)};
+    }
+  }
+  return missing;
+}
+
+// The point of a pixel on the planes of its eight neighbours; body −1 where there are none that go on there.
+SurfacePoint continued(const Film& film, const Tensor<float>& normal_prior, int64_t pixel) {
+  const int64_t height = film.camera.height, width = film.camera.width;
+  const Vec3<float> eye = film.camera.position, ray = film.ray(pixel);
+  const Vec3<float> prior = normal_prior.empty() ? Vec3<float>(0) : load3<float>(&normal_prior[3 * pixel]);
+  SurfacePoint sum;
+  float count = 0;
+  const int64_t row = pixel / width, column = pixel % width;
+  for (int64_t y = std::max<int64_t>(0, row - 1); y <= std::min(height - 1, row + 1); ++y) {
+    for (int64_t x = std::max<int64_t>(0, column - 1); x <= std::min(width - 1, column + 1); ++x) {
+      const SurfacePoint& beside = film.points[static_cast<size_t>(y * width + x)];
+      if (beside.body < 0 || (sum.body >= 0 && sum.body != beside.body)) continue;
+      // The chord from one pixel to the next has the mean of both normals.
+      const Vec3<float> normal = normalize(beside.normal + prior);
+      const float cosine = dot(normal, ray) / length(ray);
+      if (!(-cosine > least_facing)) continue;
+      const float away = dot(normal, beside.position - eye) / dot(normal, ray);
+      const float before = dot(beside.position - eye, ray) / dot(ray, ray);
+      if (!(std::abs(away - before) < most_step * before)) continue;
+      sum.body = beside.body;
+      sum.position += eye + away * ray;
+      sum.normal += length(prior) > 0 ? prior : beside.normal;
+      ++count;
+    }
+  }
+  if (count == 0) return {};
+  return {sum.body, sum.position / count, normalize(sum.normal)};
+}
+
+// Goes on from ring to ring: the pixels found, whose points the film then has.
+std::vector<int64_t> grow(Film& film, const Tensor<float>& normal_prior, std::vector<int64_t> missing) {
+  std::vector<int64_t> found;
+  for (int ring = 0; ring < most_rings && !missing.empty(); ++ring) {
+    std::vector<std::pair<int64_t, SurfacePoint>> next;
+    std::vector<int64_t> left;
+    for (const int64_t pixel : missing) {
+      const SurfacePoint point = continued(film, normal_prior, pixel);
+      if (point.body < 0)
+        left.push_back(pixel);
+      else
+        next.emplace_back(pixel, point);
+    }
+    for (const auto& [pixel, point] : next) {
+      film.points[static_cast<size_t>(pixel)] = point;
+      found.push_back(pixel);
+    }
+    missing = std::move(left);
+  }
+  return found;
+}
+
+}  // namespace
+
+Surfels new_surface(const TrackTarget& target, const Motion& motion, int64_t key, const Surfels& surfels,
+                    const raster::Options& options, const NewSurfaceStart& start, int64_t limit) {
+  Film film{target.camera, {}};
+  const std::vector<int64_t> missing = draw_bodies(target, motion, key, surfels, options, film);
+  std::vector<int64_t> found = grow(film, target.normal_prior, missing);
+  if (static_cast<int64_t>(found.size()) > limit)
+    found.resize(static_cast<size_t>(std::max<int64_t>(0, limit)));
+  RowEdit copies;
+  for (size_t k = 0; k < found.size(); ++k) copies.add(0);
+  if (found.empty()) return {};
+  Surfels made = edited_rows(surfels, PlacedEdit(copies, Device::cpu));
+  made.sh.zero();
+  made.opacity_logit.fill(logit(start.opacity));
+  if (made.has_tint()) made.tint_logit.fill(logit(start.tint));
+  for (int64_t k = 0; k < made.count(); ++k) {
+    const int64_t pixel = found[static_cast<size_t>(k)];
+    const SurfacePoint& point = film.points[static_cast<size_t>(pixel)];
+    const Vec4<double> back =
+        quaternion_conjugate(unit_quaternion(load4<double>(&motion.rotation(point.body, key, 0))));
+    const Vec3<double> centre = load3<double>(motion.centre.row(point.body));
+    const Vec3<double> arm =
+        Vec3<double>(point.position) - centre - load3<double>(&motion.shift(point.body, key, 0));
+    store3(made.position.row(k), centre + rotate(back, arm));
+    const Vec4<double> rotation = turn_z_to(rotate(back, Vec3<double>(point.normal)));
+    for (int c = 0; c < 4; ++c) made.rotation(k, c) = static_cast<float>(rotation[c]);
+    const float pixel_size = length(point.position - target.camera.position) / target.camera.focal_x;
+    made.log_scale(k, 0) = made.log_scale(k, 1) = std::log(pixels_per_scale * pixel_size);
+    for (int64_t c = 0; c < 3; ++c)
+      made.sh(k, 0, c) = (target.colour[3 * pixel + c] - 0.5F) / static_cast<float>(sh_c0);
+    made.body[k] = point.body;
+  }
+  return made;
+}
+
+}  // namespace traceflow
