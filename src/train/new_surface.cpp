@@ -35,8 +35,8 @@ struct Film {
   std::vector<SurfacePoint> points;  // of each pixel
 
   Vec3<float> ray(int64_t pixel) const {
-    return camera.ray_in_world(static_cast<float>(pixel % camera.width) + 0.5F,
-                               static_cast<float>(pixel / camera.width) + 0.5F);
+    const int64_t row = pixel / camera.width, column = pixel % camera.width;
+    return camera.ray_in_world(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F);
   }
 };
 
