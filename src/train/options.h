@@ -181,6 +181,7 @@ struct TrackOptions {
   float silhouette = 0.5F;
   float normal = 0.3F;
   float colour = 0.3F;
+  bool new_surface = false;
   bool true_poses = false;
 
   template <class Visitor>
@@ -198,6 +199,8 @@ struct TrackOptions {
     v.field("normal", normal, "", "Weight of the residual of normals.");
     v.field("colour", colour, "",
             "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
+    v.field("new_surface", new_surface, "",
+            "Add surfels where a mask covers a pixel and no body does, at each new time.");
     v.field("true_poses", true_poses, "",
             "Take poses from the capture's true motion, for tests: an upper bound for tracking.");
   }

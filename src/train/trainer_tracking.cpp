@@ -41,7 +41,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
   const bool has_come_to_the_end = now.enters && !now.goes_on;
   if (now.enters && now.goes_on) {
     follow(now.key);
-    made = new_surface(now.key);
+    if (options_.deform.track.new_surface) made = new_surface(now.key);
   }
   if (now.refines || has_come_to_the_end) follow_again();
   if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);

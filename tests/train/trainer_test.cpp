@@ -157,6 +157,7 @@ TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   const bool bends = std::string(GetParam()) == "bend";
   options.deform.kind = bends ? "nodes" : GetParam();
   options.deform.bend.misfit = 0;
+  options.deform.track.new_surface = true;
   options.deform.bend.nodes = bends ? 5 : 0;
   options.deform.track.map_each = bends ? 1 : 4;  // the last time is reached
   Trainer whole = make_trainer(options, "whole");
