@@ -30,7 +30,8 @@ struct SurfacePoint {
   Vec3<float> position{0}, normal{0};  // world
 };
 
-struct Film {
+// What each pixel of a camera shows of the bodies.
+struct SurfaceMap {
   const Camera<float>& camera;
   std::vector<SurfacePoint> points;  // of each pixel
 
@@ -54,9 +55,10 @@ Vec3<double> rotate(const Vec4<double>& q, const Vec3<double>& v) {
   return {r[1], r[2], r[3]};
 }
 
-// Draws the bodies alone: points of the pixels that they cover. The pixels that the mask covers in vain.
+// Draws the bodies alone and fills the map where they cover a pixel. Returns the pixels that the mask covers
+// and no body does.
 std::vector<int64_t> draw_bodies(const TrackTarget& target, const Motion& motion, int64_t key,
-                                 const Surfels& surfels, const raster::Options& options, Film& film) {
+                                 const Surfels& surfels, const raster::Options& options, SurfaceMap& map) {
   PosedSurfels posed;
   deform::forward(surfels, nullptr, motion.time[key], {}, 0, field::Precision::fp32, posed, nullptr);
   motion::forward(motion, surfels.body, motion.time[key], {}, posed, *motion::make_saved());
@@ -65,36 +67,36 @@ std::vector<int64_t> draw_bodies(const TrackTarget& target, const Motion& motion
   }
   posed.tint.resize({surfels.count()});
   const int64_t pixels = target.coverage.size();
-  film.points.resize(static_cast<size_t>(pixels));
+  map.points.resize(static_cast<size_t>(pixels));
   std::vector<int64_t> missing;
   raster::Output picture;
   for (int32_t body = 0; body < motion.bodies(); ++body) {
     // The rasteriser's tint is then the share of this body.
     for (int64_t i = 0; i < surfels.count(); ++i) posed.tint[i] = surfels.body[i] == body ? 1.0F : 0.0F;
-    raster::forward(posed, film.camera, options, picture, nullptr);
+    raster::forward(posed, map.camera, options, picture, nullptr);
     for (int64_t at = 0; at < pixels; ++at) {
       if (body == 0 && target.coverage[at] >= in_mask && picture.alpha[at] < uncovered) missing.push_back(at);
       if (picture.tint[at] < known || target.mask[at] == 0) continue;
       const Vec3<float> normal = load3<float>(&picture.normal[3 * at]);
       if (!(length(normal) > 0)) continue;
-      film.points[static_cast<size_t>(at)] = {body, film.camera.position + picture.depth[at] * film.ray(at),
-                                              normalize(normal)};
+      map.points[static_cast<size_t>(at)] = {body, map.camera.position + picture.depth[at] * map.ray(at),
+                                             normalize(normal)};
     }
   }
   return missing;
 }
 
-// The point of a pixel on the planes of its eight neighbours; body −1 where there are none that go on there.
-SurfacePoint continued(const Film& film, const Tensor<float>& normal_prior, int64_t pixel) {
-  const int64_t height = film.camera.height, width = film.camera.width;
-  const Vec3<float> eye = film.camera.position, ray = film.ray(pixel);
+// The mean of where the planes of the eight neighbours meet the pixel's ray; body −1 where none does.
+SurfacePoint continued(const SurfaceMap& map, const Tensor<float>& normal_prior, int64_t pixel) {
+  const int64_t height = map.camera.height, width = map.camera.width;
+  const Vec3<float> eye = map.camera.position, ray = map.ray(pixel);
   const Vec3<float> prior = normal_prior.empty() ? Vec3<float>(0) : load3<float>(&normal_prior[3 * pixel]);
   SurfacePoint sum;
   float count = 0;
   const int64_t row = pixel / width, column = pixel % width;
   for (int64_t y = std::max<int64_t>(0, row - 1); y <= std::min(height - 1, row + 1); ++y) {
     for (int64_t x = std::max<int64_t>(0, column - 1); x <= std::min(width - 1, column + 1); ++x) {
-      const SurfacePoint& beside = film.points[static_cast<size_t>(y * width + x)];
+      const SurfacePoint& beside = map.points[static_cast<size_t>(y * width + x)];
       if (beside.body < 0 || (sum.body >= 0 && sum.body != beside.body)) continue;
       // The chord from one pixel to the next has the mean of both normals.
       const Vec3<float> normal = normalize(beside.normal + prior);
@@ -113,21 +115,21 @@ SurfacePoint continued(const Film& film, const Tensor<float>& normal_prior, int6
   return {sum.body, sum.position / count, normalize(sum.normal)};
 }
 
-// Goes on from ring to ring: the pixels found, whose points the film then has.
-std::vector<int64_t> grow(Film& film, const Tensor<float>& normal_prior, std::vector<int64_t> missing) {
+// Continues the surface ring by ring. Returns the pixels that got a point.
+std::vector<int64_t> grow(SurfaceMap& map, const Tensor<float>& normal_prior, std::vector<int64_t> missing) {
   std::vector<int64_t> found;
   for (int ring = 0; ring < most_rings && !missing.empty(); ++ring) {
     std::vector<std::pair<int64_t, SurfacePoint>> next;
     std::vector<int64_t> left;
     for (const int64_t pixel : missing) {
-      const SurfacePoint point = continued(film, normal_prior, pixel);
+      const SurfacePoint point = continued(map, normal_prior, pixel);
       if (point.body < 0)
         left.push_back(pixel);
       else
         next.emplace_back(pixel, point);
     }
     for (const auto& [pixel, point] : next) {
-      film.points[static_cast<size_t>(pixel)] = point;
+      map.points[static_cast<size_t>(pixel)] = point;
       found.push_back(pixel);
     }
     missing = std::move(left);
@@ -139,9 +141,9 @@ std::vector<int64_t> grow(Film& film, const Tensor<float>& normal_prior, std::ve
 
 Surfels new_surface(const TrackTarget& target, const Motion& motion, int64_t key, const Surfels& surfels,
                     const raster::Options& options, const NewSurfaceStart& start, int64_t limit) {
-  Film film{target.camera, {}};
-  const std::vector<int64_t> missing = draw_bodies(target, motion, key, surfels, options, film);
-  std::vector<int64_t> found = grow(film, target.normal_prior, missing);
+  SurfaceMap map{target.camera, {}};
+  const std::vector<int64_t> missing = draw_bodies(target, motion, key, surfels, options, map);
+  std::vector<int64_t> found = grow(map, target.normal_prior, missing);
   if (static_cast<int64_t>(found.size()) > limit)
     found.resize(static_cast<size_t>(std::max<int64_t>(0, limit)));
   RowEdit copies;
@@ -153,7 +155,7 @@ Surfels new_surface(const TrackTarget& target, const Motion& motion, int64_t key
   if (made.has_tint()) made.tint_logit.fill(logit(start.tint));
   for (int64_t k = 0; k < made.count(); ++k) {
     const int64_t pixel = found[static_cast<size_t>(k)];
-    const SurfacePoint& point = film.points[static_cast<size_t>(pixel)];
+    const SurfacePoint& point = map.points[static_cast<size_t>(pixel)];
     const Vec4<double> back =
         quaternion_conjugate(unit_quaternion(load4<double>(&motion.rotation(point.body, key, 0))));
     const Vec3<double> centre = load3<double>(motion.centre.row(point.body));

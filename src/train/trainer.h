@@ -85,7 +85,7 @@ class Trainer {
     int64_t key = 0;       // the newest time
   };
   Tracking tracking(int iteration) const;
-  // What an iteration does to bodies before it trains. Surfels for surface that has come into view.
+  // What an iteration does to bodies before it trains. Returns surfels for surface that has come into view.
   Surfels follow_bodies(const Tracking& now);
   // Follows bodies to a new time.
   void follow(int64_t key);
@@ -169,7 +169,7 @@ class Trainer {
   Targets targets_;
   int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
   Scene scene_;
-  int64_t initial_main_count_;  // those behind it are new surface, while bodies are followed
+  int64_t initial_main_count_;  // at the start of the run; those added while bodies are followed come after
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
   static constexpr int bonds_each = 8;  // of a surfel

@@ -107,7 +107,7 @@ void Trainer::let_strays_go(int64_t key) {
   const Motion motion = scene_.main_motion->on(Device::cpu);
   const Tensor<int32_t> carried = main.body;
   release_strays(capture_, motion, motion.time[key], main);
-  // A point stands where it was found; new surface was made to move, and is nothing without its body.
+  // A released point of the capture stands still where it is. New surface was never seen to stand still.
   constexpr float unseen = -8;
   for (int64_t i = initial_main_count_; i < main.count(); ++i) {
     if (main.body[i] != carried[i]) main.opacity_logit[i] = unseen;

@@ -249,7 +249,7 @@ TEST(Tracker, LeavesReflectionsAloneAndAddsOnlySurfaceOfBodiesWhileTheyAreFollow
   for (int64_t i = first.main.count(); i < main.count(); ++i) {
     if (main.body[i] >= 0) continue;
     ++let_go;
-    EXPECT_LT(main.opacity_logit[i], -5);  // it stands nowhere
+    EXPECT_LT(main.opacity_logit[i], -5);  // transparent
   }
   EXPECT_GT(let_go, 0);
   EXPECT_LT(let_go, (main.count() - first.main.count()) / 2);
