@@ -28,6 +28,14 @@ TRACEFLOW_HD Vec4<T> unit_quaternion(const Vec4<T>& q) {
   return length2 > T(0) ? q / std::sqrt(length2) : Vec4<T>(T(1), T(0), T(0), T(0));
 }
 
+// A unit quaternion that turns z to the unit vector n: half-way between both; for n = −z a half turn about x.
+template <class T>
+TRACEFLOW_HD Vec4<T> quaternion_towards(const Vec3<T>& n) {
+  if (n.z < T(-0.9999)) return {T(0), T(1), T(0), T(0)};
+  const Vec4<T> q(T(1) + n.z, -n.y, n.x, T(0));
+  return q / length(q);
+}
+
 // The unit quaternion of a rotation vector.
 template <class T>
 TRACEFLOW_HD Vec4<T> quaternion_exp(const Vec3<T>& v) {

@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "math/rotation.h"
+#include "math/rotation_group.h"
 #include "math/spherical_harmonics.h"
 #include "math/symmetric_eigen.h"
 #include "scene/neighbours.h"
@@ -50,14 +51,6 @@ void set_scales_from_neighbours(Surfels& s) {
 
 void set_random_rotations(Surfels& s, Random& random) {
   for (float& q : s.rotation.values()) q = static_cast<float>(random.normal());
-}
-
-// The rotation whose third column is n, any turn about it.
-Vec4<float> quaternion_towards(const Vec3<float>& n) {
-  // Half-way quaternion from z to n; for n = -z a half turn about x.
-  if (n.z < -0.9999F) return {0, 1, 0, 0};
-  const Vec4<float> q(1 + n.z, -n.y, n.x, 0);
-  return q / glm::length(q);
 }
 
 void set_rotations_from_neighbours(Surfels& s) {

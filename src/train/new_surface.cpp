@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "math/activation.h"
+#include "math/rotation.h"
 #include "math/rotation_group.h"
 #include "math/spherical_harmonics.h"
 #include "ops/deform/deform.h"
@@ -40,20 +41,6 @@ struct SurfaceMap {
     return camera.ray_in_world(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F);
   }
 };
-
-// The quaternion that turns z to a unit vector.
-Vec4<double> turn_z_to(const Vec3<double>& normal) {
-  const Vec3<double> axis(-normal.y, normal.x, 0);
-  const double sine = length(axis);
-  if (sine < 1e-9) return normal.z > 0 ? Vec4<double>(1, 0, 0, 0) : Vec4<double>(0, 1, 0, 0);
-  return quaternion_exp(std::atan2(sine, normal.z) / sine * axis);
-}
-
-Vec3<double> rotate(const Vec4<double>& q, const Vec3<double>& v) {
-  const Vec4<double> r =
-      quaternion_product(quaternion_product(q, Vec4<double>(0, v.x, v.y, v.z)), quaternion_conjugate(q));
-  return {r[1], r[2], r[3]};
-}
 
 // Draws the bodies alone and fills the map where they cover a pixel. Returns the pixels that the mask covers
 // and no body does.
@@ -156,13 +143,13 @@ Surfels new_surface(const TrackTarget& target, const Motion& motion, int64_t key
   for (int64_t k = 0; k < made.count(); ++k) {
     const int64_t pixel = found[static_cast<size_t>(k)];
     const SurfacePoint& point = map.points[static_cast<size_t>(pixel)];
-    const Vec4<double> back =
-        quaternion_conjugate(unit_quaternion(load4<double>(&motion.rotation(point.body, key, 0))));
+    const Mat3<double> back =
+        transpose(rotation_from_quaternion(load4<double>(&motion.rotation(point.body, key, 0))));
     const Vec3<double> centre = load3<double>(motion.centre.row(point.body));
     const Vec3<double> arm =
         Vec3<double>(point.position) - centre - load3<double>(&motion.shift(point.body, key, 0));
-    store3(made.position.row(k), centre + rotate(back, arm));
-    const Vec4<double> rotation = turn_z_to(rotate(back, Vec3<double>(point.normal)));
+    store3(made.position.row(k), centre + back * arm);
+    const Vec4<double> rotation = quaternion_towards(back * Vec3<double>(point.normal));
     for (int c = 0; c < 4; ++c) made.rotation(k, c) = static_cast<float>(rotation[c]);
     const float pixel_size = length(point.position - target.camera.position) / target.camera.focal_x;
     made.log_scale(k, 0) = made.log_scale(k, 1) = std::log(pixels_per_scale * pixel_size);

@@ -40,7 +40,7 @@ inline Surfels ball() {
     const double z = 1 - (2 * static_cast<double>(i) + 1) / count, around = 2.399963 * static_cast<double>(i);
     const Vec3<double> n(std::sqrt(1 - z * z) * std::cos(around), std::sqrt(1 - z * z) * std::sin(around), z);
     store3(s.position.row(i), centre + radius * n);
-    const Vec4<double> towards = unit_quaternion(Vec4<double>(1 + n.z, -n.y, n.x, 0));
+    const Vec4<double> towards = quaternion_towards(n);
     for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(towards[k]);
     paint(pattern(radius * n), s.sh.row(i));
   }
