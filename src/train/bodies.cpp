@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "math/activation.h"
 #include "ops/motion/motion.h"
 #include "scene/neighbours.h"
 
@@ -179,6 +180,12 @@ void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
 }
 
 }  // namespace
+
+void make_solid(Surfels& surfels) {
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    if (surfels.body[i] >= 0) surfels.opacity_logit[i] = logit(solid_opacity);
+  }
+}
 
 std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels) {
   const View& first = *std::min_element(capture.train.begin(), capture.train.end(),

@@ -10,6 +10,12 @@
 // Which surfels move together, by the capture's masks.
 namespace traceflow {
 
+// The opacity of the points that bodies carry while they are followed. Where it learns, surfels of the front
+// fade, larger ones behind them show through, and the surface that pictures show moves away.
+inline constexpr float solid_opacity = 0.95F;
+// Gives that opacity to all that bodies carry.
+void make_solid(Surfels& surfels);
+
 // A body for each connected part of the earliest photograph's mask: it carries the surfels that project into
 // it and lie no farther behind its front than it is wide. Sets surfels.body and returns bodies that stand
 // still at the times of the training views; nothing where no part has enough surfels.

@@ -12,6 +12,7 @@
 #include "ops/deform/deform.h"
 #include "ops/motion/motion.h"
 #include "scene/rows.h"
+#include "train/bodies.h"
 
 namespace traceflow {
 
@@ -24,7 +25,7 @@ constexpr int most_rings = 6;
 // How far the surface may come nearer or go away from one pixel to the next, as a share of its distance.
 constexpr float most_step = 0.05F;
 constexpr float least_facing = 0.2F;  // cosine
-constexpr float pixels_per_scale = 0.6F;
+constexpr float pixels_per_scale = 0.6F, first_opacity = 0.7F;
 
 struct SurfacePoint {
   int32_t body = -1;
@@ -42,15 +43,25 @@ struct SurfaceMap {
   }
 };
 
-// Draws the bodies alone and fills the map where they cover a pixel. Returns the pixels that the mask covers
-// and no body does.
+// Whether the mask covers a pixel and the four around it. A surfel at the mask's edge would stick out, and
+// the next time's silhouette would push its body away from the camera.
+bool is_inside(const Tensor<float>& coverage, int64_t pixel) {
+  const int64_t height = coverage.dim(0), width = coverage.dim(1);
+  const int64_t row = pixel / width, column = pixel % width;
+  if (row == 0 || column == 0 || row + 1 == height || column + 1 == width) return false;
+  return std::min({coverage[pixel], coverage[pixel - 1], coverage[pixel + 1], coverage[pixel - width],
+                   coverage[pixel + width]}) >= in_mask;
+}
+
+// Draws the bodies alone and fills the map where they cover a pixel: where their surfels are, however much of
+// them shows. Returns the pixels inside the mask that no body covers.
 std::vector<int64_t> draw_bodies(const TrackTarget& target, const Motion& motion, int64_t key,
                                  const Surfels& surfels, const raster::Options& options, SurfaceMap& map) {
   PosedSurfels posed;
   deform::forward(surfels, nullptr, motion.time[key], {}, 0, field::Precision::fp32, posed, nullptr);
   motion::forward(motion, surfels.body, motion.time[key], {}, posed, *motion::make_saved());
   for (int64_t i = 0; i < surfels.count(); ++i) {
-    if (surfels.body[i] < 0) posed.opacity[i] = 0;
+    posed.opacity[i] = surfels.body[i] < 0 ? 0 : solid_opacity;
   }
   posed.tint.resize({surfels.count()});
   const int64_t pixels = target.coverage.size();
@@ -62,7 +73,7 @@ std::vector<int64_t> draw_bodies(const TrackTarget& target, const Motion& motion
     for (int64_t i = 0; i < surfels.count(); ++i) posed.tint[i] = surfels.body[i] == body ? 1.0F : 0.0F;
     raster::forward(posed, map.camera, options, picture, nullptr);
     for (int64_t at = 0; at < pixels; ++at) {
-      if (body == 0 && target.coverage[at] >= in_mask && picture.alpha[at] < uncovered) missing.push_back(at);
+      if (body == 0 && picture.alpha[at] < uncovered && is_inside(target.coverage, at)) missing.push_back(at);
       if (picture.tint[at] < known || target.mask[at] == 0) continue;
       const Vec3<float> normal = load3<float>(&picture.normal[3 * at]);
       if (!(length(normal) > 0)) continue;
@@ -127,7 +138,7 @@ std::vector<int64_t> grow(SurfaceMap& map, const Tensor<float>& normal_prior, st
 }  // namespace
 
 Surfels new_surface(const TrackTarget& target, const Motion& motion, int64_t key, const Surfels& surfels,
-                    const raster::Options& options, const NewSurfaceStart& start, int64_t limit) {
+                    const raster::Options& options, float tint, int64_t limit) {
   SurfaceMap map{target.camera, {}};
   const std::vector<int64_t> missing = draw_bodies(target, motion, key, surfels, options, map);
   std::vector<int64_t> found = grow(map, target.normal_prior, missing);
@@ -138,8 +149,8 @@ Surfels new_surface(const TrackTarget& target, const Motion& motion, int64_t key
   if (found.empty()) return {};
   Surfels made = edited_rows(surfels, PlacedEdit(copies, Device::cpu));
   made.sh.zero();
-  made.opacity_logit.fill(logit(start.opacity));
-  if (made.has_tint()) made.tint_logit.fill(logit(start.tint));
+  made.opacity_logit.fill(logit(first_opacity));
+  if (made.has_tint()) made.tint_logit.fill(logit(tint));
   for (int64_t k = 0; k < made.count(); ++k) {
     const int64_t pixel = found[static_cast<size_t>(k)];
     const SurfacePoint& point = map.points[static_cast<size_t>(pixel)];

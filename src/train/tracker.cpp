@@ -144,13 +144,13 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   if (any) solver.solve(all, {options_.steps / 2, little_blur});
 }
 
-Surfels Tracker::new_surface(const Surfels& main, Motion& motion, int64_t key, float extent,
-                             const NewSurfaceStart& start, int64_t limit) const {
+Surfels Tracker::new_surface(const Surfels& main, Motion& motion, int64_t key, float extent, float tint,
+                             int64_t limit) const {
   const PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
   Surfels all = main;
   for (const TrackTarget& target : solver.targets()) {
     const int64_t left = limit - (all.count() - main.count());
-    append_rows(all, traceflow::new_surface(target, motion, key, all, solver.drawing(), start, left));
+    append_rows(all, traceflow::new_surface(target, motion, key, all, solver.drawing(), tint, left));
   }
   RowEdit made;
   for (int64_t i = main.count(); i < all.count(); ++i) made.keep(i);

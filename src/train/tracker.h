@@ -42,8 +42,8 @@ class Tracker {
              const PoseSteps& steps, const ColourTrust& trust) const;
 
   // Surfels for surface that comes into view at a key, at most `limit` (train/new_surface.h).
-  Surfels new_surface(const Surfels& main, Motion& motion, int64_t key, float extent,
-                      const NewSurfaceStart& start, int64_t limit) const;
+  Surfels new_surface(const Surfels& main, Motion& motion, int64_t key, float extent, float tint,
+                      int64_t limit) const;
 
  private:
   TrackTarget target_of(const View& view) const;

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "base/version.h"
 #include "ops/loss/rigidity.h"
+#include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
 #include "train/continuation.h"
 #include "train/initialise.h"
@@ -211,12 +212,15 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   if (trainable.main_motion) share_among_keys();
   if (trainable.main_nodes) hold_nodes();
+  const bool follows = tracking(iteration_).goes_on;
+  // New surface that was wrong may fade.
+  if (follows) motion::hold_opacities(scene_.main.body, initial_main_count_, gradient_.main);
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
   // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.
   // Nothing behind this asks for memory, but the driver may, to start a kernel.
   torn_ = true;
-  const double share_of_positions = tracking(iteration_).goes_on ? share_while_tracking : 1;
+  const double share_of_positions = follows ? share_while_tracking : 1;
   optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_, share_of_positions);
   if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
   if (trainable.environment && scene_.environment.count() > 0) {

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/activation.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 #include "train/bodies.h"
@@ -95,10 +96,10 @@ void Trainer::follow(int64_t key) {
 
 Surfels Trainer::new_surface(int64_t key) const {
   const InitialOptions& initial = options_.initial;
-  const NewSurfaceStart start{.tint = initial.tint_in_mask > 0 ? initial.tint_in_mask : initial.tint};
+  const float tint = initial.tint_in_mask > 0 ? initial.tint_in_mask : initial.tint;
   Motion motion = scene_.main_motion->on(Device::cpu);
   return Tracker(options_.deform.track, options_.render, capture_)
-      .new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, start,
+      .new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, tint,
                    memory_.caps.main - scene_.main.count());
 }
 
@@ -107,10 +108,12 @@ void Trainer::let_strays_go(int64_t key) {
   const Motion motion = scene_.main_motion->on(Device::cpu);
   const Tensor<int32_t> carried = main.body;
   release_strays(capture_, motion, motion.time[key], main);
-  // A released point of the capture stands still where it is. New surface was never seen to stand still.
+  // A released point of the capture stands still where it is, and begins as what no body carried. New surface
+  // was never seen to stand still.
   constexpr float unseen = -8;
-  for (int64_t i = initial_main_count_; i < main.count(); ++i) {
-    if (main.body[i] != carried[i]) main.opacity_logit[i] = unseen;
+  for (int64_t i = 0; i < main.count(); ++i) {
+    if (main.body[i] != carried[i])
+      main.opacity_logit[i] = i < initial_main_count_ ? logit(options_.initial.opacity) : unseen;
   }
   scene_.main.opacity_logit = main.opacity_logit.on(device_);
   scene_.main.body = main.body.on(device_);

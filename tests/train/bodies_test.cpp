@@ -7,6 +7,7 @@
 
 #include "base/parallel.h"
 #include "capture/motion_truth.h"
+#include "math/activation.h"
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "ops/motion/nodes.h"
@@ -256,6 +257,39 @@ TEST(Tracker, LeavesReflectionsAloneAndAddsOnlySurfaceOfBodiesWhileTheyAreFollow
   EXPECT_FALSE(same(trainer.scene().main.position, first.main.position));
   while (trainer.iteration() < options.iterations) trainer.step();
   EXPECT_FALSE(rests());
+}
+
+// Of points that bodies carry opacities learn when the film has been followed; others learn from the start.
+TEST(Tracker, KeepsBodiesSolidWhileTheyAreFollowed) {
+  const Tumbling at;
+  const TrainOptions options = little_following();
+  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "solid");
+  const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
+  const Scene first = trainer.scene();
+  while (trainer.iteration() < options.iterations / 8 + keys - 1) trainer.step();
+  const Surfels& main = trainer.scene().main;
+  int64_t carried = 0, free = 0, let_go = 0;
+  for (int64_t i = 0; i < first.main.count(); ++i) {
+    if (main.body[i] >= 0) {
+      ++carried;
+      EXPECT_NEAR(sigmoid(main.opacity_logit[i]), solid_opacity, 1e-5);
+    } else if (first.main.body[i] >= 0) {
+      ++let_go;
+      EXPECT_LT(sigmoid(main.opacity_logit[i]), 0.9F);
+    } else {
+      free += main.opacity_logit[i] != first.main.opacity_logit[i] ? 1 : 0;
+    }
+  }
+  EXPECT_GT(carried, 100);
+  EXPECT_GT(free, 100);
+  EXPECT_GT(let_go, 0);
+  trainer.step();
+  trainer.step();
+  int64_t learns = 0;
+  for (int64_t i = 0; i < first.main.count(); ++i) {
+    if (main.body[i] >= 0) learns += std::abs(sigmoid(main.opacity_logit[i]) - solid_opacity) > 1e-4F;
+  }
+  EXPECT_GT(learns, carried / 4);
 }
 
 TEST(Tracker, AViewMovesThePosesOfTimesNearItButNotTheFirst) {

@@ -82,6 +82,11 @@ void hold_first_key(Motion& gradient) {
                HoldFirstKey{gradient.keys(), gradient.rotation.data(), gradient.shift.data()});
 }
 
+void hold_opacities(const Tensor<int32_t>& body, int64_t count, Surfels& gradient) {
+  parallel_for(gradient.device(), "motion: hold opacities", count,
+               HoldOpacity{body.data(), gradient.opacity_logit.data()});
+}
+
 void spread_over_keys(const Motion& motion, float width, Motion& gradient) {
   static thread_local Tensor<float> spread;
   for (Tensor<float>* const numbers : {&gradient.rotation, &gradient.shift}) {

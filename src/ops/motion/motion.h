@@ -35,6 +35,9 @@ void backward(const Motion& motion, const Tensor<int32_t>& body, float time, con
 // the same; the points that it began with say how large it is as long as its first pose stands.
 void hold_first_key(Motion& gradient);
 
+// Zeroes the gradient by the opacities of those of the first `count` surfels that a body carries.
+void hold_opacities(const Tensor<int32_t>& body, int64_t count, Surfels& gradient);
+
 // Convolves a gradient of `motion` in place with exp(−d²/2w²), cut off at 3w, along each body's keys, d
 // apart; width w > 0, in keys. A view's gradient is by at most two neighbouring keys, so that a step against
 // the spread one still goes downhill.

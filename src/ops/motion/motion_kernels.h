@@ -131,6 +131,16 @@ struct HoldFirstKey {
   }
 };
 
+// i: a surfel.
+struct HoldOpacity {
+  const int32_t* body;
+  float* opacity_logit;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (body[i] >= 0) opacity_logit[i] = 0;
+  }
+};
+
 // i: a body's key.
 struct SpreadOverKeys {
   const float* from;

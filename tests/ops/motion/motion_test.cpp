@@ -158,6 +158,15 @@ TEST(Motion, HoldsTheFirstKeyAndNoOther) {
   }
 }
 
+TEST(Motion, HoldsTheOpacitiesOfWhatIsCarried) {
+  Surfels gradient;
+  gradient.opacity_logit = tensor_of(std::vector<float>{1, 2, 3, 4, 5});
+  gradient.position.reset({5, 3});
+  motion::hold_opacities(tensor_of(std::vector<int32_t>{0, -1, 1, -2, 1}), 4, gradient);
+  const std::vector<float> held = {0, 2, 0, 4, 5};
+  EXPECT_TRUE(std::ranges::equal(gradient.opacity_logit.values(), held));
+}
+
 TEST(Motion, SpreadsAGradientOverKeysAsAGaussian) {
   constexpr int64_t keys = 30, at = 11;
   constexpr float width = 2.5F;
