@@ -200,7 +200,7 @@ struct TrackOptions {
     v.field("colour", colour, "",
             "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
     v.field("new_surface", new_surface, "",
-            "Add surfels where a mask covers a pixel and no body does, at each new time.");
+            "Add surfels inside masks where no body has any, at each new time.");
     v.field("true_poses", true_poses, "",
             "Take poses from the capture's true motion, for tests: an upper bound for tracking.");
   }

@@ -33,6 +33,18 @@ TEST_F(MotionOnDevice, SpreadsGradientsAsTheCpu) {
   expect_close(there.shift.on(Device::cpu), here.shift, 1e-5, "shift");
 }
 
+TEST_F(MotionOnDevice, HoldsOpacitiesAsTheCpu) {
+  Surfels here;
+  here.position.reset({700, 3});
+  here.opacity_logit.reset({700});
+  here.opacity_logit.fill(2);
+  Surfels there = here.on(Device::cuda);
+  const Tensor<int32_t> body = bodies_in_turn(700, 3);
+  motion::hold_opacities(body, 650, here);
+  motion::hold_opacities(body.on(Device::cuda), 650, there);
+  EXPECT_TRUE(same_bytes(there.opacity_logit.on(Device::cpu), here.opacity_logit));
+}
+
 TEST_F(MotionOnDevice, BendsAsTheCpu) {
   const Nodes nodes = random_nodes(7, 2, 4);
   const PosedSurfels posed = random_posed(700, 1);
