@@ -228,7 +228,7 @@ TEST(Tracker, LeavesReflectionsAloneAndAddsOnlySurfaceOfBodiesWhileTheyAreFollow
   const Tumbling at;
   TrainOptions options = little_following();
   options.density.max_surfels = 2000;
-  options.deform.track.new_surface = true;
+  options.deform.track.steps = 8;
   Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "left_alone");
   const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
   const Scene first = trainer.scene();

@@ -9,6 +9,7 @@ template void cuda::for_each_index(const char*, int64_t, const motion::MoveSurfe
 template void cuda::for_each_index(const char*, int64_t, const motion::PullKeys&);
 template void cuda::for_each_index(const char*, int64_t, const motion::TurnGradientBack&);
 template void cuda::for_each_index(const char*, int64_t, const motion::HoldFirstKey&);
+template void cuda::for_each_index(const char*, int64_t, const motion::HoldOpacity&);
 template void cuda::for_each_index(const char*, int64_t, const motion::SpreadOverKeys&);
 template void cuda::sum_each_index<motion::Pull>(const char*, int64_t, const motion::PullOfSurfel&,
                                                  const motion::KeepPull&);
