@@ -73,6 +73,15 @@ std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View
 // Decodes the views that are not in the cache, on all threads, until the cache is full. Whoever reads views
 // in order calls this ahead with the next few.
 void prefetch(const Capture& capture, std::span<const View> views);
+// A photograph by itself, as finely as it is stored but at most `widest` pixels wide, and never more coarsely
+// than the view.
+struct FinePhotograph {
+  Camera<float> camera;
+  Tensor<float> colour;    // H×W×3 in [0, 1]
+  Tensor<float> coverage;  // H×W in [0, 1], how much of a pixel the mask covers; empty without one
+};
+// Decodes it; the cache is not used.
+FinePhotograph load_fine_photograph(const Capture& capture, const View& view, int64_t widest);
 ViewTruth load_truth(const Capture& capture, const View& view);
 
 }  // namespace traceflow

@@ -1,6 +1,8 @@
 #include "capture/image_cache.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/parallel.h"
 #include "capture/decode.h"
@@ -93,6 +95,26 @@ std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View
   auto images = std::make_shared<ViewImages>();
   widen(*load_pixels(capture, view), *images);
   return images;
+}
+
+FinePhotograph load_fine_photograph(const Capture& capture, const View& view, int64_t widest) {
+  ViewSource source = capture.images->source(view.id);
+  const auto stored = static_cast<int64_t>(source.lens.width);
+  const int64_t factor = std::clamp<int64_t>((stored + widest - 1) / widest, 1, source.factor);
+  const auto finer = static_cast<float>(source.factor) / static_cast<float>(factor);
+  source.factor = static_cast<int>(factor);
+  ViewPixels pixels;
+  pixels.colour = decode_colour(source).colour;
+  if (source.mask) pixels.coverage = decode_mask(source).coverage;
+  ViewImages images;
+  widen(pixels, images);
+  FinePhotograph photograph{view.camera, std::move(images.colour), std::move(images.coverage)};
+  Camera<float>& camera = photograph.camera;
+  camera.width = static_cast<int>(source.width());
+  camera.height = static_cast<int>(source.height());
+  for (float* length : {&camera.focal_x, &camera.focal_y, &camera.centre_x, &camera.centre_y})
+    *length *= finer;
+  return photograph;
 }
 
 void prefetch(const Capture& capture, std::span<const View> views) {

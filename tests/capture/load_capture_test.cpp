@@ -341,6 +341,34 @@ TEST(Downscale, keeps_the_geometry_where_the_size_does_not_divide) {
   EXPECT_THROW(load_capture(fake.path(), options), InputError);
 }
 
+// The photograph by itself is what a capture of another size has.
+TEST(Downscale, finer_photographs_are_those_of_finer_captures) {
+  NerfDsCapture fake;
+  Tensor<uint8_t> mask({8, 12});
+  for (int64_t i = 0; i < mask.size(); i += 3) mask[i] = 255;
+  fake.write_image("mask/1x/000000_left.png.png", mask);
+  fake.save();
+  CaptureOptions options;
+  options.downscale = 4;
+  const Capture coarse = load_capture(fake.path(), options);
+  for (const auto& [widest, downscale] : {std::pair{100, 1}, {12, 1}, {11, 2}, {5, 3}, {1, 4}}) {
+    options.downscale = downscale;
+    const Capture fine = load_capture(fake.path(), options);
+    const FinePhotograph photograph = load_fine_photograph(coarse, coarse.train[0], widest);
+    const auto images = load_images(fine, fine.train[0]);
+    EXPECT_TRUE(std::ranges::equal(photograph.colour.values(), images->colour.values())) << widest;
+    EXPECT_TRUE(std::ranges::equal(photograph.coverage.values(), images->coverage.values())) << widest;
+    const Camera<float>&found = photograph.camera, &expected = fine.train[0].camera;
+    EXPECT_EQ(found.width, expected.width);
+    EXPECT_EQ(found.height, expected.height);
+    EXPECT_FLOAT_EQ(found.focal_x, expected.focal_x);
+    EXPECT_FLOAT_EQ(found.focal_y, expected.focal_y);
+    EXPECT_FLOAT_EQ(found.centre_x, expected.centre_x);
+    EXPECT_FLOAT_EQ(found.centre_y, expected.centre_y);
+    EXPECT_EQ(found.position, expected.position);
+  }
+}
+
 TEST(Distortion, moves_the_camera_and_the_pixels_together) {
   // A wide grey wall with one bright spot in a known direction; the lens moves the spot, the straightened
   // view puts it where the view's pinhole says.
