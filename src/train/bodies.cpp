@@ -181,9 +181,25 @@ void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
 
 }  // namespace
 
-void make_solid(Surfels& surfels) {
+void make_solid(const Motion& motion, Surfels& surfels) {
+  constexpr float widest = 1.5F;  // medians
+  std::vector<std::vector<float>> scales(static_cast<size_t>(motion.bodies()));
   for (int64_t i = 0; i < surfels.count(); ++i) {
-    if (surfels.body[i] >= 0) surfels.opacity_logit[i] = logit(solid_opacity);
+    if (surfels.body[i] >= 0)
+      scales[static_cast<size_t>(surfels.body[i])].push_back(
+          std::max(surfels.log_scale(i, 0), surfels.log_scale(i, 1)));
+  }
+  std::vector<float> most;
+  for (std::vector<float>& of_body : scales) {
+    const auto middle = of_body.begin() + static_cast<std::ptrdiff_t>(of_body.size() / 2);
+    std::nth_element(of_body.begin(), middle, of_body.end());
+    most.push_back(of_body.empty() ? 0 : *middle + std::log(widest));
+  }
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    if (surfels.body[i] < 0) continue;
+    surfels.opacity_logit[i] = logit(solid_opacity);
+    for (float* scale : {&surfels.log_scale(i, 0), &surfels.log_scale(i, 1)})
+      *scale = std::min(*scale, most[static_cast<size_t>(surfels.body[i])]);
   }
 }
 

@@ -13,8 +13,10 @@ namespace traceflow {
 // The opacity of the points that bodies carry while they are followed. Where it learns, surfels of the front
 // fade, larger ones behind them show through, and the surface that pictures show moves away.
 inline constexpr float solid_opacity = 0.95F;
-// Gives that opacity to all that bodies carry.
-void make_solid(Surfels& surfels);
+// Gives that opacity to all that bodies carry, and lets none start wider than 1.5 times its body's median.
+// Points are sparse here and there on the sides that no picture has shown yet, and the wide surfels there
+// stick out when they come to the rim: silhouettes then push the body away.
+void make_solid(const Motion& motion, Surfels& surfels);
 
 // A body for each connected part of the earliest photograph's mask: it carries the surfels that project into
 // it and lie no farther behind its front than it is wide. Sets surfels.body and returns bodies that stand

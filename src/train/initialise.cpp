@@ -269,7 +269,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   }
   if (finds_bodies) scene.main_motion = find_bodies(capture, scene.main);
   if (options.deform.track.true_poses) take_true_poses(capture, scene);
-  if (scene.main_motion) make_solid(scene.main);
+  if (scene.main_motion) make_solid(*scene.main_motion, scene.main);
   if (options.deform.main)
     scene.main_field = make_field(options.deform.network, residual::main_outputs, random);
 

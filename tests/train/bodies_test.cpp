@@ -1,4 +1,5 @@
 #include "train/bodies.h"
+#include "train/ball_body.h"
 
 #include <gtest/gtest.h>
 
@@ -257,6 +258,26 @@ TEST(Tracker, LeavesReflectionsAloneAndAddsOnlySurfaceOfBodiesWhileTheyAreFollow
   EXPECT_FALSE(same(trainer.scene().main.position, first.main.position));
   while (trainer.iteration() < options.iterations) trainer.step();
   EXPECT_FALSE(rests());
+}
+
+// The widest of a body are narrowed, and nothing else changes in size.
+TEST(Bodies, StartSolidAndWithoutWideSurfels) {
+  Surfels surfels = ball_body::ball();
+  const Motion motion = ball_body::turned_by(Vec3<double>(0));
+  const float median = surfels.log_scale[0];
+  surfels.body[5] = -1;
+  for (const int64_t i : {3, 4, 5}) surfels.log_scale(i, 0) = median + 1;
+  surfels.log_scale(7, 1) = median + 0.2F;
+  const Surfels before = surfels;
+  make_solid(motion, surfels);
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    const bool is_carried = i != 5;
+    EXPECT_FLOAT_EQ(sigmoid(surfels.opacity_logit[i]), is_carried ? solid_opacity : sigmoid(4.0F));
+    for (int k = 0; k < 2; ++k) {
+      const float most = is_carried ? median + std::log(1.5F) : median + 1;
+      EXPECT_FLOAT_EQ(surfels.log_scale(i, k), std::min(before.log_scale(i, k), most)) << i;
+    }
+  }
 }
 
 // Of points that bodies carry opacities learn when the film has been followed; others learn from the start.
