@@ -23,6 +23,7 @@ constexpr double blur_falls = 0.7;
 // A step turns a body by at most so many radians and shifts it by so many of its radii.
 constexpr double most_turn = 0.1, most_shift = 0.15;
 constexpr double relative_damping = 1e-3, least_damping = 1e-3;
+constexpr double pi = 3.141592653589793;
 constexpr int tries = 3;
 constexpr double shorter = 0.4;
 
@@ -169,8 +170,9 @@ double robust_cost(const Tensor<float>& residuals) {
 }
 
 // Adds Σ w J Jᵀ and −Σ w J r.
-void add_normal_equations(const Tensor<float>& residuals, const Tensor<float>& jacobian, size_t params,
-                          std::vector<double>& a, std::vector<double>& b) {
+void add_normal_equations(const Tensor<float>& residuals, const Tensor<float>& jacobian,
+                          NormalEquations& equations) {
+  const size_t params = equations.b.size();
   const int64_t pixels = residuals.size() / channels;
   constexpr int64_t block = 512;
   const auto blocks = static_cast<size_t>((pixels + block - 1) / block);
@@ -200,8 +202,8 @@ void add_normal_equations(const Tensor<float>& residuals, const Tensor<float>& j
   });
   for (const std::vector<double>& sums : partial) {
     for (size_t p = 0; p < params; ++p) {
-      for (size_t q = 0; q <= p; ++q) a[p * params + q] += sums[p * params + q];
-      b[p] += sums[params * params + p];
+      for (size_t q = 0; q <= p; ++q) equations.a[p * params + q] += sums[p * params + q];
+      equations.b[p] += sums[params * params + p];
     }
   }
 }
@@ -309,15 +311,83 @@ const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& wei
   return r;
 }
 
-std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, double damping,
-                                     bool depth_is_held, double& cost) {
-  std::vector<double> a(params_ * params_), b(params_);
-  cost = 0;
+double PoseSolver::add_targets(const TrackWeights& weights, double sigma, NormalEquations& equations) {
+  double cost = 0;
   for (size_t k = 0; k < targets_.size(); ++k) {
     const Residuals& r = look(k, weights, sigma, true);
     cost += robust_cost(r.value);
-    add_normal_equations(r.value, r.jacobian, params_, a, b);
+    add_normal_equations(r.value, r.jacobian, equations);
   }
+  return cost;
+}
+
+void PoseSolver::hold_loose(NormalEquations& equations) const {
+  std::vector<double>& a = equations.a;
+  for (size_t p = 0; p < params_; ++p) {
+    for (size_t q = 0; q < p; ++q) a[q * params_ + p] = a[p * params_ + q];
+  }
+  for (size_t body = 0; body < loose_.size(); ++body) {
+    const Mat3<double> keep = Mat3<double>(1) - loose_[body];
+    const size_t first = pose_size * body;
+    // Of three numbers `apart` places from one another.
+    const auto project = [&](double* values, size_t apart) {
+      const Vec3<double> kept = keep * Vec3<double>(values[0], values[apart], values[2 * apart]);
+      for (size_t c = 0; c < 3; ++c) values[c * apart] = kept[static_cast<int>(c)];
+    };
+    for (size_t p = 0; p < params_; ++p) project(&a[first * params_ + p], params_);
+    for (size_t p = 0; p < params_; ++p) project(&a[p * params_ + first], 1);
+    project(&equations.b[first], 1);
+  }
+}
+
+double PoseSolver::alignment_cost(NormalEquations* equations) const {
+  double cost = 0;
+  for (const Alignment& alignment : alignments_) cost += align(alignment, motion_, key_, loose_, equations);
+  return cost;
+}
+
+std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWeights& weights) {
+  // Surfels are flat. The blur takes out how they show one by one as a round surface turns.
+  constexpr double sigma = 2;  // pixels
+  const bool any = std::any_of(targets_.begin(), targets_.end(),
+                               [](const TrackTarget& target) { return !target.normal_prior.empty(); });
+  if (!any) return {};
+  weigh_colour(weights);
+  NormalEquations equations{std::vector<double>(params_ * params_), std::vector<double>(params_)};
+  add_targets(weights, sigma, equations);
+  std::vector<SymmetricEigen<3, double>> result;
+  for (size_t body = 0; body < radius_.size(); ++body) {
+    const auto block = [&](size_t down, size_t right) {
+      Mat3<double> m;
+      for (size_t p = 0; p < 3; ++p) {
+        for (size_t q = 0; q < 3; ++q) {
+          const size_t i = pose_size * body + down + p, j = pose_size * body + right + q;
+          m[static_cast<int>(q)][static_cast<int>(p)] =
+              equations.a[std::max(i, j) * params_ + std::min(i, j)];
+        }
+      }
+      return m;
+    };
+    double pixels = 0;
+    for (const TrackTarget& target : targets_) {
+      const Vec3<double> away =
+          load3<double>(pivot_.row(static_cast<int64_t>(body))) - Vec3<double>(target.camera.position);
+      pixels += pi * std::pow(target.camera.focal_x * radius_[body] / glm::length(away), 2);
+    }
+    const Mat3<double> turn = block(0, 0), both = block(0, 3), shift = block(3, 3) + Mat3<double>(1e-9);
+    const Mat3<double> reduced = turn - both * inverse(shift) * transpose(both);
+    result.push_back(symmetric_eigen(reduced / pixels));
+  }
+  return result;
+}
+
+std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, double damping,
+                                     bool depth_is_held, double& cost) {
+  NormalEquations equations{std::vector<double>(params_ * params_), std::vector<double>(params_)};
+  cost = add_targets(weights, sigma, equations);
+  hold_loose(equations);
+  cost += alignment_cost(&equations);
+  auto& [a, b] = equations;
   // Shifts in radii, so that both kinds of numbers are of one size.
   const auto unit = [&](size_t p) { return p % pose_size < 3 ? 1.0 : radius_[p / pose_size]; };
   for (size_t p = 0; p < params_; ++p) {
@@ -375,7 +445,7 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
     bool better = false;
     for (int attempt = 0; attempt < tries && !better; ++attempt) {
       take(found);
-      double after = 0;
+      double after = alignment_cost(nullptr);
       for (size_t at = 0; at < targets_.size(); ++at)
         after += robust_cost(look(at, weights, sigma, false).value);
       better = after < before;

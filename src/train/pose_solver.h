@@ -1,13 +1,16 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "math/camera.h"
+#include "math/symmetric_eigen.h"
 #include "ops/motion/motion.h"
 #include "ops/raster/raster.h"
 #include "scene/nodes.h"
 #include "scene/surfels.h"
+#include "train/photo_alignment.h"
 
 namespace traceflow {
 
@@ -48,6 +51,14 @@ class PoseSolver {
   const std::vector<TrackTarget>& targets() const { return targets_; }
   // How pictures are drawn.
   const raster::Options& drawing() const { return options_; }
+  // How stiffly what is weighed holds each body's turns where it stands, least first: eigenvalues of the
+  // normal equations of ω (radians, its shift free), over the pixels of a disk of its size, and their axes.
+  // Empty without targets.
+  std::vector<SymmetricEigen<3, double>> turn_stiffness(const TrackWeights& weights);
+  // Turns that silhouettes, normals and the model's colours do not change: only photographs that are compared
+  // do.
+  void loosen(LooseTurns loose) { loose_ = std::move(loose); }
+  void compare(Alignment alignment) { alignments_.push_back(std::move(alignment)); }
   // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
   void solve(const TrackWeights& weights, const PoseSteps& steps);
   // How colour alone would turn the bodies from where they are, which stay there: ω of each, radians.
@@ -63,6 +74,12 @@ class PoseSolver {
   void weigh_colour(const TrackWeights& weights);
   // at: of a target. sigma: of the blur, pixels. Until the next call.
   const Residuals& look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
+  // Adds what the targets ask for; returns the cost.
+  double add_targets(const TrackWeights& weights, double sigma, NormalEquations& equations);
+  // Takes the loose turns out of the equations.
+  void hold_loose(NormalEquations& equations) const;
+  // The cost of the photographs that are compared.
+  double alignment_cost(NormalEquations* equations) const;
   // The step that a view of all targets asks for, limited; the cost where they stand.
   std::vector<double> step(const TrackWeights& weights, double sigma, double damping, bool depth_is_held,
                            double& cost);
@@ -81,6 +98,8 @@ class PoseSolver {
   motion::SavedPtr saved_;
   Tensor<float> pivot_;
   std::vector<Tensor<float>> colour_weight_;  // of each target, H×W
+  LooseTurns loose_;                          // empty, or of each body
+  std::vector<Alignment> alignments_;
   raster::Output whole_;
   raster::SavedPtr blended_;
   Residuals residuals_;

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "capture/capture.h"
+#include "math/symmetric_eigen.h"
 #include "render/render_options.h"
 #include "scene/scene.h"
 #include "train/new_surface.h"
@@ -11,14 +12,23 @@
 
 namespace traceflow {
 
-// Whether the colours of a body belong to its surface. A texture turns with the body; a mirror image stays
-// behind, so that colour alone would take back a part of each turn. Gathered over the times followed.
+// Which colours tell how a body turns; gathered over the times followed, for each of B bodies. Empty before.
+// A texture turns with the body; a mirror image stays behind, so that the model's colours would take back a
+// part of each turn. Where silhouettes and normals hardly tell a turn, as that of a ball, photographs are
+// compared: what they show decides, and if it is a mirror image nothing is lost.
 struct ColourTrust {
   Tensor<double> taken_back;  // B, Σ −ω·d, radians²: d the last turn by normals and silhouettes, ω what
                               // colour alone would add to it
-  Tensor<double> turned;  // B, Σ d·d
+  Tensor<double> turned;     // B, Σ d·d
+  Tensor<double> stiffness;  // B×3: Σ of the least and of the middle stiffness, and of how many times
 
+  // Whether the model's colours belong to the surface.
   bool holds(int64_t body) const;
+  void add_stiffness(const std::vector<SymmetricEigen<3, double>>& now);
+  // The turns of each body that photographs decide, by the mean stiffness and the axes now
+  // (PoseSolver::turn_stiffness): none, those about the least stiff axis, or all. What looks the same however
+  // it turns about two axes is a ball.
+  LooseTurns loose_turns(const std::vector<SymmetricEigen<3, double>>& now) const;
 };
 
 // Finds where rigid bodies are at a time of the film: Gauss–Newton on six numbers a body, from what does not
@@ -48,7 +58,12 @@ class Tracker {
  private:
   TrackTarget target_of(const View& view) const;
   PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent) const;
-  TrackWeights weights(const Motion& motion, const ColourTrust& trust) const;
+  TrackWeights weights(const Motion& motion, const ColourTrust& trust, const LooseTurns& loose) const;
+  // Lets the solver compare the key's photograph with earlier ones, where photographs decide turns.
+  void compare_photographs(PoseSolver& solver, const Surfels& main, const Motion& motion, int64_t key,
+                           float extent, const LooseTurns& loose) const;
+  // Of the pictures that are drawn of a view.
+  Camera<float> drawn_camera(const View& view) const;
 
   TrackOptions options_;
   RenderOptions render_;

@@ -55,6 +55,7 @@ Safetensors Trainer::checkpoint() const {
   if (!colour_trust_.turned.empty()) {
     file.add("colour_trust/taken_back", colour_trust_.taken_back);
     file.add("colour_trust/turned", colour_trust_.turned);
+    file.add("colour_trust/stiffness", colour_trust_.stiffness);
   }
   file.add("views/order", views_.order());
   Tensor<int64_t> random(Shape{4});
@@ -99,9 +100,11 @@ void Trainer::resume() {
   colour_trust_ = {};
   if (file.has("colour_trust/turned")) {
     colour_trust_ = {file.tensor<double>("colour_trust/taken_back"),
-                     file.tensor<double>("colour_trust/turned")};
+                     file.tensor<double>("colour_trust/turned"),
+                     file.tensor<double>("colour_trust/stiffness")};
     const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
-    if (colour_trust_.turned.shape() != bodies || colour_trust_.taken_back.shape() != bodies)
+    if (colour_trust_.turned.shape() != bodies || colour_trust_.taken_back.shape() != bodies ||
+        colour_trust_.stiffness.shape() != Shape{bodies[0], 3})
       throw InputError("checkpoint", "colour_trust", colour_trust_.turned.shape().to_string(),
                        bodies.to_string());
   }

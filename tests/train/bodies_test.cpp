@@ -428,7 +428,7 @@ TEST(Bodies, BendWhereSilhouettesGetWorse) {
 // any.
 TEST(Tracker, TrustsColourThatTakesBackLittle) {
   const auto holds = [](double taken_back, double turned) {
-    return ColourTrust{tensor_of(std::vector<double>{taken_back}), tensor_of(std::vector<double>{turned})}
+    return ColourTrust{tensor_of(std::vector<double>{taken_back}), tensor_of(std::vector<double>{turned}), {}}
         .holds(0);
   };
   EXPECT_FALSE(ColourTrust().holds(0));

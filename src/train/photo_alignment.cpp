@@ -1,0 +1,175 @@
+#include "train/photo_alignment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "base/parallel.h"
+#include "math/rotation.h"
+
+namespace traceflow {
+
+namespace {
+
+// Detail is what is finer than so many pixels. Coarser patterns are shading, which stays where it is when a
+// body turns: at four pixels a quarter of each turn was lost on a small ball.
+constexpr double detail_sigma = 2;
+// The weight of a difference of colours, and where the cost of one becomes linear.
+constexpr double weight = 1.5, huber_width = 0.05;
+constexpr float least_cosine = 0.3F;  // between a surface and the ray to it
+constexpr int64_t most_samples = 2000;
+
+Tensor<float> blurred(const Tensor<float>& image, double sigma) {
+  const int64_t height = image.dim(0), width = image.dim(1);
+  const auto radius = static_cast<int64_t>(std::ceil(2.5 * sigma));
+  std::vector<float> taps;
+  float sum = 0;
+  for (int64_t k = -radius; k <= radius; ++k) {
+    taps.push_back(static_cast<float>(std::exp(-0.5 * static_cast<double>(k * k) / (sigma * sigma))));
+    sum += taps.back();
+  }
+  for (float& tap : taps) tap /= sum;
+  const auto pass = [&](const Tensor<float>& from, bool down) {
+    Tensor<float> to(image.shape());
+    parallel_blocks("alignment: blur", height, 4, [&](int64_t begin, int64_t end) {
+      for (int64_t y = begin; y < end; ++y) {
+        for (int64_t x = 0; x < width; ++x) {
+          Vec3<float> mean(0);
+          for (int64_t k = -radius; k <= radius; ++k) {
+            const int64_t row = down ? std::clamp<int64_t>(y + k, 0, height - 1) : y;
+            const int64_t column = down ? x : std::clamp<int64_t>(x + k, 0, width - 1);
+            mean += taps[static_cast<size_t>(k + radius)] * load3<float>(&from(row, column, 0));
+          }
+          store3(&to(y, x, 0), mean);
+        }
+      }
+    });
+    return to;
+  };
+  return pass(pass(image, false), true);
+}
+
+bool faces(const Vec3<double>& normal, const Vec3<double>& ray) {
+  return -dot(normal, ray) > least_cosine * length(ray);
+}
+
+// A photograph at a place between pixels, and its derivatives along both sides.
+struct Looked {
+  Vec3<double> value, by_x, by_y;
+};
+
+// Bilinear; none outside of the mask or the picture.
+std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
+  const auto column = static_cast<int64_t>(std::floor(x - 0.5)),
+             row = static_cast<int64_t>(std::floor(y - 0.5));
+  if (column < 0 || row < 0 || column + 1 >= photo.camera.width || row + 1 >= photo.camera.height)
+    return std::nullopt;
+  for (const int64_t r : {row, row + 1}) {
+    for (const int64_t c : {column, column + 1}) {
+      if (photo.mask(r, c) == 0) return std::nullopt;
+    }
+  }
+  const double right = x - 0.5 - static_cast<double>(column), down = y - 0.5 - static_cast<double>(row);
+  const auto at = [&](int64_t r, int64_t c) { return load3<double>(&photo.detail(row + r, column + c, 0)); };
+  const Vec3<double> top = (1 - right) * at(0, 0) + right * at(0, 1);
+  const Vec3<double> bottom = (1 - right) * at(1, 0) + right * at(1, 1);
+  return Looked{(1 - down) * top + down * bottom,
+                (1 - down) * (at(0, 1) - at(0, 0)) + down * (at(1, 1) - at(1, 0)), bottom - top};
+}
+
+// Adds one residual, weighted: its derivative by ω, whose numbers begin at `first`.
+void add_row(NormalEquations& equations, size_t first, const Vec3<double>& row, double residual,
+             double share) {
+  const size_t params = equations.b.size();
+  for (int p = 0; p < 3; ++p) {
+    const size_t at = first + static_cast<size_t>(p);
+    for (int q = 0; q <= p; ++q)
+      equations.a[at * params + first + static_cast<size_t>(q)] += share * row[p] * row[q];
+    equations.b[at] -= share * row[p] * residual;
+  }
+}
+
+}  // namespace
+
+DetailPhoto detail_of(FinePhotograph photograph) {
+  DetailPhoto photo{photograph.camera, std::move(photograph.colour),
+                    Tensor<uint8_t>(photograph.coverage.shape())};
+  const Tensor<float> mean = blurred(photo.detail, detail_sigma);
+  for (int64_t i = 0; i < mean.size(); ++i) photo.detail[i] -= mean[i];
+  for (int64_t i = 0; i < photo.mask.size(); ++i) photo.mask[i] = photograph.coverage[i] >= 0.5F ? 1 : 0;
+  return photo;
+}
+
+std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySurface& surface,
+                                         const Motion& motion, int64_t key, const LooseTurns& loose) {
+  std::vector<std::vector<DetailSample>> found(loose.size());
+  const Camera<float>& drawn = surface.camera;
+  const float ratio = drawn.focal_x / photo.camera.focal_x;
+  const auto shrunk = [&](int64_t k, int size) {
+    return std::min<int64_t>(size - 1, static_cast<int64_t>((static_cast<float>(k) + 0.5F) * ratio));
+  };
+  for (int64_t y = 0; y < photo.camera.height; ++y) {
+    for (int64_t x = 0; x < photo.camera.width; ++x) {
+      if (photo.mask(y, x) == 0) continue;
+      const int64_t at = shrunk(y, drawn.height) * drawn.width + shrunk(x, drawn.width);
+      SurfacePoint point = surface.points[static_cast<size_t>(at)];
+      if (point.body < 0 || loose[static_cast<size_t>(point.body)] == Mat3<double>(0)) continue;
+      const Vec3<float> ray =
+          photo.camera.ray_in_world(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
+      if (!faces(Vec3<double>(point.normal), Vec3<double>(ray))) continue;
+      // The drawn pixel's plane, where the finer pixel's ray meets it.
+      const float away = dot(point.normal, point.position - photo.camera.position) / dot(point.normal, ray);
+      point.position = photo.camera.position + away * ray;
+      found[static_cast<size_t>(point.body)].push_back(
+          {at_rest(point, motion, key), load3<float>(&photo.detail(y, x, 0))});
+    }
+  }
+  std::vector<DetailSample> samples;
+  for (const std::vector<DetailSample>& of_body : found) {
+    const size_t every = (of_body.size() + most_samples - 1) / most_samples;
+    for (size_t i = 0; i < of_body.size(); i += every) samples.push_back(of_body[i]);
+  }
+  return samples;
+}
+
+double align(const Alignment& alignment, const Motion& motion, int64_t key, const LooseTurns& loose,
+             NormalEquations* equations) {
+  const Camera<double> camera = convert<double>(alignment.photo->camera);
+  const Mat3<double> axes = transpose(camera.camera_from_world);  // columns: the camera's axes in world
+  std::vector<Mat3<double>> rotation;
+  for (int64_t b = 0; b < motion.bodies(); ++b)
+    rotation.push_back(rotation_from_quaternion(load4<double>(&motion.rotation(b, key, 0))));
+  double cost = 0;
+  for (const DetailSample& sample : alignment.samples) {
+    const auto body = static_cast<size_t>(sample.rest.body);
+    const Vec3<double> centre = load3<double>(motion.centre.row(sample.rest.body));
+    const Vec3<double> arm = rotation[body] * (Vec3<double>(sample.rest.position) - centre);
+    const Vec3<double> point = centre + arm + load3<double>(&motion.shift(sample.rest.body, key, 0));
+    const Vec3<double> in_camera = camera.point_in_camera(point);
+    if (!(in_camera.z > 0)) continue;
+    const Vec2<double> at = camera.project(in_camera);
+    const bool is_seen = faces(rotation[body] * Vec3<double>(sample.rest.normal), point - camera.position);
+    const std::optional<Looked> there = is_seen ? look(*alignment.photo, at.x, at.y) : std::nullopt;
+    if (!there) {
+      cost += alignment.weight * huber_width / 2;  // leaving the view pays no better than a difference
+      continue;
+    }
+    // Of the pixel, by the point.
+    const Vec3<double> x_by = camera.focal_x / in_camera.z * (axes[0] - in_camera.x / in_camera.z * axes[2]);
+    const Vec3<double> y_by = camera.focal_y / in_camera.z * (axes[1] - in_camera.y / in_camera.z * axes[2]);
+    for (int c = 0; c < 3; ++c) {
+      const double residual = weight * (there->value[c] - static_cast<double>(sample.detail[c]));
+      const double size = std::abs(residual);
+      cost +=
+          alignment.weight * (size < huber_width ? size * size / (2 * huber_width) : size - huber_width / 2);
+      if (equations == nullptr) continue;
+      const Vec3<double> by_point = weight * (there->by_x[c] * x_by + there->by_y[c] * y_by);
+      add_row(*equations, 6 * body, loose[body] * cross(arm, by_point), residual,
+              alignment.weight / std::max(huber_width, size));
+    }
+  }
+  return cost;
+}
+
+}  // namespace traceflow

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "capture/capture.h"
+#include "train/body_surface.h"
+
+// Direct alignment: how a body has turned from one photograph to another, by its texture. It needs no colours
+// of the model, which are blurred while bodies are followed.
+namespace traceflow {
+
+// A photograph as alignment compares it.
+struct DetailPhoto {
+  Camera<float> camera;
+  Tensor<float> detail;  // H×W×3, the colour less its mean within a few pixels: what shading leaves
+  Tensor<uint8_t> mask;  // H×W
+};
+DetailPhoto detail_of(FinePhotograph photograph);
+
+// Points of bodies at rest, with the detail that the photograph of one time shows there.
+struct DetailSample {
+  SurfacePoint rest;
+  Vec3<float> detail{0};
+};
+
+// Which turns of each body photographs decide: projects its ω onto them; 0 for none.
+using LooseTurns = std::vector<Mat3<double>>;
+
+// The samples of a key, at most 2,000 of each body that has loose turns. surface: as drawn at that key.
+std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySurface& surface,
+                                         const Motion& motion, int64_t key, const LooseTurns& loose);
+
+// What an earlier time says of the photograph of another.
+struct Alignment {
+  std::shared_ptr<const DetailPhoto> photo;  // of the time whose poses are sought
+  std::vector<DetailSample> samples;
+  double weight = 1;  // of a sample's cost
+};
+
+// Normal equations of P numbers: a (P×P, row-major, the lower triangle) and b.
+struct NormalEquations {
+  std::vector<double> a, b;
+};
+
+// The robust cost (Huber) of the alignment with bodies as they stand at a key. Adds to `equations`, six
+// numbers a body of which ω (about its pivot) is used, unless it is null. Its b is the cost's derivative,
+// negative.
+double align(const Alignment& alignment, const Motion& motion, int64_t key, const LooseTurns& loose,
+             NormalEquations* equations);
+
+}  // namespace traceflow

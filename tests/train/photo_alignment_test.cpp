@@ -1,0 +1,143 @@
+#include "train/photo_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "math/rotation_group.h"
+#include "train/ball_body.h"
+#include "train/tracker.h"
+
+namespace traceflow {
+namespace {
+
+using ball_body::ball, ball_body::centre, ball_body::picture_of, ball_body::radius, ball_body::turned_by;
+
+const Vec3<double> turned_since(0.03, 0.09, -0.02);
+
+// A ball with a pattern that is a few pixels wide.
+Surfels patterned_ball() {
+  Surfels s = ball();
+  s.log_scale.fill(std::log(0.03F));
+  for (int64_t i = 0; i < s.count(); ++i) {
+    const Vec3<double> x = load3<double>(s.position.row(i)) - centre;
+    const double wave = std::sin(35 * x.x) + std::sin(35 * x.y + 1) + std::sin(35 * x.z + 2);
+    ball_body::paint(Vec3<double>(0.5 + 0.15 * wave, 0.5 - 0.1 * wave, 0.4), s.sh.row(i));
+  }
+  return s;
+}
+
+// Stretched along the axes.
+Surfels stretched_ball(const Vec3<double>& by) {
+  Surfels s = ball();
+  for (int64_t i = 0; i < s.count(); ++i) {
+    const Vec3<double> x = load3<double>(s.position.row(i)) - centre;
+    store3(s.position.row(i), centre + by * x);
+    const Vec4<double> towards = quaternion_towards(normalize(x / by));
+    for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(towards[k]);
+  }
+  return s;
+}
+
+DetailPhoto photo_of(const TrackTarget& picture) {
+  return detail_of({picture.camera, picture.colour, picture.coverage});
+}
+
+// The ball at rest, to be compared with the photograph of the ball where it has been turned.
+Alignment alignment_of(const Surfels& surfels, const LooseTurns& loose) {
+  const TrackTarget rest = picture_of(surfels, Vec3<double>(0), false);
+  const Motion still = turned_by(Vec3<double>(0));
+  return {std::make_shared<const DetailPhoto>(photo_of(picture_of(surfels, turned_since, false))),
+          detail_samples(photo_of(rest), draw_bodies(rest.camera, still, 0, surfels, {}), still, 0, loose),
+          1};
+}
+
+TEST(PhotoAlignment, SamplesLieOnTheBallAndFaceOutwards) {
+  const Surfels surfels = patterned_ball();
+  const Alignment alignment = alignment_of(surfels, {Mat3<double>(1)});
+  ASSERT_GT(alignment.samples.size(), 800U);
+  double off = 0, turned = 0;
+  for (const DetailSample& sample : alignment.samples) {
+    const Vec3<double> arm = Vec3<double>(sample.rest.position) - centre;
+    off += std::abs(glm::length(arm) / radius - 1);
+    turned += 1 - dot(normalize(arm), Vec3<double>(sample.rest.normal));
+  }
+  const auto count = static_cast<double>(alignment.samples.size());
+  EXPECT_LT(off, 0.02 * count);
+  EXPECT_LT(turned, 0.01 * count);
+  EXPECT_TRUE(alignment_of(surfels, {Mat3<double>(0)}).samples.empty());
+}
+
+TEST(PhotoAlignment, TheEquationsHoldTheCostsDerivative) {
+  const Surfels surfels = patterned_ball();
+  const LooseTurns loose{Mat3<double>(1)};
+  const Alignment alignment = alignment_of(surfels, loose);
+  const Vec3<double> at = 0.5 * turned_since;
+  NormalEquations equations{std::vector<double>(36), std::vector<double>(6)};
+  const double cost = align(alignment, turned_by(at), 0, loose, &equations);
+  EXPECT_DOUBLE_EQ(cost, align(alignment, turned_by(at), 0, loose, nullptr));
+  constexpr double step = 2e-4;
+  double size = 0, off = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto moved = [&](double by) {
+      Vec3<double> turn(0);
+      turn[axis] = by;
+      const Vec4<double> q = quaternion_product(quaternion_exp(turn), quaternion_exp(at));
+      return align(alignment, turned_by(quaternion_log(q)), 0, loose, nullptr);
+    };
+    const double expected = -(moved(step) - moved(-step)) / (2 * step);
+    const double found = equations.b[static_cast<size_t>(axis)];
+    size = std::max(size, std::abs(expected));
+    off = std::max(off, std::abs(found - expected));
+  }
+  EXPECT_GT(size, 1);
+  EXPECT_LT(off, 0.03 * size);
+}
+
+// Neither silhouettes nor normals tell how a ball has turned. Its photographs do, and where they are not
+// compared it is left as it was.
+TEST(PhotoAlignment, FindsHowABallHasTurned) {
+  const Surfels surfels = patterned_ball();
+  const LooseTurns loose{Mat3<double>(1)};
+  for (const bool compares : {false, true}) {
+    Motion motion = turned_by(Vec3<double>(0));
+    PoseSolver solver(surfels, nullptr, motion, 0, {}, {picture_of(surfels, turned_since, false)});
+    solver.loosen(loose);
+    if (compares) solver.compare(alignment_of(surfels, loose));
+    solver.solve({0.5F, 0.3F, {0.0F}}, {8, 1});
+    const Vec3<double> found = quaternion_log(unit_quaternion(load4<double>(&motion.rotation(0, 0, 0))));
+    const Vec3<double> expected = compares ? turned_since : Vec3<double>(0);
+    EXPECT_LT(glm::length(found - expected), compares ? 0.05 * glm::length(turned_since) : 1e-6) << compares;
+  }
+}
+
+std::vector<SymmetricEigen<3, double>> stiffness_of(const Surfels& surfels) {
+  Motion motion = turned_by(Vec3<double>(0));
+  return PoseSolver(surfels, nullptr, motion, 0, {}, {picture_of(surfels, Vec3<double>(0), false)})
+      .turn_stiffness({0.5F, 0.3F, {0.0F}});
+}
+
+// A ball turns freely about all axes, a spindle about its own, and what has three lengths about none.
+TEST(PhotoAlignment, LooseTurnsAreThoseOfTheShape) {
+  const auto turns = [](const Vec3<double>& by) {
+    return ColourTrust().loose_turns(stiffness_of(stretched_ball(by)))[0];
+  };
+  EXPECT_EQ(turns(Vec3<double>(1)), Mat3<double>(1));
+  const Mat3<double> spindle = turns({0.6, 1.4, 0.6});
+  EXPECT_GT(spindle[1][1], 0.98);
+  EXPECT_NEAR(spindle[0][0] + spindle[1][1] + spindle[2][2], 1, 1e-9);
+  EXPECT_EQ(turns({1.0, 0.5, 0.25}), Mat3<double>(0));
+}
+
+// One picture in which lumps of a ball pass for an edge does not stop its turns from being loose.
+TEST(PhotoAlignment, LooseTurnsAreThoseOfTheMeanStiffness) {
+  const std::vector<SymmetricEigen<3, double>> round = stiffness_of(ball()),
+                                               stiff = stiffness_of(stretched_ball({1.0, 0.5, 0.25}));
+  ColourTrust trust;
+  for (int k = 0; k < 20; ++k) trust.add_stiffness(round);
+  trust.add_stiffness(stiff);
+  EXPECT_EQ(trust.loose_turns(stiff)[0], Mat3<double>(1));
+}
+
+}  // namespace
+}  // namespace traceflow
