@@ -5,8 +5,8 @@
 #include <optional>
 #include <utility>
 
-#include "base/parallel.h"
 #include "math/rotation.h"
+#include "train/gaussian_blur.h"
 
 namespace traceflow {
 
@@ -19,36 +19,6 @@ constexpr double detail_sigma = 2;
 constexpr double weight = 1.5, huber_width = 0.05;
 constexpr float least_cosine = 0.3F;  // between a surface and the ray to it
 constexpr int64_t most_samples = 2000;
-
-Tensor<float> blurred(const Tensor<float>& image, double sigma) {
-  const int64_t height = image.dim(0), width = image.dim(1);
-  const auto radius = static_cast<int64_t>(std::ceil(2.5 * sigma));
-  std::vector<float> taps;
-  float sum = 0;
-  for (int64_t k = -radius; k <= radius; ++k) {
-    taps.push_back(static_cast<float>(std::exp(-0.5 * static_cast<double>(k * k) / (sigma * sigma))));
-    sum += taps.back();
-  }
-  for (float& tap : taps) tap /= sum;
-  const auto pass = [&](const Tensor<float>& from, bool down) {
-    Tensor<float> to(image.shape());
-    parallel_blocks("alignment: blur", height, 4, [&](int64_t begin, int64_t end) {
-      for (int64_t y = begin; y < end; ++y) {
-        for (int64_t x = 0; x < width; ++x) {
-          Vec3<float> mean(0);
-          for (int64_t k = -radius; k <= radius; ++k) {
-            const int64_t row = down ? std::clamp<int64_t>(y + k, 0, height - 1) : y;
-            const int64_t column = down ? x : std::clamp<int64_t>(x + k, 0, width - 1);
-            mean += taps[static_cast<size_t>(k + radius)] * load3<float>(&from(row, column, 0));
-          }
-          store3(&to(y, x, 0), mean);
-        }
-      }
-    });
-    return to;
-  };
-  return pass(pass(image, false), true);
-}
 
 bool faces(const Vec3<double>& normal, const Vec3<double>& ray) {
   return -dot(normal, ray) > least_cosine * length(ray);
@@ -95,7 +65,8 @@ void add_row(NormalEquations& equations, size_t first, const Vec3<double>& row, 
 DetailPhoto detail_of(FinePhotograph photograph) {
   DetailPhoto photo{photograph.camera, std::move(photograph.colour),
                     Tensor<uint8_t>(photograph.coverage.shape())};
-  const Tensor<float> mean = blurred(photo.detail, detail_sigma);
+  Tensor<float> mean = photo.detail, scratch;
+  gaussian_blur(mean, scratch, photo.camera.height, photo.camera.width, 3, detail_sigma);
   for (int64_t i = 0; i < mean.size(); ++i) photo.detail[i] -= mean[i];
   for (int64_t i = 0; i < photo.mask.size(); ++i) photo.mask[i] = photograph.coverage[i] >= 0.5F ? 1 : 0;
   return photo;

@@ -53,7 +53,7 @@ class PoseSolver {
   const raster::Options& drawing() const { return options_; }
   // How stiffly what is weighed holds each body's turns where it stands, least first: eigenvalues of the
   // normal equations of ω (radians, its shift free), over the pixels of a disk of its size, and their axes.
-  // Empty without targets.
+  // Empty without normal priors: silhouettes alone hold hardly anything.
   std::vector<SymmetricEigen<3, double>> turn_stiffness(const TrackWeights& weights);
   // Turns that silhouettes, normals and the model's colours do not change: only photographs that are compared
   // do.

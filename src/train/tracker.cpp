@@ -62,7 +62,7 @@ bool ColourTrust::holds(int64_t body) const {
 }
 
 void ColourTrust::add_stiffness(const std::vector<SymmetricEigen<3, double>>& now) {
-  if (stiffness.empty()) stiffness.reset({static_cast<int64_t>(now.size()), 3});
+  if (stiffness.empty() && !now.empty()) stiffness.reset({static_cast<int64_t>(now.size()), 3});
   for (size_t b = 0; b < now.size(); ++b) {
     if (!(now[b].values[2] > 0)) continue;  // it is not in view
     double* const sums = stiffness.row(static_cast<int64_t>(b));
@@ -208,15 +208,16 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   const TrackWeights geometry = weights(motion, {}, {});
   const PoseSteps steps{options_.steps, options_.blur};
   if (options_.colour == 0) return solver.solve(geometry, steps);
+  if (trust.turned.empty()) {
+    trust.turned.reset({motion.bodies()});
+    trust.taken_back.reset({motion.bodies()});
+    trust.stiffness.reset({motion.bodies(), 3});
+  }
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
   trust.add_stiffness(stiffness);
   const LooseTurns loose = trust.loose_turns(stiffness);
   solver.loosen(loose);
   solver.solve(geometry, steps);
-  if (trust.turned.empty()) {
-    trust.turned.reset({motion.bodies()});
-    trust.taken_back.reset({motion.bodies()});
-  }
   const std::vector<Vec3<double>> back = solver.turns_by_colour();
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     const Vec3<double> turn = turn_between(motion, b, std::max<int64_t>(0, key - keys_for_trust), key);

@@ -189,6 +189,33 @@ TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   }
 }
 
+// Without normal priors nothing is known of how stiffly bodies are held.
+TEST(Trainer, BodiesWithoutNormalPriorsAreResumedToo) {
+  const fs::path bare = fs::path(::testing::TempDir()) / ("no_normals_" + std::to_string(::getpid()));
+  fs::copy(capture_folder(), bare, fs::copy_options::recursive);
+  fs::remove_all(bare / "normal");
+  TrainOptions options = small_run(40);
+  options.deform.kind = "nodes";
+  Capture capture = load_capture(bare, options.capture);
+  ASSERT_FALSE(capture.has_normal_priors);
+  Trainer whole(options, std::move(capture), bare / "whole");
+  ASSERT_TRUE(whole.scene().main_motion.has_value());
+  whole.run(never);
+  for (const int pause : {13, 40}) {
+    Trainer part(options, load_capture(bare, options.capture), bare / "parts");
+    if (pause == 40) part.resume();
+    std::atomic<bool> stop{false};
+    part.stream().listen([&](const events::Event& event) {
+      const auto* step = std::get_if<events::Step>(&event);
+      if (step && step->iteration == pause) stop = true;
+    });
+    part.run(stop);
+    if (pause == 40) {
+      EXPECT_EQ(scene_bytes(part.scene()), scene_bytes(whole.scene()));
+    }
+  }
+}
+
 TEST(Trainer, TheCheckpointBeforeTheLastIsKeptAndServesWhenTheLastIsDamaged) {
   TrainOptions options = small_run(12);
   options.save_every = 5;
