@@ -9,6 +9,7 @@
 #include "base/tensor.h"
 #include "capture/formats/capture_options.h"
 #include "capture/formats/finding.h"
+#include "capture/point_tracks.h"
 #include "math/camera.h"
 #include "scene/scene.h"
 
@@ -47,6 +48,7 @@ struct Capture {
   std::vector<View> train;
   std::vector<View> test;
   Tensor<float> points;  // P×3, normalised scene; may be empty
+  PointTracks tracks;    // may be empty
   SceneNormalisation normalisation;
   float near_plane = 0;  // scene.json's, normalised scene units; 0 when absent
   float far_plane = 0;

@@ -61,6 +61,7 @@ class Assembly {
     take_points();
     find_masks();
     find_priors();
+    find_tracks();
     find_truth();
     choose_axes();
     // They quote names from files.
@@ -345,26 +346,54 @@ class Assembly {
         });
   }
 
-  // One element for each training id in the order of the capture's list, or one for each of all ids.
+  // The ids that the elements of an array belong to: one for each training id in the order of the capture's
+  // list, or one for each of all ids. Null where neither fits.
+  const std::vector<std::string>* ids_of_rows(const Shape& shape) const {
+    for (const auto* ids : {&found_.train_ids, &found_.all_ids}) {
+      if (shape.rank() > 0 && shape[0] == static_cast<int64_t>(ids->size())) return ids;
+    }
+    return nullptr;
+  }
+  std::string meaning_of_rows() const {
+    return "T the training views (" + std::to_string(found_.train_ids.size()) + ") or all (" +
+           std::to_string(found_.all_ids.size()) + ")";
+  }
+
   void take_prior_array(const TreeFile& file) {
     shared_.prior_array.emplace(file.open());
     const Shape& shape = shared_.prior_array->shape();
-    const bool fits_train = shape.rank() == 4 && shape[0] == static_cast<int64_t>(found_.train_ids.size());
-    const bool fits_all = shape.rank() == 4 && shape[0] == static_cast<int64_t>(found_.all_ids.size());
-    if ((!fits_train && !fits_all) || shape[3] != 3 || shape.elements() == 0) {
-      throw InputError(file.name(), "shape", shape.to_string(),
-                       "T×H×W×3 with T the training views (" + std::to_string(found_.train_ids.size()) +
-                           ") or all (" + std::to_string(found_.all_ids.size()) + ")",
+    const std::vector<std::string>* const ids = ids_of_rows(shape);
+    if (ids == nullptr || shape.rank() != 4 || shape[3] != 3 || shape.elements() == 0) {
+      throw InputError(file.name(), "shape", shape.to_string(), "T×H×W×3 with " + meaning_of_rows(),
                        "make the priors again or take the file away");
     }
     if (!is_image_size(shape[2], shape[1]))
       throw InputError(file.name(), "shape", shape.to_string(), image_size_limits, "scale the priors down");
-    const std::vector<std::string>& ids = fits_train ? found_.train_ids : found_.all_ids;
-    for (size_t i = 0; i < ids.size(); ++i) {
-      const auto found = sources_.find(ids[i]);
+    for (size_t i = 0; i < ids->size(); ++i) {
+      const auto found = sources_.find((*ids)[i]);
       if (found != sources_.end()) found->second.prior_slice = static_cast<int64_t>(i);
     }
     capture_.has_normal_priors = true;
+  }
+
+  void find_tracks() {
+    const TreeFile file = first_file({"tracks.npy"});
+    if (!file) return;
+    const NpyFile array(file.open());
+    const Shape& shape = array.shape();
+    const std::vector<std::string>* const ids = ids_of_rows(shape);
+    if (ids == nullptr || shape.rank() != 3 || shape[2] != 3) {
+      throw InputError(file.name(), "shape", shape.to_string(), "T×N×3 with " + meaning_of_rows(),
+                       "attach the tracks again or take the file away");
+    }
+    std::unordered_map<std::string, int64_t> row_of;
+    for (size_t i = 0; i < ids->size(); ++i) row_of.emplace((*ids)[i], static_cast<int64_t>(i));
+    std::vector<TrackRow> rows;
+    for (const View& view : capture_.train) {
+      const auto row = row_of.find(view.id);
+      rows.push_back({row == row_of.end() ? -1 : row->second, &sources_.at(view.id)});
+    }
+    capture_.tracks = tracks_of_rows(array.read(), rows);
   }
 
   // size_of_its: width and height of what belongs to a view, if there is such. It reads the header of every

@@ -19,6 +19,7 @@
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
 #include "prepare/programs.h"
+#include "prepare/track_source.h"
 
 namespace traceflow::prepare {
 
@@ -27,14 +28,15 @@ namespace {
 namespace fs = std::filesystem;
 using Say = std::function<void(const std::string& line)>;
 
-// What is attached in one go: a folder, and all that a reader would take beside or before it.
+// What is attached in one go: a folder or a file, and all that a reader would take beside or before it.
 struct Kind {
-  const char* folder;
+  const char* name;
   std::vector<const char*> replaced;
 };
-const std::array<Kind, 2> kinds = {
-    {{"normal", {"normal", "normal.npz", "normal.npy"}}, {"mask", {"mask", "resized_mask"}}}};
-const Kind &normals_kind = kinds[0], &masks_kind = kinds[1];
+const std::array<Kind, 3> kinds = {{{"normal", {"normal", "normal.npz", "normal.npy"}},
+                                    {"mask", {"mask", "resized_mask"}},
+                                    {"tracks.npy", {"tracks.npy"}}}};
+const Kind &normals_kind = kinds[0], &masks_kind = kinds[1], &tracks_kind = kinds[2];
 
 // Everything new lies here, until it is whole.
 class Staging {
@@ -42,7 +44,7 @@ class Staging {
   explicit Staging(const fs::path& capture) : capture_(capture), folder_(capture / ".attach-priors") {
     // Killed between putting the old aside and putting the new in its place.
     for (const Kind& kind : kinds) {
-      if (fs::exists(folder_ / kind.folder)) put_back(kind);
+      if (fs::exists(folder_ / kind.name)) put_back(kind);
     }
     fs::remove_all(folder_);
     fs::create_directories(folder_);
@@ -55,21 +57,21 @@ class Staging {
   Staging& operator=(const Staging&) = delete;
 
   fs::path operator/(const fs::path& name) const { return folder_ / name; }
-  // Puts the folders made here in the place of what the capture has: all, or none.
+  // Puts what was made here in the place of what the capture has: all, or none.
   void move_in() const {
     std::vector<const Kind*> moved;
     try {
       for (const Kind& kind : kinds) {
-        if (!fs::exists(folder_ / kind.folder)) continue;
+        if (!fs::exists(folder_ / kind.name)) continue;
         moved.push_back(&kind);
         for (const char* name : kind.replaced) {
           if (fs::exists(capture_ / name)) fs::rename(capture_ / name, old(name));
         }
-        fs::rename(folder_ / kind.folder, capture_ / kind.folder);
+        fs::rename(folder_ / kind.name, capture_ / kind.name);
       }
     } catch (const fs::filesystem_error&) {
       for (const Kind* kind : moved) {
-        if (!fs::exists(folder_ / kind->folder)) fs::rename(capture_ / kind->folder, folder_ / kind->folder);
+        if (!fs::exists(folder_ / kind->name)) fs::rename(capture_ / kind->name, folder_ / kind->name);
         put_back(*kind);
       }
       throw;
@@ -208,11 +210,37 @@ void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOption
                   capture.train.size() + capture.test.size(), 100 * covered));
 }
 
+void attach_tracks(const Capture& capture, const ViewIds& ids, const AttachOptions& options,
+                   const Staging& staging, const Say& say) {
+  const TrackSource source(options.tracks);
+  const auto matched = match_views(options.tracks, {}, source.times(), ids);
+  const Lens& lens = capture.images->source(capture.train.front().id).lens;
+  const double width = options.tracks_width > 0 ? options.tracks_width : lens.width;
+  const Tensor<float> rows = source.rows(ids.listed_train, matched, width, lens.height * width / lens.width);
+  int64_t seen = 0, inside = 0;
+  for (int64_t i = 0; i < rows.size(); i += 3) {
+    if (rows[i + 2] == 0) continue;
+    ++seen;
+    if (rows[i] >= 0 && rows[i] <= 1 && rows[i + 1] >= 0 && rows[i + 1] <= 1) ++inside;
+  }
+  if (2 * inside < seen || seen == 0) {
+    throw InputError(options.tracks, "tracks",
+                     fmt::format("{} of {} visible points in pictures {:g} pixels wide", inside, seen, width),
+                     "most of them", "say with --tracks-width how wide the pictures were that were tracked");
+  }
+  write_npy(staging / tracks_kind.name, rows);
+  say(fmt::format("{:<10}{} points on {} training views, each seen by {:.0f} in the mean", "tracks",
+                  source.points(), capture.train.size(),
+                  static_cast<double>(inside) / static_cast<double>(source.points())));
+}
+
 }  // namespace
 
 void AttachOptions::validate() const {
-  if (normals.empty() && masks.empty())
-    throw InputError("option", "normals", "nothing", "--normals, --masks or both");
+  if (normals.empty() && masks.empty() && tracks.empty())
+    throw InputError("option", "normals", "nothing", "--normals, --masks or --tracks");
+  if (tracks_width < 0)
+    throw InputError("option", "tracks_width", std::to_string(tracks_width), "a number from 0 on");
 }
 
 std::map<std::string, int64_t> match_views(const std::string& origin, const std::vector<std::string>& names,
@@ -275,12 +303,14 @@ void attach_priors(const fs::path& capture, const AttachOptions& options, const 
   const FolderLock lock(capture / ".attach-priors.lock", capture, "attaching priors");
   if (!options.normals.empty()) refuse_to_replace(capture, normals_kind, options);
   if (!options.masks.empty()) refuse_to_replace(capture, masks_kind, options);
+  if (!options.tracks.empty()) refuse_to_replace(capture, tracks_kind, options);
   const CaptureOptions size = at_largest_size(capture);
   const Capture loaded = load_capture(capture, size);
   const ViewIds ids = ids_in(loaded, size);
   const Staging staging(capture);
   if (!options.normals.empty()) attach_normals(loaded, ids, options, staging, say, stop);
   if (!options.masks.empty()) attach_masks(loaded, ids, options, staging, say, stop);
+  if (!options.tracks.empty()) attach_tracks(loaded, ids, options, staging, say);
   staging.move_in();
 }
 

@@ -15,6 +15,8 @@ namespace traceflow::prepare {
 struct AttachOptions {
   std::string normals;
   std::string masks;
+  std::string tracks;
+  int tracks_width = 0;
   PriorAxes axes = PriorAxes::automatic;
   bool force = false;
 
@@ -24,16 +26,20 @@ struct AttachOptions {
             "An .npz or .npy array T×H×W×3 of normals, a film of pictures of them, or a folder of such "
             "pictures.");
     v.field("masks", masks, "", "A folder or film with the moving object white.");
+    v.field("tracks", tracks, "",
+            "An .npz array of points that were tracked: tracks (T×N×2, pixels) and visibility (T×N).");
+    v.field("tracks_width", tracks_width, "pixels",
+            "Width of the pictures that were tracked; 0: that of the photographs.");
     v.field("axes", axes, "", "Axes of the normals; automatic: by agreement with the capture's points.");
-    v.field("force", force, "", "Replaces normals and masks that are there.");
+    v.field("force", force, "", "Replaces normals, masks and tracks that are there.");
   }
   void validate() const;
 };
 
-// Puts normals and masks of other programs into the folder of a capture of any format: normal/1x/ID.png with
-// 16 bits and the axes that are the default there (x right, y up, z to the viewer), mask/1x/ID.png.png. `say`
-// gets a line for everything found. Throws InputError, with the capture as it was, also where another process
-// is at it; and Stopped.
+// Puts normals, masks and tracks of other programs into the folder of a capture of any format:
+// normal/1x/ID.png with 16 bits and the axes that are the default there (x right, y up, z to the viewer),
+// mask/1x/ID.png.png, tracks.npy. `say` gets a line for everything found. Throws InputError, with the capture
+// as it was, also where another process is at it; and Stopped.
 void attach_priors(const std::filesystem::path& capture, const AttachOptions& options,
                    const std::function<void(const std::string& line)>& say, const std::atomic<bool>& stop);
 

@@ -174,6 +174,7 @@ void TrackOptions::validate() const {
   check_not_negative(silhouette, "deform.track.silhouette");
   check_not_negative(normal, "deform.track.normal");
   check_not_negative(colour, "deform.track.colour");
+  check_not_negative(tracks, "deform.track.tracks");
 }
 
 void BendOptions::validate() const {

@@ -181,6 +181,7 @@ struct TrackOptions {
   float silhouette = 0.5F;
   float normal = 0.3F;
   float colour = 0.3F;
+  float tracks = 1;
   bool new_surface = true;
   bool true_poses = false;
 
@@ -199,6 +200,8 @@ struct TrackOptions {
     v.field("normal", normal, "", "Weight of the residual of normals.");
     v.field("colour", colour, "",
             "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
+    v.field("tracks", tracks, "",
+            "Weight of the capture's tracked points, on bodies that they are seen to turn with.");
     v.field("new_surface", new_surface, "",
             "Add surfels inside masks where no body has any, at each new time.");
     v.field("true_poses", true_poses, "",

@@ -48,18 +48,6 @@ std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
                 (1 - down) * (at(0, 1) - at(0, 0)) + down * (at(1, 1) - at(1, 0)), bottom - top};
 }
 
-// Adds one residual, weighted: its derivative by ω, whose numbers begin at `first`.
-void add_row(NormalEquations& equations, size_t first, const Vec3<double>& row, double residual,
-             double share) {
-  const size_t params = equations.b.size();
-  for (int p = 0; p < 3; ++p) {
-    const size_t at = first + static_cast<size_t>(p);
-    for (int q = 0; q <= p; ++q)
-      equations.a[at * params + first + static_cast<size_t>(q)] += share * row[p] * row[q];
-    equations.b[at] -= share * row[p] * residual;
-  }
-}
-
 }  // namespace
 
 DetailPhoto detail_of(FinePhotograph photograph) {
@@ -136,8 +124,9 @@ double align(const Alignment& alignment, const Motion& motion, int64_t key, cons
           alignment.weight * (size < huber_width ? size * size / (2 * huber_width) : size - huber_width / 2);
       if (equations == nullptr) continue;
       const Vec3<double> by_point = weight * (there->by_x[c] * x_by + there->by_y[c] * y_by);
-      add_row(*equations, 6 * body, loose[body] * cross(arm, by_point), residual,
-              alignment.weight / std::max(huber_width, size));
+      const Vec3<double> by_turn = loose[body] * cross(arm, by_point);
+      equations->add<3>(6 * body, {by_turn.x, by_turn.y, by_turn.z}, residual,
+                        alignment.weight / std::max(huber_width, size));
     }
   }
   return cost;

@@ -5,6 +5,7 @@
 
 #include "capture/capture.h"
 #include "train/body_surface.h"
+#include "train/normal_equations.h"
 
 // Direct alignment: how a body has turned from one photograph to another, by its texture. It needs no colours
 // of the model, which are blurred while bodies are followed.
@@ -36,11 +37,6 @@ struct Alignment {
   std::shared_ptr<const DetailPhoto> photo;  // of the time whose poses are sought
   std::vector<DetailSample> samples;
   double weight = 1;  // of a sample's cost
-};
-
-// Normal equations of P numbers: a (P×P, row-major, the lower triangle) and b.
-struct NormalEquations {
-  std::vector<double> a, b;
 };
 
 // The robust cost (Huber) of the alignment with bodies as they stand at a key. Adds to `equations`, six

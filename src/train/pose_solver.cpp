@@ -282,10 +282,24 @@ void PoseSolver::hold_loose(NormalEquations& equations) const {
   }
 }
 
-double PoseSolver::alignment_cost(NormalEquations* equations) const {
+double PoseSolver::cost_of_tracks(const std::vector<bool>& decide, NormalEquations* equations) const {
+  std::vector<TrackedPart> parts(radius_.size());
+  for (size_t body = 0; body < parts.size(); ++body) {
+    if (!decide.empty() && decide[body])
+      parts[body] = {Mat3<double>(1), true};
+    else if (!loose_.empty())
+      parts[body].turns = loose_[body];
+  }
+  double cost = 0;
+  for (const Reprojection& reprojection : reprojections_)
+    cost += reproject(reprojection, motion_, key_, parts, equations);
+  return cost;
+}
+
+double PoseSolver::cost_of_texture(const TrackWeights& weights, NormalEquations* equations) const {
   double cost = 0;
   for (const Alignment& alignment : alignments_) cost += align(alignment, motion_, key_, loose_, equations);
-  return cost;
+  return cost + cost_of_tracks(weights.tracks, equations);
 }
 
 std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWeights& weights) {
@@ -295,7 +309,7 @@ std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWei
                                [](const TrackTarget& target) { return !target.normal_prior.empty(); });
   if (!any) return {};
   weigh_colour(weights);
-  NormalEquations equations{std::vector<double>(params_ * params_), std::vector<double>(params_)};
+  NormalEquations equations(params_);
   add_targets(weights, sigma, equations);
   std::vector<SymmetricEigen<3, double>> result;
   for (size_t body = 0; body < radius_.size(); ++body) {
@@ -323,12 +337,16 @@ std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWei
   return result;
 }
 
-std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, double damping,
-                                     bool depth_is_held, double& cost) {
-  NormalEquations equations{std::vector<double>(params_ * params_), std::vector<double>(params_)};
+std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, bool depth_is_held,
+                                     double& cost) {
+  NormalEquations equations(params_);
   cost = add_targets(weights, sigma, equations);
   hold_loose(equations);
-  cost += alignment_cost(&equations);
+  cost += cost_of_texture(weights, &equations);
+  return solved(std::move(equations), least_damping, depth_is_held);
+}
+
+std::vector<double> PoseSolver::solved(NormalEquations equations, double damping, bool depth_is_held) const {
   auto& [a, b] = equations;
   // Shifts in radii, so that both kinds of numbers are of one size.
   const auto unit = [&](size_t p) { return p % pose_size < 3 ? 1.0 : radius_[p / pose_size]; };
@@ -382,12 +400,12 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
   for (int k = 0; k < steps.count; ++k) {
     const double sigma = steps.blur * std::pow(blur_falls, k);
     double before = 0;
-    std::vector<double> found = step(weights, sigma, least_damping, steps.hold_depth, before);
+    std::vector<double> found = step(weights, sigma, steps.hold_depth, before);
     const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
     bool better = false;
     for (int attempt = 0; attempt < tries && !better; ++attempt) {
       take(found);
-      double after = alignment_cost(nullptr);
+      double after = cost_of_texture(weights, nullptr);
       for (size_t at = 0; at < targets_.size(); ++at)
         after += robust_cost(look(at, weights, sigma, false).value);
       better = after < before;
@@ -400,16 +418,13 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
   }
 }
 
-std::vector<Vec3<double>> PoseSolver::turns_by_colour() {
+template <class F>
+std::vector<Vec3<double>> PoseSolver::turns_of_steps(F&& next) {
   constexpr int steps = 3;
-  constexpr double sigma = 1;    // pixels
-  constexpr double damping = 1;  // what colour does not tell stays
-  const TrackWeights colour{0, 0, std::vector<float>(static_cast<size_t>(motion_.bodies()), 1.0F)};
   const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
-  weigh_colour(colour);
   for (int k = 0; k < steps; ++k) {
-    double cost = 0;
-    take(step(colour, sigma, damping, false, cost));
+    constexpr double damping = 1;  // what is not told stays
+    take(solved(next(), damping, false));
   }
   std::vector<Vec3<double>> turns;
   for (int64_t b = 0; b < motion_.bodies(); ++b) {
@@ -421,6 +436,26 @@ std::vector<Vec3<double>> PoseSolver::turns_by_colour() {
   motion_.shift = shift;
   pose();
   return turns;
+}
+
+std::vector<Vec3<double>> PoseSolver::turns_by_colour() {
+  constexpr double sigma = 1;  // pixels
+  const TrackWeights colour{0, 0, std::vector<float>(radius_.size(), 1.0F), {}};
+  weigh_colour(colour);
+  return turns_of_steps([&] {
+    NormalEquations equations(params_);
+    add_targets(colour, sigma, equations);
+    hold_loose(equations);
+    return equations;
+  });
+}
+
+std::vector<Vec3<double>> PoseSolver::turns_by_tracks() {
+  return turns_of_steps([&] {
+    NormalEquations equations(params_);
+    cost_of_tracks(std::vector<bool>(radius_.size(), true), &equations);
+    return equations;
+  });
 }
 
 }  // namespace traceflow

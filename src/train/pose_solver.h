@@ -11,6 +11,7 @@
 #include "scene/nodes.h"
 #include "scene/surfels.h"
 #include "train/photo_alignment.h"
+#include "train/reprojection.h"
 
 namespace traceflow {
 
@@ -27,7 +28,10 @@ struct TrackTarget {
 // Weights of what is compared: residuals are in [0, 1], normals unit.
 struct TrackWeights {
   float silhouette = 0, normal = 0;
-  std::vector<float> colour;  // of each body
+  // Of each body.
+  std::vector<float> colour = {};
+  std::vector<bool> tracks =
+      {};  // whether tracked points decide its pose, or its loose turns alone; empty: those
 };
 
 // How poses are solved.
@@ -56,13 +60,16 @@ class PoseSolver {
   // Empty without normal priors: silhouettes alone hold hardly anything.
   std::vector<SymmetricEigen<3, double>> turn_stiffness(const TrackWeights& weights);
   // Turns that silhouettes, normals and the model's colours do not change: only photographs that are compared
-  // do.
+  // and tracked points do.
   void loosen(LooseTurns loose) { loose_ = std::move(loose); }
   void compare(Alignment alignment) { alignments_.push_back(std::move(alignment)); }
+  void compare(Reprojection reprojection) { reprojections_.push_back(std::move(reprojection)); }
   // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
   void solve(const TrackWeights& weights, const PoseSteps& steps);
-  // How colour alone would turn the bodies from where they are, which stay there: ω of each, radians.
+  // How colour alone, or tracked points alone, would turn the bodies from where they are, which stay there: ω
+  // of each, radians.
   std::vector<Vec3<double>> turns_by_colour();
+  std::vector<Vec3<double>> turns_by_tracks();
 
  private:
   // One view's residuals and how they change.
@@ -78,11 +85,16 @@ class PoseSolver {
   double add_targets(const TrackWeights& weights, double sigma, NormalEquations& equations);
   // Takes the loose turns out of the equations.
   void hold_loose(NormalEquations& equations) const;
-  // The cost of the photographs that are compared.
-  double alignment_cost(NormalEquations* equations) const;
+  // The cost of the photographs and the tracked points that are compared.
+  double cost_of_texture(const TrackWeights& weights, NormalEquations* equations) const;
+  double cost_of_tracks(const std::vector<bool>& decide, NormalEquations* equations) const;
   // The step that a view of all targets asks for, limited; the cost where they stand.
-  std::vector<double> step(const TrackWeights& weights, double sigma, double damping, bool depth_is_held,
-                           double& cost);
+  std::vector<double> step(const TrackWeights& weights, double sigma, bool depth_is_held, double& cost);
+  // Of equations in radians and world units.
+  std::vector<double> solved(NormalEquations equations, double damping, bool depth_is_held) const;
+  // Takes some steps, and returns how they have turned the bodies, which are put back.
+  template <class F>
+  std::vector<Vec3<double>> turns_of_steps(F&& next);
   // Adds to the normal equations' matrix, of shifts in radii, what keeps bodies as far from the camera.
   void hold_depth(std::vector<double>& matrix) const;
   void take(const std::vector<double>& step);
@@ -100,6 +112,7 @@ class PoseSolver {
   std::vector<Tensor<float>> colour_weight_;  // of each target, H×W
   LooseTurns loose_;                          // empty, or of each body
   std::vector<Alignment> alignments_;
+  std::vector<Reprojection> reprojections_;
   raster::Output whole_;
   raster::SavedPtr blended_;
   Residuals residuals_;

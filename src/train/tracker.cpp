@@ -16,15 +16,16 @@ constexpr int widest = 160;
 constexpr int keys_for_speed = 3;
 // How far back the turn lies that colour may take back.
 constexpr int64_t keys_for_trust = 5;
-// Colour is trusted where it takes back less than such a share of the turns, of which there were enough.
+// Colour, or what is tracked, is trusted where it takes back less than such a share of the turns, of which
+// there were enough.
 constexpr double most_taken_back = 0.15;
 constexpr double enough_turned = 0.06;  // radians², Σ over times: as one turn of 14 degrees
 
 // Turns less stiff than this are decided by photographs. The middle one of balls is 0.2 to 0.4, of a kettle
 // and a bust 2 to 4, and of a smooth cylinder 0.55.
 constexpr double least_stiffness = 0.45;
-// Photographs are compared at this width or less.
-constexpr int64_t widest_photograph = 640;
+// Photographs are compared at this width or less, and with those of so many keys before at most.
+constexpr int64_t widest_photograph = 640, oldest_photograph = 9;
 
 // Average of factor × factor pixels.
 Tensor<float> smaller(const Tensor<float>& image, int64_t numbers, int64_t factor) {
@@ -57,12 +58,17 @@ Vec3<double> turn_between(const Motion& motion, int64_t body, int64_t first, int
 
 }  // namespace
 
-bool ColourTrust::holds(int64_t body) const {
+TextureTrust TextureTrust::of(int64_t bodies) {
+  return {Tensor<double>({bodies}), Tensor<double>({bodies}), Tensor<double>({bodies}),
+          Tensor<double>({bodies, 3})};
+}
+
+bool TextureTrust::holds(const Tensor<double>& taken_back, int64_t body) const {
   return !turned.empty() && turned[body] > enough_turned && taken_back[body] < most_taken_back * turned[body];
 }
 
-void ColourTrust::add_stiffness(const std::vector<SymmetricEigen<3, double>>& now) {
-  if (stiffness.empty() && !now.empty()) stiffness.reset({static_cast<int64_t>(now.size()), 3});
+void TextureTrust::add_stiffness(const std::vector<SymmetricEigen<3, double>>& now) {
+  if (stiffness.empty() && !now.empty()) *this = of(static_cast<int64_t>(now.size()));
   for (size_t b = 0; b < now.size(); ++b) {
     if (!(now[b].values[2] > 0)) continue;  // it is not in view
     double* const sums = stiffness.row(static_cast<int64_t>(b));
@@ -72,7 +78,7 @@ void ColourTrust::add_stiffness(const std::vector<SymmetricEigen<3, double>>& no
   }
 }
 
-LooseTurns ColourTrust::loose_turns(const std::vector<SymmetricEigen<3, double>>& now) const {
+LooseTurns TextureTrust::loose_turns(const std::vector<SymmetricEigen<3, double>>& now) const {
   LooseTurns loose;
   for (size_t b = 0; b < now.size(); ++b) {
     std::array<double, 3> sums{now[b].values[0], now[b].values[1], 1};
@@ -151,45 +157,83 @@ PoseSolver Tracker::solver(const Surfels& main, const Nodes* nodes, Motion& moti
   return solver;
 }
 
-void Tracker::compare_photographs(PoseSolver& solver, const Surfels& main, const Motion& motion, int64_t key,
-                                  float extent, const LooseTurns& loose) const {
-  // Keys: the nearest tell the most, the farther ones keep errors from adding up.
-  constexpr std::array<int64_t, 3> earlier = {1, 3, 9};
-  const auto view_at = [&](int64_t k) {
-    return std::find_if(capture_.train.begin(), capture_.train.end(),
-                        [&](const View& view) { return view.time == motion.time[k]; });
-  };
+std::vector<size_t> Tracker::views_at(const Motion& motion, int64_t key) const {
+  std::vector<size_t> views;
+  for (size_t i = 0; i < capture_.train.size(); ++i) {
+    if (capture_.train[i].time == motion.time[key]) views.push_back(i);
+  }
+  return views;
+}
+
+void Tracker::compare_texture(PoseSolver& solver, const Surfels& main, const Motion& motion, int64_t key,
+                              float extent, const LooseTurns& loose) const {
+  // The nearest tell the most, the farther ones keep errors from adding up.
+  constexpr std::array<int64_t, 4> keys_back = {1, 3, 9, 27};
+  const bool has_tracks = !capture_.tracks.empty() && options_.tracks > 0;
+  std::vector<EarlierView> earlier;
+  for (const int64_t back : keys_back) {
+    if (back > key || (back > oldest_photograph && !has_tracks)) break;
+    for (const size_t view : views_at(motion, key - back)) {
+      earlier.push_back({back, view,
+                         draw_bodies(drawn_camera(capture_.train[view]), motion, key - back, main,
+                                     render_.raster_options(extent))});
+      if (!has_tracks) break;
+    }
+  }
+  if (any_turns(loose)) compare_photographs(solver, earlier, motion, key, loose);
+  if (has_tracks) compare_tracks(solver, earlier, motion, key);
+}
+
+void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier,
+                                  const Motion& motion, int64_t key, const LooseTurns& loose) const {
+  constexpr double weight = 1.0 / 3;
   std::shared_ptr<const DetailPhoto> now;
-  for (const int64_t back : earlier) {
-    if (back > key) break;
-    const View &view = *view_at(key), &before = *view_at(key - back);
-    FinePhotograph photograph = load_fine_photograph(capture_, before, widest_photograph);
+  int64_t last = 0;
+  for (const auto& [back, at, surface] : earlier) {
+    if (back == last || back > oldest_photograph) continue;
+    last = back;
+    FinePhotograph photograph = load_fine_photograph(capture_, capture_.train[at], widest_photograph);
     if (photograph.coverage.empty()) continue;
     if (!now) {
-      FinePhotograph newest = load_fine_photograph(capture_, view, widest_photograph);
+      FinePhotograph newest =
+          load_fine_photograph(capture_, capture_.train[views_at(motion, key).front()], widest_photograph);
       if (newest.coverage.empty()) return;
       now = std::make_shared<const DetailPhoto>(detail_of(std::move(newest)));
     }
-    const BodySurface surface =
-        draw_bodies(drawn_camera(before), motion, key - back, main, render_.raster_options(extent));
     // A drawn pixel counts as much as in the other residuals.
     const double finer = static_cast<double>(now->camera.focal_x) / surface.camera.focal_x;
-    solver.compare({now, detail_samples(detail_of(std::move(photograph)), surface, motion, key - back, loose),
-                    1 / (finer * finer * static_cast<double>(earlier.size()))});
+    solver.compare(
+        Alignment{now, detail_samples(detail_of(std::move(photograph)), surface, motion, key - back, loose),
+                  weight / (finer * finer)});
   }
 }
 
-TrackWeights Tracker::weights(const Motion& motion, const ColourTrust& trust, const LooseTurns& loose) const {
-  TrackWeights weights{options_.silhouette, options_.normal, {}};
+void Tracker::compare_tracks(PoseSolver& solver, const std::vector<EarlierView>& earlier,
+                             const Motion& motion, int64_t key) const {
+  for (const size_t view : views_at(motion, key)) {
+    const Camera<float> camera = drawn_camera(capture_.train[view]);
+    for (const auto& [back, at, surface] : earlier) {
+      std::vector<TrackedPoint> points =
+          tracked_points(capture_.tracks, static_cast<int64_t>(at), static_cast<int64_t>(view), surface,
+                         motion, key - back, camera);
+      solver.compare(Reprojection{camera, std::move(points), options_.tracks});
+    }
+  }
+}
+
+TrackWeights Tracker::weights(const Motion& motion, const TextureTrust& trust,
+                              const LooseTurns& loose) const {
+  TrackWeights weights{options_.silhouette, options_.normal, {}, {}};
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     const bool is_ball = !loose.empty() && loose[static_cast<size_t>(b)] == Mat3<double>(1);
-    weights.colour.push_back(trust.holds(b) && !is_ball ? options_.colour : 0.0F);
+    weights.colour.push_back(trust.holds_colour(b) && !is_ball ? options_.colour : 0.0F);
+    weights.tracks.push_back(!capture_.tracks.empty() && trust.holds_tracks(b) && !is_ball);
   }
   return weights;
 }
 
 void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
-                    const PoseSteps& steps, const ColourTrust& trust) const {
+                    const PoseSteps& steps, const TextureTrust& trust) const {
   PoseSteps held = steps;
   held.hold_depth = steps.hold_depth || key == 0;
   PoseSolver solver = this->solver(main, nodes, motion, key, extent);
@@ -197,37 +241,36 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
   if (options_.colour > 0) loose = trust.loose_turns(solver.turn_stiffness(weights(motion, {}, {})));
   solver.loosen(loose);
   // Where bodies bend, what a photograph showed at rest is not known.
-  if (nodes == nullptr && any_turns(loose)) compare_photographs(solver, main, motion, key, extent, loose);
+  if (nodes == nullptr) compare_texture(solver, main, motion, key, extent, loose);
   solver.solve(weights(motion, trust, loose), held);
 }
 
 void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,
-                     ColourTrust& trust) const {
+                     TextureTrust& trust) const {
   predict(motion, key);
   PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
   const TrackWeights geometry = weights(motion, {}, {});
   const PoseSteps steps{options_.steps, options_.blur};
   if (options_.colour == 0) return solver.solve(geometry, steps);
-  if (trust.turned.empty()) {
-    trust.turned.reset({motion.bodies()});
-    trust.taken_back.reset({motion.bodies()});
-    trust.stiffness.reset({motion.bodies(), 3});
-  }
+  if (trust.turned.empty()) trust = TextureTrust::of(motion.bodies());
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
   trust.add_stiffness(stiffness);
   const LooseTurns loose = trust.loose_turns(stiffness);
   solver.loosen(loose);
   solver.solve(geometry, steps);
-  const std::vector<Vec3<double>> back = solver.turns_by_colour();
+  compare_texture(solver, main, motion, key, extent, loose);
+  const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();
   for (int64_t b = 0; b < motion.bodies(); ++b) {
-    const Vec3<double> turn = turn_between(motion, b, std::max<int64_t>(0, key - keys_for_trust), key);
-    trust.taken_back[b] -= dot(back[static_cast<size_t>(b)], turn);
+    // Up to the key before: what errs at this one is not taken for a turn that texture takes back.
+    const Vec3<double> turn = turn_between(motion, b, std::max<int64_t>(0, key - keys_for_trust), key - 1);
+    trust.taken_back_by_colour[b] -= dot(by_colour[static_cast<size_t>(b)], turn);
+    trust.taken_back_by_tracks[b] -= dot(by_tracks[static_cast<size_t>(b)], turn);
     trust.turned[b] += dot(turn, turn);
   }
   const TrackWeights all = weights(motion, trust, loose);
   bool any = any_turns(loose);
-  if (any) compare_photographs(solver, main, motion, key, extent, loose);
-  for (const float weight : all.colour) any = any || weight > 0;
+  for (int64_t b = 0; b < motion.bodies(); ++b)
+    any = any || all.colour[static_cast<size_t>(b)] > 0 || all.tracks[static_cast<size_t>(b)];
   constexpr double little_blur = 1;  // pixels
   if (any) solver.solve(all, {options_.steps / 2, little_blur});
 }

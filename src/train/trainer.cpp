@@ -352,7 +352,7 @@ std::string Trainer::tell_iteration() {
     before_step_.motion = scene_.main_motion;
     before_step_.nodes = scene_.main_nodes;
     before_step_.body = scene_.main.body;
-    before_step_.colour_trust = colour_trust_;
+    before_step_.texture_trust = texture_trust_;
   }
   const Clock::time_point start = Clock::now();
   LossTerms terms;
@@ -463,7 +463,7 @@ void Trainer::step_back() {
       scene_.main_motion = before_step_.motion;
       scene_.main_nodes = before_step_.nodes;
       scene_.main.body = before_step_.body;
-      colour_trust_ = before_step_.colour_trust;
+      texture_trust_ = before_step_.texture_trust;
     }
   }
   tell_density();

@@ -145,7 +145,7 @@ class Trainer {
     std::optional<Motion> motion;
     std::optional<Nodes> nodes;
     Tensor<int32_t> body;
-    ColourTrust colour_trust;
+    TextureTrust texture_trust;
   };
   // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
   // again.
@@ -188,7 +188,7 @@ class Trainer {
   StepMeter meter_;
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
   Draws before_step_;
-  ColourTrust colour_trust_;  // while bodies are followed
+  TextureTrust texture_trust_;  // while bodies are followed
   // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
   bool torn_ = false;
   std::atomic<bool> stop_soon_{false};

@@ -52,10 +52,11 @@ Safetensors Trainer::checkpoint() const {
     file.add("bonds/index", bonds_.index);
     file.add("bonds/distance2", bonds_.distance2);
   }
-  if (!colour_trust_.turned.empty()) {
-    file.add("colour_trust/taken_back", colour_trust_.taken_back);
-    file.add("colour_trust/turned", colour_trust_.turned);
-    file.add("colour_trust/stiffness", colour_trust_.stiffness);
+  if (!texture_trust_.turned.empty()) {
+    file.add("texture_trust/turned", texture_trust_.turned);
+    file.add("texture_trust/taken_back_by_colour", texture_trust_.taken_back_by_colour);
+    file.add("texture_trust/taken_back_by_tracks", texture_trust_.taken_back_by_tracks);
+    file.add("texture_trust/stiffness", texture_trust_.stiffness);
   }
   file.add("views/order", views_.order());
   Tensor<int64_t> random(Shape{4});
@@ -97,15 +98,17 @@ void Trainer::resume() {
     check_bonds(bonds_, scene_.main.count(), bonds_each);
     bonds_ = bonds_.on(device_);
   }
-  colour_trust_ = {};
-  if (file.has("colour_trust/turned")) {
-    colour_trust_ = {file.tensor<double>("colour_trust/taken_back"),
-                     file.tensor<double>("colour_trust/turned"),
-                     file.tensor<double>("colour_trust/stiffness")};
+  texture_trust_ = {};
+  if (file.has("texture_trust/turned")) {
+    TextureTrust& trust = texture_trust_;
+    trust.turned = file.tensor<double>("texture_trust/turned");
+    trust.taken_back_by_colour = file.tensor<double>("texture_trust/taken_back_by_colour");
+    trust.taken_back_by_tracks = file.tensor<double>("texture_trust/taken_back_by_tracks");
+    trust.stiffness = file.tensor<double>("texture_trust/stiffness");
     const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
-    if (colour_trust_.turned.shape() != bodies || colour_trust_.taken_back.shape() != bodies ||
-        colour_trust_.stiffness.shape() != Shape{bodies[0], 3})
-      throw InputError("checkpoint", "colour_trust", colour_trust_.turned.shape().to_string(),
+    if (trust.turned.shape() != bodies || trust.taken_back_by_colour.shape() != bodies ||
+        trust.taken_back_by_tracks.shape() != bodies || trust.stiffness.shape() != Shape{bodies[0], 3})
+      throw InputError("checkpoint", "texture_trust", texture_trust_.turned.shape().to_string(),
                        bodies.to_string());
   }
   views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));

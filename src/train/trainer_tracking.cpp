@@ -61,7 +61,7 @@ void Trainer::follow_again() {
   if (scene_.main_nodes) nodes = scene_.main_nodes->on(Device::cpu);
   const PoseSteps steps{few_steps, little_blur * track.blur, tracking(iteration_).refines};
   for (int64_t key = 0; key < motion.keys(); ++key)
-    tracker.solve(main, nodes ? &*nodes : nullptr, motion, key, scene_.extent, steps, colour_trust_);
+    tracker.solve(main, nodes ? &*nodes : nullptr, motion, key, scene_.extent, steps, texture_trust_);
   scene_.main_motion = motion.on(device_);
 }
 
@@ -73,16 +73,16 @@ void Trainer::follow(int64_t key) {
   const Tracker tracker(track, options_.render, capture_);
   if (key == 1)
     tracker.solve(main, nullptr, motion, 0, scene_.extent, {track.steps, little_blur * track.blur},
-                  colour_trust_);
+                  texture_trust_);
   if (key > 2) {
     const int64_t oldest = std::max<int64_t>(0, key - track.window);
     for (int k = 0; k < track.again; ++k) {
       const int64_t at = oldest + static_cast<int64_t>(random_.below(static_cast<int64_t>(key - oldest)));
       tracker.solve(main, nullptr, motion, at, scene_.extent, {few_steps, little_blur * track.blur},
-                    colour_trust_);
+                    texture_trust_);
     }
   }
-  tracker.follow(main, motion, key, scene_.extent, colour_trust_);
+  tracker.follow(main, motion, key, scene_.extent, texture_trust_);
   // What is behind stands where this one does until it is reached.
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     for (int64_t later = key + 1; later < motion.keys(); ++later) {

@@ -92,6 +92,10 @@ MalformedKind malformed_arrays() {
         },
         "capture/normal.npy: shape: found 7x1x1x3, expected T×H×W×3 with T the training views (1) or all "
         "(2); make the priors again or take the file away"},
+       {"tracks of another number of views", inspect_capture,
+        [=](Files& files) { files["capture/tracks.npy"] = npy("'<f4'", "(7, 1, 3)", 84); },
+        "capture/tracks.npy: shape: found 7x1x3, expected T×N×3 with T the training views (1) or all (2); "
+        "attach the tracks again or take the file away"},
        {"an archive of no arrays", inspect_capture, put_normals({}),
         "capture/normal.npz: found an archive of nothing, expected one array; save the array again"},
        {"an archive of two arrays", inspect_capture,

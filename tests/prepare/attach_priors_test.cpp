@@ -195,6 +195,75 @@ TEST_F(AttachPriors, FindsTheAxesOfEachKind) {
   }
 }
 
+// Points of the scene, as a program would track them through the training views: in pixels of pictures of
+// some width, the centre of the first pixel at 0. Point 3 is lost in view 1.
+std::string tracks_archive(const Capture& capture, int64_t points, double width, bool is_batch = false) {
+  const auto views = static_cast<int64_t>(capture.train.size());
+  Tensor<float> tracks(is_batch ? Shape{1, views, points, 2} : Shape{views, points, 2});
+  Tensor<float> visibility({views, points});
+  visibility.fill(1);
+  visibility(1, 3) = 0;
+  for (int64_t v = 0; v < views; ++v) {
+    const Camera<float>& camera = capture.train[static_cast<size_t>(v)].camera;
+    for (int64_t n = 0; n < points; ++n) {
+      const Vec2<float> at = camera.project(camera.point_in_camera(load3<float>(capture.points.row(n))));
+      for (int side = 0; side < 2; ++side)
+        tracks[2 * (v * points + n) + side] = static_cast<float>(at[side] * width / camera.width - 0.5);
+    }
+  }
+  const TempFolder folder;
+  write_npy(folder / "tracks.npy", tracks);
+  write_npy(folder / "visibility.npy", visibility);
+  return zip_archive({{"tracks.npy", bytes_of(folder / "tracks.npy")},
+                      {"visibility.npy", bytes_of(folder / "visibility.npy")}},
+                     true);
+}
+
+TEST_F(AttachPriors, TracksComeBackAsDirections) {
+  constexpr int64_t points = 40;
+  for (const double width : {80.0, 320.0}) {
+    write_bytes(folder_ / "tracks.npz", tracks_archive(truth_, points, width, width > 80));
+    AttachOptions options;
+    options.tracks = folder_ / "tracks.npz";
+    options.tracks_width = width > 80 ? static_cast<int>(width) : 0;
+    options.force = true;
+    EXPECT_THAT(attach(options), HasSubstr("40 points on 5 training views"));
+    // At any size.
+    for (const int downscale : {1, 2}) {
+      CaptureOptions size;
+      size.downscale = downscale;
+      const Capture attached = load_capture(capture(), size);
+      ASSERT_EQ(attached.tracks.count(), points);
+      int64_t seen = 0;
+      for (int64_t v = 0; v < 5; ++v) {
+        const Camera<float>& camera = attached.train[static_cast<size_t>(v)].camera;
+        for (int64_t n = 0; n < points; ++n) {
+          const Vec3<float> x = camera.point_in_camera(load3<float>(truth_.points.row(n)));
+          const bool is_inside = camera.sees(load3<float>(truth_.points.row(n)));
+          EXPECT_EQ(attached.tracks.seen(v, n) == 1, is_inside && (v != 1 || n != 3)) << v << " " << n;
+          if (attached.tracks.seen(v, n) == 0) continue;
+          ++seen;
+          EXPECT_NEAR(attached.tracks.direction(v, n, 0), x.x / x.z, 1e-5);
+          EXPECT_NEAR(attached.tracks.direction(v, n, 1), x.y / x.z, 1e-5);
+        }
+      }
+      EXPECT_GT(seen, 100);
+    }
+  }
+}
+
+TEST_F(AttachPriors, RefusesTracksOfOtherPictures) {
+  AttachOptions options;
+  options.tracks = folder_ / "tracks.npz";
+  write_bytes(options.tracks, tracks_archive(truth_, 40, 8000));
+  EXPECT_THAT(refusal(options), HasSubstr("--tracks-width"));
+  Capture shorter = truth_;
+  shorter.train.pop_back();
+  write_bytes(options.tracks, tracks_archive(shorter, 40, 80));
+  EXPECT_THAT(refusal(options), AllOf(HasSubstr("count: found 4"), HasSubstr("5 training views")));
+  EXPECT_FALSE(fs::exists(capture() / "tracks.npy"));
+}
+
 TEST_F(AttachPriors, TakesAxesThatAreNamed) {
   write_npy(folder_ / "normals.npy", normals_in({-1, -1, -1}));
   AttachOptions options;
@@ -421,7 +490,7 @@ TEST_F(AttachPriors, WithoutFfmpegSaysHowToGetIt) {
 
 TEST_F(AttachPriors, WhatDoesNotFitIsRefusedAndTheCaptureLeftAsItWas) {
   AttachOptions options;
-  EXPECT_THAT(refusal(options), HasSubstr("--normals, --masks or both"));
+  EXPECT_THAT(refusal(options), HasSubstr("--normals, --masks or --tracks"));
   options.normals = folder_ / "nowhere.npz";
   EXPECT_THAT(refusal(options), HasSubstr("nowhere.npz"));
   Tensor<float> short_array({3, 48, 80, 3});

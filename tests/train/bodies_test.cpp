@@ -428,10 +428,13 @@ TEST(Bodies, BendWhereSilhouettesGetWorse) {
 // any.
 TEST(Tracker, TrustsColourThatTakesBackLittle) {
   const auto holds = [](double taken_back, double turned) {
-    return ColourTrust{tensor_of(std::vector<double>{taken_back}), tensor_of(std::vector<double>{turned}), {}}
-        .holds(0);
+    TextureTrust trust = TextureTrust::of(1);
+    trust.taken_back_by_colour[0] = taken_back;
+    trust.turned[0] = turned;
+    EXPECT_EQ(trust.holds_tracks(0), turned > 0.1);  // which take nothing back
+    return trust.holds_colour(0);
   };
-  EXPECT_FALSE(ColourTrust().holds(0));
+  EXPECT_FALSE(TextureTrust().holds_colour(0));
   EXPECT_FALSE(holds(0, 0.01));
   EXPECT_TRUE(holds(0.01, 0.2));
   EXPECT_TRUE(holds(-0.1, 0.2));

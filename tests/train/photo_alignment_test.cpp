@@ -73,7 +73,7 @@ TEST(PhotoAlignment, TheEquationsHoldTheCostsDerivative) {
   const LooseTurns loose{Mat3<double>(1)};
   const Alignment alignment = alignment_of(surfels, loose);
   const Vec3<double> at = 0.5 * turned_since;
-  NormalEquations equations{std::vector<double>(36), std::vector<double>(6)};
+  NormalEquations equations(6);
   const double cost = align(alignment, turned_by(at), 0, loose, &equations);
   EXPECT_DOUBLE_EQ(cost, align(alignment, turned_by(at), 0, loose, nullptr));
   constexpr double step = 2e-4;
@@ -120,7 +120,7 @@ std::vector<SymmetricEigen<3, double>> stiffness_of(const Surfels& surfels) {
 // A ball turns freely about all axes, a spindle about its own, and what has three lengths about none.
 TEST(PhotoAlignment, LooseTurnsAreThoseOfTheShape) {
   const auto turns = [](const Vec3<double>& by) {
-    return ColourTrust().loose_turns(stiffness_of(stretched_ball(by)))[0];
+    return TextureTrust().loose_turns(stiffness_of(stretched_ball(by)))[0];
   };
   EXPECT_EQ(turns(Vec3<double>(1)), Mat3<double>(1));
   const Mat3<double> spindle = turns({0.6, 1.4, 0.6});
@@ -133,7 +133,7 @@ TEST(PhotoAlignment, LooseTurnsAreThoseOfTheShape) {
 TEST(PhotoAlignment, LooseTurnsAreThoseOfTheMeanStiffness) {
   const std::vector<SymmetricEigen<3, double>> round = stiffness_of(ball()),
                                                stiff = stiffness_of(stretched_ball({1.0, 0.5, 0.25}));
-  ColourTrust trust;
+  TextureTrust trust;
   for (int k = 0; k < 20; ++k) trust.add_stiffness(round);
   trust.add_stiffness(stiff);
   EXPECT_EQ(trust.loose_turns(stiff)[0], Mat3<double>(1));

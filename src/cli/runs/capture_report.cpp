@@ -81,13 +81,20 @@ void print_extras(const Capture& capture, const Inspection& found) {
                              capture.masks_are_estimated ? "estimated, of what moves; " : "",
                              100 * found.pixels.masked));
   }
-  if (!capture.has_normal_priors) return;
-  row("normal priors",
-      fmt::format("axes {}, on {:.1f}% of the pixels{}", prior_axes_name(capture.prior_axes),
-                  100 * found.pixels.with_prior,
-                  found.pixels.prior_angle > 0
-                      ? fmt::format(", {:.0f}° from planes through the points", found.pixels.prior_angle)
-                      : ""));
+  if (capture.has_normal_priors) {
+    row("normal priors",
+        fmt::format("axes {}, on {:.1f}% of the pixels{}", prior_axes_name(capture.prior_axes),
+                    100 * found.pixels.with_prior,
+                    found.pixels.prior_angle > 0
+                        ? fmt::format(", {:.0f}° from planes through the points", found.pixels.prior_angle)
+                        : ""));
+  }
+  if (!capture.tracks.empty()) {
+    const PointTracks& tracks = capture.tracks;
+    const auto seen = std::count(tracks.seen.data(), tracks.seen.data() + tracks.seen.size(), uint8_t{1});
+    row("tracks", fmt::format("{} points, a view sees {:.0f} of them", tracks.count(),
+                              static_cast<double>(seen) / static_cast<double>(capture.train.size())));
+  }
 }
 
 // The texts name three views; paths, which are asked for to be followed, are listed, but not by the hundred.
@@ -211,6 +218,7 @@ nlohmann::json report_json(const Capture& capture, const Inspection& found, cons
           {"masks_estimated", capture.masks_are_estimated},
           {"prior_axes",
            capture.has_normal_priors ? nlohmann::json(prior_axes_name(capture.prior_axes)) : nullptr},
+          {"tracked_points", capture.tracks.count()},
           {"decoded", decoded_json(found.pixels)},
           {"memory",
            {{"decoded_bytes", found.decoded_bytes},

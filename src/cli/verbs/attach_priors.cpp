@@ -18,8 +18,8 @@ void add_attach_priors(CLI::App& program) {
     std::string capture;
     prepare::AttachOptions options;
   };
-  CLI::App* verb =
-      program.add_subcommand("attach-priors", "Put normals and masks of other programs into a capture.");
+  CLI::App* verb = program.add_subcommand("attach-priors",
+                                          "Put normals, masks and tracks of other programs into a capture.");
   const auto a = std::make_shared<Arguments>();
   verb->add_option("-d,--data", a->capture, "The capture's folder")->required()->option_text("CAPTURE");
   const OptionArguments given(*verb, option_fields(a->options));
