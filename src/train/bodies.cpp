@@ -12,6 +12,7 @@
 #include "math/activation.h"
 #include "ops/motion/motion.h"
 #include "scene/neighbours.h"
+#include "train/mask_parts.h"
 
 namespace traceflow {
 
@@ -30,7 +31,7 @@ constexpr double share_in_masks = 0.9;
 // Pictures are compared by means over squares of so many image widths to each side.
 constexpr double unrest_reach = 1.0 / 80;
 
-// Connected parts (8 neighbours) of a mask.
+// Connected parts of a mask.
 struct Parts {
   Tensor<int32_t> label;      // H×W, of the part that a pixel lies in or beside, -1 for none
   std::vector<int64_t> area;  // pixels of each
@@ -58,23 +59,7 @@ Parts parts_of(const Tensor<uint8_t>& mask) {
   const int64_t height = mask.dim(0), width = mask.dim(1);
   Parts parts{Tensor<int32_t>({height, width}), {}};
   parts.label.fill(-1);
-  std::vector<int64_t> part;
-  Tensor<uint8_t> visited({height, width});
-  for (int64_t start = 0; start < mask.size(); ++start) {
-    if (mask[start] == 0 || visited[start] != 0) continue;
-    part.assign(1, start);
-    visited[start] = 1;
-    for (size_t k = 0; k < part.size(); ++k) {
-      const int64_t row = part[k] / width, column = part[k] % width;
-      for (int64_t y = std::max<int64_t>(0, row - 1); y <= std::min(height - 1, row + 1); ++y) {
-        for (int64_t x = std::max<int64_t>(0, column - 1); x <= std::min(width - 1, column + 1); ++x) {
-          const int64_t at = y * width + x;
-          if (mask[at] == 0 || visited[at] != 0) continue;
-          visited[at] = 1;
-          part.push_back(at);
-        }
-      }
-    }
+  for (const std::vector<int64_t>& part : mask_parts(mask)) {
     if (static_cast<int64_t>(part.size()) < least_pixels) continue;
     for (const int64_t pixel : part) parts.label[pixel] = static_cast<int32_t>(parts.area.size());
     parts.area.push_back(static_cast<int64_t>(part.size()));

@@ -418,6 +418,14 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
   }
 }
 
+double PoseSolver::cost(const TrackWeights& weights) {
+  constexpr double sigma = 1;  // pixels
+  weigh_colour(weights);
+  double sum = 0;
+  for (size_t at = 0; at < targets_.size(); ++at) sum += robust_cost(look(at, weights, sigma, false).value);
+  return sum;
+}
+
 template <class F>
 std::vector<Vec3<double>> PoseSolver::turns_of_steps(F&& next) {
   constexpr int steps = 3;

@@ -66,6 +66,10 @@ class PoseSolver {
   void compare(Reprojection reprojection) { reprojections_.push_back(std::move(reprojection)); }
   // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
   void solve(const TrackWeights& weights, const PoseSteps& steps);
+  // What the targets cost where bodies stand.
+  double cost(const TrackWeights& weights);
+  // After the motion has been changed by others.
+  void refresh() { pose(); }
   // How colour alone, or tracked points alone, would turn the bodies from where they are, which stay there: ω
   // of each, radians.
   std::vector<Vec3<double>> turns_by_colour();

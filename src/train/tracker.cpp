@@ -7,6 +7,7 @@
 
 #include "math/rotation_group.h"
 #include "scene/rows.h"
+#include "train/redetection.h"
 
 namespace traceflow {
 
@@ -251,13 +252,18 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
   const TrackWeights geometry = weights(motion, {}, {});
   const PoseSteps steps{options_.steps, options_.blur};
-  if (options_.colour == 0) return solver.solve(geometry, steps);
+  if (options_.colour == 0) {
+    solver.solve(geometry, steps);
+    find_lost_bodies(solver, main, motion, key, key - 1, geometry, steps);
+    return;
+  }
   if (trust.turned.empty()) trust = TextureTrust::of(motion.bodies());
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
   trust.add_stiffness(stiffness);
   const LooseTurns loose = trust.loose_turns(stiffness);
   solver.loosen(loose);
   solver.solve(geometry, steps);
+  find_lost_bodies(solver, main, motion, key, key - 1, geometry, steps);
   compare_texture(solver, main, motion, key, extent, loose);
   const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();
   for (int64_t b = 0; b < motion.bodies(); ++b) {

@@ -58,12 +58,11 @@ inline Motion turned_by(const Vec3<double>& turn) {
 
 // The picture of the ball where it has been turned. A texture has turned with it; of a mirror the colours are
 // those of places, as if it had not turned.
-inline TrackTarget picture_of(const Surfels& ball, const Vec3<double>& turn, bool mirrors) {
+inline TrackTarget picture_at(const Surfels& ball, const Motion& motion, bool mirrors) {
   TrackTarget target;
   target.camera.width = target.camera.height = 64;
   target.camera.focal_x = target.camera.focal_y = 90;
   target.camera.centre_x = target.camera.centre_y = 32;
-  const Motion motion = turned_by(turn);
   PosedSurfels posed;
   deform::forward(ball, nullptr, 0, {}, 0, field::Precision::fp32, posed, nullptr);
   const motion::SavedPtr saved = motion::make_saved();
@@ -78,6 +77,21 @@ inline TrackTarget picture_of(const Surfels& ball, const Vec3<double>& turn, boo
   target.mask.resize(picture.alpha.shape());
   for (int64_t i = 0; i < target.mask.size(); ++i) target.mask[i] = picture.alpha[i] > 0.5F ? 1 : 0;
   return target;
+}
+inline TrackTarget picture_of(const Surfels& ball, const Vec3<double>& turn, bool mirrors) {
+  return picture_at(ball, turned_by(turn), mirrors);
+}
+
+// The ball, stretched along the axes.
+inline Surfels stretched_ball(const Vec3<double>& by) {
+  Surfels s = ball();
+  for (int64_t i = 0; i < s.count(); ++i) {
+    const Vec3<double> x = load3<double>(s.position.row(i)) - centre;
+    store3(s.position.row(i), centre + by * x);
+    const Vec4<double> towards = quaternion_towards(normalize(x / by));
+    for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(towards[k]);
+  }
+  return s;
 }
 
 }  // namespace traceflow::ball_body

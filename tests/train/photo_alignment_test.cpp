@@ -11,7 +11,8 @@
 namespace traceflow {
 namespace {
 
-using ball_body::ball, ball_body::centre, ball_body::picture_of, ball_body::radius, ball_body::turned_by;
+using ball_body::ball, ball_body::centre, ball_body::picture_of, ball_body::radius, ball_body::stretched_ball,
+    ball_body::turned_by;
 
 const Vec3<double> turned_since(0.03, 0.09, -0.02);
 
@@ -23,18 +24,6 @@ Surfels patterned_ball() {
     const Vec3<double> x = load3<double>(s.position.row(i)) - centre;
     const double wave = std::sin(35 * x.x) + std::sin(35 * x.y + 1) + std::sin(35 * x.z + 2);
     ball_body::paint(Vec3<double>(0.5 + 0.15 * wave, 0.5 - 0.1 * wave, 0.4), s.sh.row(i));
-  }
-  return s;
-}
-
-// Stretched along the axes.
-Surfels stretched_ball(const Vec3<double>& by) {
-  Surfels s = ball();
-  for (int64_t i = 0; i < s.count(); ++i) {
-    const Vec3<double> x = load3<double>(s.position.row(i)) - centre;
-    store3(s.position.row(i), centre + by * x);
-    const Vec4<double> towards = quaternion_towards(normalize(x / by));
-    for (int k = 0; k < 4; ++k) s.rotation(i, k) = static_cast<float>(towards[k]);
   }
   return s;
 }
