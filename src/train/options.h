@@ -181,7 +181,7 @@ struct TrackOptions {
   float silhouette = 0.5F;
   float normal = 0.3F;
   float colour = 0.3F;
-  float tracks = 1;
+  float tracks = 0.3F;
   bool new_surface = true;
   bool true_poses = false;
 

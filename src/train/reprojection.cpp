@@ -10,7 +10,7 @@ namespace traceflow {
 namespace {
 
 // Errors much larger than this hardly count: the program that tracked the point has lost it. Pixels.
-constexpr double lost = 2;
+constexpr double lost = 1;
 // Between the surface and the ray to it: near a body's edge, tracks slip off.
 constexpr float least_cosine_of_track = 0.3F;
 
