@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "math/rotation_group.h"
@@ -18,8 +19,9 @@ constexpr double least_inside = 0.3;
 // Parts of the mask that are smaller than this share of what the body showed before are not it.
 constexpr double least_part = 0.2;
 constexpr double fewest_free_pixels = 12;
-constexpr double turned_by = 0.6;  // radians, of the turns that are tried beside none
-constexpr double wide_blur = 4;    // pixels
+// Radians, of the turns that are tried beside none.
+constexpr std::array<double, 2> turned_by = {0.4, 0.9};
+constexpr double wide_blur = 4;  // pixels
 
 // The largest part of the mask that shows no body but the one that is sought.
 struct FreePart {
@@ -71,65 +73,75 @@ void put(Motion& motion, int64_t body, int64_t key, const Vec3<double>& shift, c
   store3(&motion.shift(body, key, 0), shift);
 }
 
+// Where a body is put that has lost its place: its shift; nothing where no free part of the mask is like it.
+std::optional<Vec3<double>> place_in(const FreePart& part, const PoseSolver& solver, const Surfels& main,
+                                     const Motion& motion, int64_t body, int64_t previous) {
+  const TrackTarget& target = solver.targets().front();
+  const Camera<float>& camera = target.camera;
+  const BodySurface then = draw_bodies(camera, motion, previous, main, solver.drawing());
+  const Shown shown = shown_in(then, target.mask, motion.bodies());
+  const auto area = static_cast<double>(shown.all[static_cast<size_t>(body)]);
+  if (part.area < std::max(fewest_free_pixels, least_part * area)) return std::nullopt;
+  const Vec3<double> centre = load3<double>(motion.centre.row(body));
+  const Vec3<double> last = centre + load3<double>(&motion.shift(body, previous, 0));
+  double depth = camera.point_in_camera(Vec3<float>(last)).z;
+  if (!part.at_border && area > 0) depth *= std::sqrt(area / part.area);
+  const Vec3<double> ray(
+      camera.ray_in_world(static_cast<float>(part.middle.x), static_cast<float>(part.middle.y)));
+  return Vec3<double>(camera.position) + depth * ray - centre;
+}
+
+// Solves for a body from several turns, and keeps the best if it costs less than how it stands.
+bool try_turns(PoseSolver& solver, Motion& motion, int64_t body, int64_t key, const Vec3<double>& shift,
+               const TrackWeights& weights, const PoseSteps& steps) {
+  double least = solver.cost(weights);
+  std::vector<Vec3<double>> turns{Vec3<double>(0)};
+  for (const double by : turned_by) {
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3<double> turn(0);
+      turn[axis] = by;
+      turns.insert(turns.end(), {turn, -turn});
+    }
+  }
+  const Vec4<double> rotation = unit_quaternion(load4<double>(&motion.rotation(body, key - 1, 0)));
+  const Tensor<float> rotations = motion.rotation, shifts = motion.shift;
+  Tensor<float> best_rotations = rotations, best_shifts = shifts;
+  bool is_better = false;
+  for (const Vec3<double>& turn : turns) {
+    motion.rotation = rotations;
+    motion.shift = shifts;
+    put(motion, body, key, shift, quaternion_product(quaternion_exp(turn), rotation));
+    solver.refresh();
+    solver.solve(weights, {steps.count, wide_blur});
+    const double cost = solver.cost(weights);
+    if (!(cost < least)) continue;
+    least = cost;
+    best_rotations = motion.rotation;
+    best_shifts = motion.shift;
+    is_better = true;
+  }
+  motion.rotation = best_rotations;
+  motion.shift = best_shifts;
+  solver.refresh();
+  if (is_better) solver.solve(weights, steps);
+  return is_better;
+}
+
 }  // namespace
 
-int find_lost_bodies(PoseSolver& solver, const Surfels& main, Motion& motion, int64_t key, int64_t previous,
+int find_lost_bodies(PoseSolver& solver, const Surfels& main, Motion& motion, int64_t key,
                      const TrackWeights& weights, const PoseSteps& steps) {
   if (solver.targets().empty()) return 0;
   const TrackTarget& target = solver.targets().front();
-  const Camera<float>& camera = target.camera;
-  const int64_t bodies = motion.bodies();
-  BodySurface surface = draw_bodies(camera, motion, key, main, solver.drawing());
-  const Shown now = shown_in(surface, target.mask, bodies);
-  const auto is_lost = [&](int64_t body) {
-    const auto b = static_cast<size_t>(body);
-    return static_cast<double>(now.inside[b]) <= least_inside * static_cast<double>(now.all[b]);
-  };
-  const std::array<Vec3<double>, 7> turns = {{{0, 0, 0},
-                                              {turned_by, 0, 0},
-                                              {-turned_by, 0, 0},
-                                              {0, turned_by, 0},
-                                              {0, -turned_by, 0},
-                                              {0, 0, turned_by},
-                                              {0, 0, -turned_by}}};
   int found = 0;
-  for (int64_t body = 0; body < bodies; ++body) {
-    if (!is_lost(body)) continue;
-    const FreePart part = free_part(target, surface, body);
-    const BodySurface then = draw_bodies(camera, motion, previous, main, solver.drawing());
-    const auto area = static_cast<double>(shown_in(then, target.mask, bodies).all[static_cast<size_t>(body)]);
-    if (part.area < std::max(fewest_free_pixels, least_part * area)) continue;
-    const Vec3<double> centre = load3<double>(motion.centre.row(body));
-    const Vec3<double> last = centre + load3<double>(&motion.shift(body, previous, 0));
-    const Vec4<double> rotation = unit_quaternion(load4<double>(&motion.rotation(body, previous, 0)));
-    double depth = camera.point_in_camera(Vec3<float>(last)).z;
-    if (!part.at_border && area > 0) depth *= std::sqrt(area / part.area);
-    const Vec3<double> place = Vec3<double>(camera.position) +
-                               depth * Vec3<double>(camera.ray_in_world(static_cast<float>(part.middle.x),
-                                                                        static_cast<float>(part.middle.y)));
-    const Tensor<float> rotations = motion.rotation, shifts = motion.shift;
-    double least = solver.cost(weights);
-    Motion best = motion;
-    bool is_better = false;
-    for (const Vec3<double>& turn : turns) {
-      motion.rotation = rotations;
-      motion.shift = shifts;
-      put(motion, body, key, place - centre, quaternion_product(quaternion_exp(turn), rotation));
-      solver.refresh();
-      solver.solve(weights, {steps.count, wide_blur});
-      const double cost = solver.cost(weights);
-      if (!(cost < least)) continue;
-      least = cost;
-      best = motion;
-      is_better = true;
-    }
-    motion.rotation = best.rotation;
-    motion.shift = best.shift;
-    solver.refresh();
-    if (!is_better) continue;
-    solver.solve(weights, steps);
-    surface = draw_bodies(camera, motion, key, main, solver.drawing());
-    ++found;
+  for (int64_t body = 0; body < motion.bodies(); ++body) {
+    const BodySurface surface = draw_bodies(target.camera, motion, key, main, solver.drawing());
+    const Shown now = shown_in(surface, target.mask, motion.bodies());
+    const auto b = static_cast<size_t>(body);
+    if (static_cast<double>(now.inside[b]) > least_inside * static_cast<double>(now.all[b])) continue;
+    const std::optional<Vec3<double>> shift =
+        place_in(free_part(target, surface, body), solver, main, motion, body, key - 1);
+    if (shift && try_turns(solver, motion, body, key, *shift, weights, steps)) ++found;
   }
   return found;
 }

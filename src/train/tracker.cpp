@@ -22,6 +22,10 @@ constexpr int64_t keys_for_trust = 5;
 constexpr double most_taken_back = 0.15;
 constexpr double enough_turned = 0.06;  // radians², Σ over times: as one turn of 14 degrees
 
+// Texture could take back no more than so much of a turn, radians: the solver's steps are short. What a body
+// turned beyond it, over a gap in the film say, is no evidence.
+constexpr double most_judged = 0.3;
+
 // Turns less stiff than this are decided by photographs. The middle one of balls is 0.2 to 0.4, of a kettle
 // and a bust 2 to 4, and of a smooth cylinder 0.55.
 constexpr double least_stiffness = 0.45;
@@ -249,12 +253,12 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
 int Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,
                     TextureTrust& trust) const {
   predict(motion, key);
-  PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
   const TrackWeights geometry = weights(motion, {}, {});
+  PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
   const PoseSteps steps{options_.steps, options_.blur};
   if (options_.colour == 0) {
     solver.solve(geometry, steps);
-    return find_lost_bodies(solver, main, motion, key, key - 1, geometry, steps);
+    return find_lost_bodies(solver, main, motion, key, geometry, steps);
   }
   if (trust.turned.empty()) trust = TextureTrust::of(motion.bodies());
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
@@ -262,12 +266,13 @@ int Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float exte
   const LooseTurns loose = trust.loose_turns(stiffness);
   solver.loosen(loose);
   solver.solve(geometry, steps);
-  const int found = find_lost_bodies(solver, main, motion, key, key - 1, geometry, steps);
+  const int found = find_lost_bodies(solver, main, motion, key, geometry, steps);
   compare_texture(solver, main, motion, key, extent, loose);
   const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     // Up to the key before: what errs at this one is not taken for a turn that texture takes back.
-    const Vec3<double> turn = turn_between(motion, b, std::max<int64_t>(0, key - keys_for_trust), key - 1);
+    Vec3<double> turn = turn_between(motion, b, std::max<int64_t>(0, key - keys_for_trust), key - 1);
+    turn *= most_judged / std::max(most_judged, length(turn));
     trust.taken_back_by_colour[b] -= dot(by_colour[static_cast<size_t>(b)], turn);
     trust.taken_back_by_tracks[b] -= dot(by_tracks[static_cast<size_t>(b)], turn);
     trust.turned[b] += dot(turn, turn);

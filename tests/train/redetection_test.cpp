@@ -45,7 +45,7 @@ TEST(Redetection, FindsABodyThatHasJumped) {
     Motion motion = standing_at({}, {-0.2, 0.2, 0});
     PoseSolver solver(surfels, nullptr, motion, 1, {}, {picture});
     solver.solve(weights, steps);
-    const int found = finds ? find_lost_bodies(solver, surfels, motion, 1, 0, weights, steps) : 0;
+    const int found = finds ? find_lost_bodies(solver, surfels, motion, 1, weights, steps) : 0;
     EXPECT_EQ(found, finds ? 1 : 0);
     const double off = glm::length(load3<double>(&motion.shift(0, 1, 0)) - shift);
     EXPECT_EQ(off < 0.05, finds) << off;
@@ -64,7 +64,7 @@ TEST(Redetection, LeavesAloneWhatIsNotLostOrNowhere) {
     Motion motion = standing_at({}, {});
     const Motion before = motion;
     PoseSolver solver(surfels, nullptr, motion, 1, {}, {picture});
-    EXPECT_EQ(find_lost_bodies(solver, surfels, motion, 1, 0, weights, steps), 0);
+    EXPECT_EQ(find_lost_bodies(solver, surfels, motion, 1, weights, steps), 0);
     EXPECT_TRUE(std::ranges::equal(motion.rotation.values(), before.rotation.values()));
     EXPECT_TRUE(std::ranges::equal(motion.shift.values(), before.shift.values()));
   }
