@@ -14,7 +14,7 @@ struct PointTracks {
   Tensor<float> direction;  // V×N×2, X/Z and Y/Z in the view's camera
   Tensor<uint8_t> seen;     // V×N
 
-  bool empty() const { return seen.size() == 0; }
+  bool empty() const { return seen.empty(); }
   int64_t count() const { return empty() ? 0 : seen.dim(1); }
 };
 

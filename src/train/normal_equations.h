@@ -13,11 +13,11 @@ struct NormalEquations {
   std::vector<double> a, b;
 
   explicit NormalEquations(size_t params) : a(params * params), b(params) {}
-  // Adds one weighted residual, whose derivatives by N numbers that follow each other are `row`.
-  template <size_t N>
-  void add(size_t first, const std::array<double, N>& row, double residual, double share) {
+  // Adds one weighted residual, whose derivatives by `count` numbers that follow each other are `row`.
+  template <size_t count>
+  void add(size_t first, const std::array<double, count>& row, double residual, double share) {
     const size_t params = b.size();
-    for (size_t p = 0; p < N; ++p) {
+    for (size_t p = 0; p < count; ++p) {
       for (size_t q = 0; q <= p; ++q) a[(first + p) * params + first + q] += share * row[p] * row[q];
       b[first + p] -= share * row[p] * residual;
     }

@@ -23,7 +23,8 @@ TEST(PointTracks, ALensIsStraightened) {
   constexpr int64_t count = 25;
   Tensor<float> stored({2, count, 3});
   const auto direction = [](int64_t n) {
-    return Vec2<double>(0.1 * static_cast<double>(n % 5) - 0.2, 0.08 * static_cast<double>(n / 5) - 0.16);
+    const int64_t row = n / 5, column = n % 5;
+    return Vec2<double>(0.1 * static_cast<double>(column) - 0.2, 0.08 * static_cast<double>(row) - 0.16);
   };
   for (int64_t n = 0; n < count; ++n) {
     const Vec2<double> pixel = source.lens.pixel_from_ideal(direction(n));
