@@ -85,6 +85,7 @@ std::optional<Vec3<double>> place_in(const FreePart& part, const PoseSolver& sol
   const Vec3<double> centre = load3<double>(motion.centre.row(body));
   const Vec3<double> last = centre + load3<double>(&motion.shift(body, previous, 0));
   double depth = camera.point_in_camera(Vec3<float>(last)).z;
+  if (!(depth > 0)) return std::nullopt;
   if (!part.at_border && area > 0) depth *= std::sqrt(area / part.area);
   const Vec3<double> ray(
       camera.ray_in_world(static_cast<float>(part.middle.x), static_cast<float>(part.middle.y)));

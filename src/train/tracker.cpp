@@ -250,15 +250,16 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
   solver.solve(weights(motion, trust, loose), held);
 }
 
-int Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,
-                    TextureTrust& trust) const {
+void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,
+                     TextureTrust& trust) const {
   predict(motion, key);
   const TrackWeights geometry = weights(motion, {}, {});
   PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
   const PoseSteps steps{options_.steps, options_.blur};
   if (options_.colour == 0) {
     solver.solve(geometry, steps);
-    return find_lost_bodies(solver, main, motion, key, geometry, steps);
+    find_lost_bodies(solver, main, motion, key, geometry, steps);
+    return;
   }
   if (trust.turned.empty()) trust = TextureTrust::of(motion.bodies());
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
@@ -266,7 +267,7 @@ int Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float exte
   const LooseTurns loose = trust.loose_turns(stiffness);
   solver.loosen(loose);
   solver.solve(geometry, steps);
-  const int found = find_lost_bodies(solver, main, motion, key, geometry, steps);
+  find_lost_bodies(solver, main, motion, key, geometry, steps);
   compare_texture(solver, main, motion, key, extent, loose);
   const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();
   for (int64_t b = 0; b < motion.bodies(); ++b) {
@@ -283,7 +284,6 @@ int Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float exte
     any = any || all.colour[static_cast<size_t>(b)] > 0 || all.tracks[static_cast<size_t>(b)];
   constexpr double little_blur = 1;  // pixels
   if (any) solver.solve(all, {options_.steps / 2, little_blur});
-  return found;
 }
 
 Surfels Tracker::new_surface(const Surfels& main, Motion& motion, int64_t key, float extent, float tint,

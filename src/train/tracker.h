@@ -51,10 +51,9 @@ class Tracker {
   // Puts key k where bodies that go on as in the three keys before would be, and the keys behind it there
   // too.
   static void predict(Motion& motion, int64_t key);
-  // Predicts and finds the poses of a new key, and learns whether colour and tracks are to be trusted.
-  // Returns how many bodies had been lost and were found elsewhere (train/redetection.h). main, motion: on
-  // the CPU.
-  int follow(const Surfels& main, Motion& motion, int64_t key, float extent, TextureTrust& trust) const;
+  // Predicts and finds the poses of a new key, and learns whether colour and tracks are to be trusted. A body
+  // that is lost is looked for elsewhere (train/redetection.h). main, motion: on the CPU.
+  void follow(const Surfels& main, Motion& motion, int64_t key, float extent, TextureTrust& trust) const;
   // Finds the poses of a key from where they are. At the first key, where one camera sees it, bodies stay as
   // far from that camera as the points are. nodes: null where bodies are rigid.
   void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,

@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
@@ -84,13 +82,7 @@ void Trainer::follow(int64_t key) {
                     texture_trust_);
     }
   }
-  const int found = tracker.follow(main, motion, key, scene_.extent, texture_trust_);
-  if (found > 0) {
-    warn(
-        fmt::format("at time {:.3f} {} of {} bodies had been lost and {} found elsewhere; see whether they "
-                    "move as they should there",
-                    motion.time[key], found, motion.bodies(), found > 1 ? "were" : "was"));
-  }
+  tracker.follow(main, motion, key, scene_.extent, texture_trust_);
   // What is behind stands where this one does until it is reached.
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     for (int64_t later = key + 1; later < motion.keys(); ++later) {
