@@ -41,6 +41,20 @@ BodySurface draw_bodies(const Camera<float>& camera, const Motion& motion, int64
   return surface;
 }
 
+std::vector<Mat3<double>> rotations_at(const Motion& motion, int64_t key) {
+  std::vector<Mat3<double>> rotations;
+  for (int64_t b = 0; b < motion.bodies(); ++b)
+    rotations.push_back(rotation_from_quaternion(load4<double>(&motion.rotation(b, key, 0))));
+  return rotations;
+}
+
+std::array<Vec3<double>, 2> pixel_by_point(const Camera<double>& camera, const Vec3<double>& in_camera) {
+  const Mat3<double> axes = transpose(camera.camera_from_world);  // columns: the camera's axes in world
+  const Vec3<double>& x = in_camera;
+  return {camera.focal_x / x.z * (axes[0] - x.x / x.z * axes[2]),
+          camera.focal_y / x.z * (axes[1] - x.y / x.z * axes[2])};
+}
+
 SurfacePoint at_rest(const SurfacePoint& point, const Motion& motion, int64_t key) {
   const Mat3<double> back =
       transpose(rotation_from_quaternion(load4<double>(&motion.rotation(point.body, key, 0))));

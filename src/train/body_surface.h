@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "ops/raster/raster.h"
@@ -28,6 +29,11 @@ struct BodySurface {
 BodySurface draw_bodies(const Camera<float>& camera, const Motion& motion, int64_t key,
                         const Surfels& surfels, const raster::Options& options);
 
+// The rotations of all bodies at a key.
+std::vector<Mat3<double>> rotations_at(const Motion& motion, int64_t key);
+// How the pixel that shows a point moves with it, in world: ∂x and ∂y. in_camera: the point, before the
+// camera.
+std::array<Vec3<double>, 2> pixel_by_point(const Camera<double>& camera, const Vec3<double>& in_camera);
 // The same point of body `point.body` at rest.
 SurfacePoint at_rest(const SurfacePoint& point, const Motion& motion, int64_t key);
 

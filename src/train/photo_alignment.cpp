@@ -5,7 +5,6 @@
 #include <optional>
 #include <utility>
 
-#include "math/rotation.h"
 #include "train/gaussian_blur.h"
 
 namespace traceflow {
@@ -95,10 +94,7 @@ std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySur
 double align(const Alignment& alignment, const Motion& motion, int64_t key, const LooseTurns& loose,
              NormalEquations* equations) {
   const Camera<double> camera = convert<double>(alignment.photo->camera);
-  const Mat3<double> axes = transpose(camera.camera_from_world);  // columns: the camera's axes in world
-  std::vector<Mat3<double>> rotation;
-  for (int64_t b = 0; b < motion.bodies(); ++b)
-    rotation.push_back(rotation_from_quaternion(load4<double>(&motion.rotation(b, key, 0))));
+  const std::vector<Mat3<double>> rotation = rotations_at(motion, key);
   double cost = 0;
   for (const DetailSample& sample : alignment.samples) {
     const auto body = static_cast<size_t>(sample.rest.body);
@@ -114,9 +110,7 @@ double align(const Alignment& alignment, const Motion& motion, int64_t key, cons
       cost += alignment.weight * huber_width / 2;  // leaving the view pays no better than a difference
       continue;
     }
-    // Of the pixel, by the point.
-    const Vec3<double> x_by = camera.focal_x / in_camera.z * (axes[0] - in_camera.x / in_camera.z * axes[2]);
-    const Vec3<double> y_by = camera.focal_y / in_camera.z * (axes[1] - in_camera.y / in_camera.z * axes[2]);
+    const auto [x_by, y_by] = pixel_by_point(camera, in_camera);
     for (int c = 0; c < 3; ++c) {
       const double residual = weight * (there->value[c] - static_cast<double>(sample.detail[c]));
       const double size = std::abs(residual);

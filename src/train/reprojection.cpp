@@ -3,8 +3,6 @@
 #include <array>
 #include <cmath>
 
-#include "math/rotation.h"
-
 namespace traceflow {
 
 namespace {
@@ -43,10 +41,7 @@ std::vector<TrackedPoint> tracked_points(const PointTracks& tracks, int64_t from
 double reproject(const Reprojection& reprojection, const Motion& motion, int64_t key,
                  const std::vector<TrackedPart>& parts, NormalEquations* equations) {
   const Camera<double> camera = convert<double>(reprojection.camera);
-  const Mat3<double> axes = transpose(camera.camera_from_world);  // columns: the camera's axes in world
-  std::vector<Mat3<double>> rotation;
-  for (int64_t b = 0; b < motion.bodies(); ++b)
-    rotation.push_back(rotation_from_quaternion(load4<double>(&motion.rotation(b, key, 0))));
+  const std::vector<Mat3<double>> rotation = rotations_at(motion, key);
   double cost = 0;
   for (const TrackedPoint& point : reprojection.points) {
     const auto body = static_cast<size_t>(point.rest.body);
@@ -61,10 +56,7 @@ double reproject(const Reprojection& reprojection, const Motion& motion, int64_t
     const double size = dot(error, error), share = 1 / (1 + size / (lost * lost));
     cost += reprojection.weight * lost * lost / 2 * (1 - share);
     if (equations == nullptr || !(in_camera.z > 0)) continue;
-    // Of the pixel, by the point.
-    const std::array<Vec3<double>, 2> by_point = {
-        camera.focal_x / in_camera.z * (axes[0] - in_camera.x / in_camera.z * axes[2]),
-        camera.focal_y / in_camera.z * (axes[1] - in_camera.y / in_camera.z * axes[2])};
+    const std::array<Vec3<double>, 2> by_point = pixel_by_point(camera, in_camera);
     for (int side = 0; side < 2; ++side) {
       const Vec3<double>& shift = by_point[static_cast<size_t>(side)];
       const Vec3<double> turn = part.turns * cross(arm, shift);
