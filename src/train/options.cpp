@@ -88,8 +88,6 @@ TrainOptions demo_preset() {
   o.density.max_surfels = 16000;
   o.initial.max_points = 8000;
   o.environment_density.max_surfels = 8000;
-  // A ball that mirrors would be turned by what it shows, which costs depth (docs/results.md).
-  o.deform.track.colour = 0;
   return o;
 }
 

@@ -287,8 +287,8 @@ double PoseSolver::cost_of_tracks(const std::vector<bool>& decide, NormalEquatio
   for (size_t body = 0; body < parts.size(); ++body) {
     if (!decide.empty() && decide[body])
       parts[body] = {Mat3<double>(1), true};
-    else if (!loose_.empty())
-      parts[body].turns = loose_[body];
+    else if (!by_texture_.empty())
+      parts[body].turns = by_texture_[body];
   }
   double cost = 0;
   for (const Reprojection& reprojection : reprojections_)
@@ -298,7 +298,8 @@ double PoseSolver::cost_of_tracks(const std::vector<bool>& decide, NormalEquatio
 
 double PoseSolver::cost_of_texture(const TrackWeights& weights, NormalEquations* equations) const {
   double cost = 0;
-  for (const Alignment& alignment : alignments_) cost += align(alignment, motion_, key_, loose_, equations);
+  for (const Alignment& alignment : alignments_)
+    cost += align(alignment, motion_, key_, by_texture_, equations);
   return cost + cost_of_tracks(weights.tracks, equations);
 }
 

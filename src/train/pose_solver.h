@@ -60,8 +60,11 @@ class PoseSolver {
   // Empty without normal priors: silhouettes alone hold hardly anything.
   std::vector<SymmetricEigen<3, double>> turn_stiffness(const TrackWeights& weights);
   // Turns that silhouettes, normals and the model's colours do not change: only photographs that are compared
-  // and tracked points do.
-  void loosen(LooseTurns loose) { loose_ = std::move(loose); }
+  // and tracked points do, by_texture of them.
+  void loosen(LooseTurns loose, LooseTurns by_texture) {
+    loose_ = std::move(loose);
+    by_texture_ = std::move(by_texture);
+  }
   void compare(Alignment alignment) { alignments_.push_back(std::move(alignment)); }
   void compare(Reprojection reprojection) { reprojections_.push_back(std::move(reprojection)); }
   // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
@@ -114,7 +117,7 @@ class PoseSolver {
   motion::SavedPtr saved_;
   Tensor<float> pivot_;
   std::vector<Tensor<float>> colour_weight_;  // of each target, H×W
-  LooseTurns loose_;                          // empty, or of each body
+  LooseTurns loose_, by_texture_;             // empty, or of each body
   std::vector<Alignment> alignments_;
   std::vector<Reprojection> reprojections_;
   raster::Output whole_;

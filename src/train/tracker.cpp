@@ -7,6 +7,7 @@
 
 #include "math/rotation_group.h"
 #include "scene/rows.h"
+#include "train/mirror_image.h"
 #include "train/redetection.h"
 
 namespace traceflow {
@@ -17,18 +18,10 @@ constexpr int widest = 160;
 constexpr int keys_for_speed = 3;
 // How far back the turn lies that colour may take back.
 constexpr int64_t keys_for_trust = 5;
-// Colour, or what is tracked, is trusted where it takes back less than such a share of the turns, of which
-// there were enough.
-constexpr double most_taken_back = 0.15;
-constexpr double enough_turned = 0.06;  // radians², Σ over times: as one turn of 14 degrees
-
 // Texture could take back no more than so much of a turn, radians: the solver's steps are short. What a body
 // turned beyond it, over a gap in the film say, is no evidence.
 constexpr double most_judged = 0.3;
 
-// Turns less stiff than this are decided by photographs. The middle one of balls is 0.2 to 0.4, of a kettle
-// and a bust 2 to 4, and of a smooth cylinder 0.55.
-constexpr double least_stiffness = 0.45;
 // Photographs are compared at this width or less, and with those of so many keys before at most.
 constexpr int64_t widest_photograph = 640, oldest_photograph = 9;
 
@@ -61,40 +54,19 @@ Vec3<double> turn_between(const Motion& motion, int64_t body, int64_t first, int
   return quaternion_log(quaternion_product(to, quaternion_conjugate(from)));
 }
 
+// Nothing tells the loose turns of bodies that mirror: they do not go on.
+void hold_mirrors(Motion& motion, int64_t key, const LooseTurns& loose, const TextureTrust& trust) {
+  for (int64_t b = 0; b < motion.bodies() && !loose.empty(); ++b) {
+    if (!trust.mirrors(b)) continue;
+    const Vec3<double> turn = turn_between(motion, b, key - 1, key);
+    const Vec4<double> before = unit_quaternion(load4<double>(&motion.rotation(b, key - 1, 0)));
+    const Vec4<double> held =
+        quaternion_product(quaternion_exp(turn - loose[static_cast<size_t>(b)] * turn), before);
+    for (int c = 0; c < 4; ++c) motion.rotation(b, key, c) = static_cast<float>(held[c]);
+  }
+}
+
 }  // namespace
-
-TextureTrust TextureTrust::of(int64_t bodies) {
-  return {Tensor<double>({bodies}), Tensor<double>({bodies}), Tensor<double>({bodies}),
-          Tensor<double>({bodies, 3})};
-}
-
-bool TextureTrust::holds(const Tensor<double>& taken_back, int64_t body) const {
-  return !turned.empty() && turned[body] > enough_turned && taken_back[body] < most_taken_back * turned[body];
-}
-
-void TextureTrust::add_stiffness(const std::vector<SymmetricEigen<3, double>>& now) {
-  if (stiffness.empty() && !now.empty()) *this = of(static_cast<int64_t>(now.size()));
-  for (size_t b = 0; b < now.size(); ++b) {
-    if (!(now[b].values[2] > 0)) continue;  // it is not in view
-    double* const sums = stiffness.row(static_cast<int64_t>(b));
-    sums[0] += now[b].values[0];
-    sums[1] += now[b].values[1];
-    sums[2] += 1;
-  }
-}
-
-LooseTurns TextureTrust::loose_turns(const std::vector<SymmetricEigen<3, double>>& now) const {
-  LooseTurns loose;
-  for (size_t b = 0; b < now.size(); ++b) {
-    std::array<double, 3> sums{now[b].values[0], now[b].values[1], 1};
-    const auto body = static_cast<int64_t>(b);
-    if (!stiffness.empty() && stiffness(body, 2) > 0) std::copy_n(stiffness.row(body), 3, sums.begin());
-    const bool is_loose = sums[0] < least_stiffness * sums[2], is_ball = sums[1] < least_stiffness * sums[2];
-    const Vec3<double> axis = now[b].vectors[0];
-    loose.push_back(is_ball ? Mat3<double>(1) : is_loose ? outerProduct(axis, axis) : Mat3<double>(0));
-  }
-  return loose;
-}
 
 Tracker::Tracker(const TrackOptions& options, const RenderOptions& render, const Capture& capture)
     : options_(options), render_(render), capture_(capture) {}
@@ -170,28 +142,27 @@ std::vector<size_t> Tracker::views_at(const Motion& motion, int64_t key) const {
   return views;
 }
 
-void Tracker::compare_texture(PoseSolver& solver, const Surfels& main, const Motion& motion, int64_t key,
-                              float extent, const LooseTurns& loose) const {
+std::vector<Tracker::EarlierView> Tracker::earlier_views(const Surfels& main, const Motion& motion,
+                                                         int64_t key, float extent) const {
   // The nearest tell the most, the farther ones keep errors from adding up.
   constexpr std::array<int64_t, 4> keys_back = {1, 3, 9, 27};
-  const bool has_tracks = !capture_.tracks.empty() && options_.tracks > 0;
   std::vector<EarlierView> earlier;
   for (const int64_t back : keys_back) {
-    if (back > key || (back > oldest_photograph && !has_tracks)) break;
+    if (back > key || (back > oldest_photograph && !has_tracks())) break;
     for (const size_t view : views_at(motion, key - back)) {
       earlier.push_back({back, view,
                          draw_bodies(drawn_camera(capture_.train[view]), motion, key - back, main,
                                      render_.raster_options(extent))});
-      if (!has_tracks) break;
+      if (!has_tracks()) break;
     }
   }
-  if (any_turns(loose)) compare_photographs(solver, earlier, motion, key, loose);
-  if (has_tracks) compare_tracks(solver, earlier, motion, key);
+  return earlier;
 }
 
 void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier,
                                   const Motion& motion, int64_t key, const LooseTurns& loose) const {
   constexpr double weight = 1.0 / 3;
+  if (!any_turns(loose)) return;
   std::shared_ptr<const DetailPhoto> now;
   int64_t last = 0;
   for (const auto& [back, at, surface] : earlier) {
@@ -213,8 +184,27 @@ void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierV
   }
 }
 
+void Tracker::look_for_mirror_images(const std::vector<EarlierView>& earlier, const Motion& motion,
+                                     int64_t key, const LooseTurns& loose, TextureTrust& trust) const {
+  // Long enough for a mirror image to turn, short enough for photographs to tell.
+  constexpr int64_t keys_back = 3;
+  const auto is_meant = [](const EarlierView& view) { return view.keys_back == keys_back; };
+  const auto from = std::find_if(earlier.begin(), earlier.end(), is_meant);
+  if (from == earlier.end()) return;
+  const Vec3<double> eye(capture_.train[views_at(motion, key).front()].camera.position);
+  for (int64_t b = 0; b < motion.bodies(); ++b) {
+    const Mat3<double>& turns = loose[static_cast<size_t>(b)];
+    if (turns == Mat3<double>(0)) continue;
+    const Vec3<double> shift =
+        load3<double>(&motion.shift(b, key, 0)) - load3<double>(&motion.shift(b, key - keys_back, 0));
+    trust.add_turn(b, turns * turn_of_mirror_image(from->surface, static_cast<int32_t>(b), eye, shift),
+                   turns * turn_between(motion, b, key - keys_back, key));
+  }
+}
+
 void Tracker::compare_tracks(PoseSolver& solver, const std::vector<EarlierView>& earlier,
                              const Motion& motion, int64_t key) const {
+  if (!has_tracks()) return;
   for (const size_t view : views_at(motion, key)) {
     const Camera<float> camera = drawn_camera(capture_.train[view]);
     for (const auto& [back, at, surface] : earlier) {
@@ -232,7 +222,7 @@ TrackWeights Tracker::weights(const Motion& motion, const TextureTrust& trust,
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     const bool is_ball = !loose.empty() && loose[static_cast<size_t>(b)] == Mat3<double>(1);
     weights.colour.push_back(trust.holds_colour(b) && !is_ball ? options_.colour : 0.0F);
-    weights.tracks.push_back(!capture_.tracks.empty() && trust.holds_tracks(b) && !is_ball);
+    weights.tracks.push_back(has_tracks() && trust.holds_tracks(b) && !is_ball);
   }
   return weights;
 }
@@ -244,9 +234,14 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
   PoseSolver solver = this->solver(main, nodes, motion, key, extent);
   LooseTurns loose;
   if (options_.colour > 0) loose = trust.loose_turns(solver.turn_stiffness(weights(motion, {}, {})));
-  solver.loosen(loose);
+  const LooseTurns by_texture = trust.without_mirrors(loose);
+  solver.loosen(loose, by_texture);
   // Where bodies bend, what a photograph showed at rest is not known.
-  if (nodes == nullptr) compare_texture(solver, main, motion, key, extent, loose);
+  if (nodes == nullptr && (any_turns(by_texture) || has_tracks())) {
+    const std::vector<EarlierView> earlier = earlier_views(main, motion, key, extent);
+    compare_photographs(solver, earlier, motion, key, by_texture);
+    compare_tracks(solver, earlier, motion, key);
+  }
   solver.solve(weights(motion, trust, loose), held);
 }
 
@@ -264,11 +259,16 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   if (trust.turned.empty()) trust = TextureTrust::of(motion.bodies());
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
   trust.add_stiffness(stiffness);
-  const LooseTurns loose = trust.loose_turns(stiffness);
-  solver.loosen(loose);
+  const LooseTurns loose = trust.loose_turns(stiffness), by_texture = trust.without_mirrors(loose);
+  hold_mirrors(motion, key, loose, trust);
+  solver.refresh();
+  solver.loosen(loose, by_texture);
   solver.solve(geometry, steps);
   find_lost_bodies(solver, main, motion, key, geometry, steps);
-  compare_texture(solver, main, motion, key, extent, loose);
+  std::vector<EarlierView> earlier;
+  if (any_turns(by_texture) || has_tracks()) earlier = earlier_views(main, motion, key, extent);
+  compare_photographs(solver, earlier, motion, key, by_texture);
+  compare_tracks(solver, earlier, motion, key);
   const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     // Up to the key before: what errs at this one is not taken for a turn that texture takes back.
@@ -279,11 +279,12 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
     trust.turned[b] += dot(turn, turn);
   }
   const TrackWeights all = weights(motion, trust, loose);
-  bool any = any_turns(loose);
+  bool any = any_turns(by_texture);
   for (int64_t b = 0; b < motion.bodies(); ++b)
     any = any || all.colour[static_cast<size_t>(b)] > 0 || all.tracks[static_cast<size_t>(b)];
   constexpr double little_blur = 1;  // pixels
   if (any) solver.solve(all, {options_.steps / 2, little_blur});
+  look_for_mirror_images(earlier, motion, key, by_texture, trust);
 }
 
 Surfels Tracker::new_surface(const Surfels& main, Motion& motion, int64_t key, float extent, float tint,

@@ -57,6 +57,7 @@ Safetensors Trainer::checkpoint() const {
     file.add("texture_trust/taken_back_by_colour", texture_trust_.taken_back_by_colour);
     file.add("texture_trust/taken_back_by_tracks", texture_trust_.taken_back_by_tracks);
     file.add("texture_trust/stiffness", texture_trust_.stiffness);
+    file.add("texture_trust/mirror_image", texture_trust_.mirror_image);
   }
   file.add("views/order", views_.order());
   Tensor<int64_t> random(Shape{4});
@@ -105,9 +106,11 @@ void Trainer::resume() {
     trust.taken_back_by_colour = file.tensor<double>("texture_trust/taken_back_by_colour");
     trust.taken_back_by_tracks = file.tensor<double>("texture_trust/taken_back_by_tracks");
     trust.stiffness = file.tensor<double>("texture_trust/stiffness");
+    trust.mirror_image = file.tensor<double>("texture_trust/mirror_image");
     const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
     if (trust.turned.shape() != bodies || trust.taken_back_by_colour.shape() != bodies ||
-        trust.taken_back_by_tracks.shape() != bodies || trust.stiffness.shape() != Shape{bodies[0], 3})
+        trust.taken_back_by_tracks.shape() != bodies || trust.stiffness.shape() != Shape{bodies[0], 3} ||
+        trust.mirror_image.shape() != Shape{bodies[0], 2})
       throw InputError("checkpoint", "texture_trust", texture_trust_.turned.shape().to_string(),
                        bodies.to_string());
   }

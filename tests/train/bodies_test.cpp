@@ -424,23 +424,6 @@ TEST(Bodies, BendWhereSilhouettesGetWorse) {
   EXPECT_FALSE(bends(SynthScene::balls));
 }
 
-// Colour is trusted where it takes back little of the turns that there were, and of none before there were
-// any.
-TEST(Tracker, TrustsColourThatTakesBackLittle) {
-  const auto holds = [](double taken_back, double turned) {
-    TextureTrust trust = TextureTrust::of(1);
-    trust.taken_back_by_colour[0] = taken_back;
-    trust.turned[0] = turned;
-    EXPECT_EQ(trust.holds_tracks(0), turned > 0.1);  // which take nothing back
-    return trust.holds_colour(0);
-  };
-  EXPECT_FALSE(TextureTrust().holds_colour(0));
-  EXPECT_FALSE(holds(0, 0.01));
-  EXPECT_TRUE(holds(0.01, 0.2));
-  EXPECT_TRUE(holds(-0.1, 0.2));
-  EXPECT_FALSE(holds(0.1, 0.2));
-}
-
 TEST(Tracker, PredictsWhatGoesOnAsBefore) {
   Motion motion =
       still_motion(Tensor<float>({1, 3}), tensor_of(std::vector<float>{0, 0.1F, 0.2F, 0.3F, 0.4F, 1}));
