@@ -168,6 +168,9 @@ void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
 
 void make_solid(const Motion& motion, Surfels& surfels) {
   constexpr float widest = 1.5F;  // medians
+  // Of what they start as, which is as wide as their neighbours are apart. Two of them still cover 0.9 of the
+  // pixel half way between them.
+  constexpr float share = 0.6F;
   std::vector<std::vector<float>> scales(static_cast<size_t>(motion.bodies()));
   for (int64_t i = 0; i < surfels.count(); ++i) {
     if (surfels.body[i] >= 0)
@@ -184,7 +187,7 @@ void make_solid(const Motion& motion, Surfels& surfels) {
     if (surfels.body[i] < 0) continue;
     surfels.opacity_logit[i] = logit(solid_opacity);
     for (float* scale : {&surfels.log_scale(i, 0), &surfels.log_scale(i, 1)})
-      *scale = std::min(*scale, most[static_cast<size_t>(surfels.body[i])]);
+      *scale = std::log(share) + std::min(*scale, most[static_cast<size_t>(surfels.body[i])]);
   }
 }
 

@@ -13,9 +13,9 @@ namespace traceflow {
 // The opacity of the points that bodies carry while they are followed. Where it learns, surfels of the front
 // fade, larger ones behind them show through, and the surface that pictures show moves away.
 inline constexpr float solid_opacity = 0.95F;
-// Gives that opacity to all that bodies carry, and lets none start wider than 1.5 times its body's median.
-// Points are sparse here and there on the sides that no picture has shown yet, and the wide surfels there
-// stick out when they come to the rim: silhouettes then push the body away.
+// Gives that opacity to all that bodies carry and narrows them to 0.6 of their width, or of 1.5 times their
+// body's median. A solid surfel shows up to 1.1 of its width beyond its centre. Those on the sides that no
+// picture has shown yet stick out when they come to the rim: silhouettes then push the body away.
 void make_solid(const Motion& motion, Surfels& surfels);
 
 // A body for each connected part of the earliest photograph's mask: it carries the surfels that project into

@@ -39,14 +39,8 @@ Surfels empty_surfels(int64_t count, int degree, bool tint) {
 }
 
 void set_scales_from_neighbours(Surfels& s) {
-  const Neighbours near = nearest_neighbours(s.position, neighbours_for_scale);
-  for (int64_t i = 0; i < s.count(); ++i) {
-    float sum = 0;
-    for (int k = 0; k < neighbours_for_scale; ++k) sum += near.distance2(i, k);
-    const float log_scale = 0.5F * std::log(std::max(sum / neighbours_for_scale, least_distance2));
-    s.log_scale(i, 0) = log_scale;
-    s.log_scale(i, 1) = log_scale;
-  }
+  const Tensor<float> log_scale = log_spacing(s.position);
+  for (int64_t i = 0; i < s.count(); ++i) s.log_scale(i, 0) = s.log_scale(i, 1) = log_scale[i];
 }
 
 void set_random_rotations(Surfels& s, Random& random) {
@@ -128,6 +122,17 @@ void take_true_poses(const Capture& capture, Scene& scene) {
 }
 
 }  // namespace
+
+Tensor<float> log_spacing(const Tensor<float>& points) {
+  const Neighbours near = nearest_neighbours(points, neighbours_for_scale);
+  Tensor<float> result({points.dim(0)});
+  for (int64_t i = 0; i < result.size(); ++i) {
+    float sum = 0;
+    for (int k = 0; k < neighbours_for_scale; ++k) sum += near.distance2(i, k);
+    result[i] = 0.5F * std::log(std::max(sum / neighbours_for_scale, least_distance2));
+  }
+  return result;
+}
 
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random) {
   Surfels s = empty_surfels(points.dim(0), options.sh_degree, true);

@@ -20,6 +20,10 @@ struct InitialScene {
 // Throws InputError when there is no such place either.
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
+// The logarithm of how far each of the points (P×3) is from its neighbours: the root mean square distance of
+// three.
+Tensor<float> log_spacing(const Tensor<float>& points);
+
 // Its parts. Grey surfels at the given points (P×3), as wide as their neighbours are apart.
 Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& options, Random& random);
 // Surfels drawn uniformly in cells of the box around the points and the cameras, `environment_box` times as

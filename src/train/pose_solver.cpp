@@ -163,6 +163,7 @@ PoseSolver::PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, 
       radius_(radii_of(main, motion)),
       saved_(motion::make_saved()),
       pivot_({motion.bodies(), 3}),
+      normal_weight_(targets_.size()),
       colour_weight_(targets_.size()),
       blended_(raster::make_saved()) {
   options_.sort = raster::SortOrder::centre;  // as body_jacobian asks
@@ -193,6 +194,20 @@ void PoseSolver::turn_priors() {
   }
 }
 
+void PoseSolver::weigh_normals(const TrackWeights& weights, Over over) {
+  for (size_t k = 0; k < targets_.size(); ++k) {
+    const TrackTarget& target = targets_[k];
+    normal_weight_[k].reset(target.coverage.shape());
+    if (!(weights.normal > 0) || target.normal_prior.empty()) continue;
+    if (over == Over::bodies) raster::forward(posed_, target.camera, options_, whole_, nullptr);
+    for (int64_t i = 0; i < target.mask.size(); ++i) {
+      const Vec3<float> told = load3<float>(&target.normal_prior[3 * i]);
+      if (target.mask[i] == 0 || !(dot(told, told) > 0)) continue;
+      normal_weight_[k][i] = weights.normal * (over == Over::bodies ? whole_.tint[i] : 1.0F);
+    }
+  }
+}
+
 // Where bodies with different weights meet, a pixel has the mean of what shows there.
 void PoseSolver::weigh_colour(const TrackWeights& weights) {
   const bool any = std::any_of(weights.colour.begin(), weights.colour.end(), [](float w) { return w > 0; });
@@ -211,6 +226,11 @@ void PoseSolver::weigh_colour(const TrackWeights& weights) {
   }
 }
 
+void PoseSolver::weigh(const TrackWeights& weights) {
+  weigh_normals(weights, Over::masks);
+  weigh_colour(weights);
+}
+
 const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& weights, double sigma,
                                               bool with_jacobian) {
   const TrackTarget& target = targets_[at];
@@ -218,15 +238,10 @@ const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& wei
   const int64_t pixels = whole_.tint.size();
   Residuals& r = residuals_;
   r.value.reset({pixels, channels});
-  const bool has_prior = !target.normal_prior.empty(), has_colour = !target.colour.empty();
-  const auto weight_of_normal = [&](int64_t i) {
-    if (!has_prior || target.mask[i] == 0) return 0.0F;
-    const Vec3<float> told = load3<float>(&target.normal_prior[3 * i]);
-    return dot(told, told) > 0 ? weights.normal : 0.0F;
-  };
+  const bool has_colour = !target.colour.empty();
   for (int64_t i = 0; i < pixels; ++i) {
     r.value(i, 0) = weights.silhouette * (whole_.tint[i] - target.coverage[i]);
-    const float by_normal = weight_of_normal(i), by_colour = colour_weight_[at][i];
+    const float by_normal = normal_weight_[at][i], by_colour = colour_weight_[at][i];
     for (int64_t k = 0; k < 3; ++k) {
       if (by_normal > 0)
         r.value(i, 1 + k) = by_normal * (whole_.normal[3 * i + k] - target.normal_prior[3 * i + k]);
@@ -236,7 +251,7 @@ const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& wei
   if (with_jacobian) {
     raster::body_jacobian(posed_, main_.body, pivot_, target.camera, options_, *blended_, r.jacobian);
     for (int64_t i = 0; i < pixels; ++i) {
-      const float by_normal = weight_of_normal(i), by_colour = colour_weight_[at][i];
+      const float by_normal = normal_weight_[at][i], by_colour = colour_weight_[at][i];
       float* row = r.jacobian.data() + i * static_cast<int64_t>(params_) * channels;
       for (size_t p = 0; p < params_; ++p, row += channels) {
         row[0] *= weights.silhouette;
@@ -309,7 +324,7 @@ std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWei
   const bool any = std::any_of(targets_.begin(), targets_.end(),
                                [](const TrackTarget& target) { return !target.normal_prior.empty(); });
   if (!any) return {};
-  weigh_colour(weights);
+  weigh(weights);
   NormalEquations equations(params_);
   add_targets(weights, sigma, equations);
   std::vector<SymmetricEigen<3, double>> result;
@@ -400,6 +415,7 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
   weigh_colour(weights);
   for (int k = 0; k < steps.count; ++k) {
     const double sigma = steps.blur * std::pow(blur_falls, k);
+    weigh_normals(weights, Over::bodies);
     double before = 0;
     std::vector<double> found = step(weights, sigma, steps.hold_depth, before);
     const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
@@ -421,7 +437,7 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
 
 double PoseSolver::cost(const TrackWeights& weights) {
   constexpr double sigma = 1;  // pixels
-  weigh_colour(weights);
+  weigh(weights);
   double sum = 0;
   for (size_t at = 0; at < targets_.size(); ++at) sum += robust_cost(look(at, weights, sigma, false).value);
   return sum;
@@ -450,7 +466,7 @@ std::vector<Vec3<double>> PoseSolver::turns_of_steps(F&& next) {
 std::vector<Vec3<double>> PoseSolver::turns_by_colour() {
   constexpr double sigma = 1;  // pixels
   const TrackWeights colour{0, 0, std::vector<float>(radius_.size(), 1.0F), {}};
-  weigh_colour(colour);
+  weigh(colour);
   return turns_of_steps([&] {
     NormalEquations equations(params_);
     add_targets(colour, sigma, equations);

@@ -85,6 +85,12 @@ class PoseSolver {
     Tensor<float> jacobian;  // n×P×7; as it was where not asked for
   };
   void pose();
+  // Set each pixel's weights, which then stand while bodies move. Normals count in the masks, or only as far
+  // as bodies cover them: what a mask shows beyond them is surface that has come into view, and normals that
+  // are compared there pull a body nearer until it covers it.
+  enum class Over { masks, bodies };
+  void weigh(const TrackWeights& weights);  // over the masks
+  void weigh_normals(const TrackWeights& weights, Over over);
   void weigh_colour(const TrackWeights& weights);
   // at: of a target. sigma: of the blur, pixels. Until the next call.
   const Residuals& look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
@@ -116,8 +122,8 @@ class PoseSolver {
   PosedSurfels still_, posed_;
   motion::SavedPtr saved_;
   Tensor<float> pivot_;
-  std::vector<Tensor<float>> colour_weight_;  // of each target, H×W
-  LooseTurns loose_, by_texture_;             // empty, or of each body
+  std::vector<Tensor<float>> normal_weight_, colour_weight_;  // of each target, H×W
+  LooseTurns loose_, by_texture_;                             // empty, or of each body
   std::vector<Alignment> alignments_;
   std::vector<Reprojection> reprojections_;
   raster::Output whole_;

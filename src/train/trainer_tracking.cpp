@@ -5,6 +5,7 @@
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 #include "train/bodies.h"
+#include "train/initialise.h"
 #include "train/trainer.h"
 
 // The part of the loop that follows bodies from time to time before everything trains.
@@ -111,10 +112,16 @@ void Trainer::let_strays_go(int64_t key) {
   // A released point of the capture stands still where it is, and begins as what no body carried. New surface
   // was never seen to stand still.
   constexpr float unseen = -8;
+  Tensor<float> points({std::min(initial_main_count_, main.count()), 3});
+  std::copy_n(main.position.data(), points.size(), points.data());
+  const Tensor<float> log_scale = log_spacing(points);
   for (int64_t i = 0; i < main.count(); ++i) {
-    if (main.body[i] != carried[i])
-      main.opacity_logit[i] = i < initial_main_count_ ? logit(options_.initial.opacity) : unseen;
+    if (main.body[i] == carried[i]) continue;
+    const bool is_point = i < points.dim(0);
+    main.opacity_logit[i] = is_point ? logit(options_.initial.opacity) : unseen;
+    if (is_point) main.log_scale(i, 0) = main.log_scale(i, 1) = log_scale[i];
   }
+  scene_.main.log_scale = main.log_scale.on(device_);
   scene_.main.opacity_logit = main.opacity_logit.on(device_);
   scene_.main.body = main.body.on(device_);
 }

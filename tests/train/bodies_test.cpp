@@ -260,8 +260,8 @@ TEST(Tracker, LeavesReflectionsAloneAndAddsOnlySurfaceOfBodiesWhileTheyAreFollow
   EXPECT_FALSE(rests());
 }
 
-// The widest of a body are narrowed, and nothing else changes in size.
-TEST(Bodies, StartSolidAndWithoutWideSurfels) {
+// What is carried is narrowed, the widest the most, and nothing else changes in size.
+TEST(Bodies, StartSolidAndNarrow) {
   Surfels surfels = ball_body::ball();
   const Motion motion = ball_body::turned_by(Vec3<double>(0));
   const float median = surfels.log_scale[0];
@@ -274,8 +274,9 @@ TEST(Bodies, StartSolidAndWithoutWideSurfels) {
     const bool is_carried = i != 5;
     EXPECT_FLOAT_EQ(sigmoid(surfels.opacity_logit[i]), is_carried ? solid_opacity : sigmoid(4.0F));
     for (int k = 0; k < 2; ++k) {
-      const float most = is_carried ? median + std::log(1.5F) : median + 1;
-      EXPECT_FLOAT_EQ(surfels.log_scale(i, k), std::min(before.log_scale(i, k), most)) << i;
+      const float most = median + std::log(1.5F), started = before.log_scale(i, k);
+      const float expected = is_carried ? std::min(started, most) + std::log(0.6F) : started;
+      EXPECT_FLOAT_EQ(surfels.log_scale(i, k), expected) << i;
     }
   }
 }
@@ -297,6 +298,7 @@ TEST(Tracker, KeepsBodiesSolidWhileTheyAreFollowed) {
     } else if (first.main.body[i] >= 0) {
       ++let_go;
       EXPECT_LT(sigmoid(main.opacity_logit[i]), 0.9F);
+      EXPECT_GT(main.log_scale(i, 0), first.main.log_scale(i, 0) + 0.1F);  // not narrow any more
     } else {
       free += main.opacity_logit[i] != first.main.opacity_logit[i] ? 1 : 0;
     }

@@ -58,5 +58,25 @@ TEST(PoseSolver, HoldsTheDepthAndNothingElse) {
   }
 }
 
+// The mask is wider than the ball all around, as where surface comes into view that it does not have yet. The
+// normals there do not pull the ball towards the camera.
+TEST(PoseSolver, NormalsOfWhatNoBodyCoversDoNotCount) {
+  const Surfels surfels = ball();
+  TrackTarget picture = picture_of(surfels, Vec3<double>(0), false);
+  const Camera<float>& camera = picture.camera;
+  for (int64_t at = 0; at < picture.mask.size(); ++at) {
+    const Vec2<float> off(static_cast<float>(at % camera.width) + 0.5F - camera.centre_x,
+                          static_cast<float>(at / camera.width) + 0.5F - camera.centre_y);
+    const float radius = length(off);
+    if (picture.coverage[at] > 0.95F || radius > 27) continue;
+    picture.mask[at] = 1;
+    store3(&picture.normal_prior[3 * at], Vec3<float>(off.x, off.y, 0) / radius);
+  }
+  Motion motion = turned_by(Vec3<double>(0));
+  PoseSolver solver(surfels, nullptr, motion, 0, {}, {picture});
+  solver.solve({0, 0.3F, {0.0F}}, {8, 0.5});
+  EXPECT_LT(std::abs(motion.shift(0, 0, 2)), 0.02F);
+}
+
 }  // namespace
 }  // namespace traceflow
