@@ -118,14 +118,14 @@ TEST(TextureTrust, FindsMirrorsByTheirPhotographs) {
 TEST(TextureTrust, FindsTheDemosMirrorBall) {
   const fs::path folder = fs::path(::testing::TempDir()) / ("balls_" + std::to_string(::getpid()));
   SynthOptions made;
-  made.frames = 24;
-  made.width = 120;
-  made.height = 68;
+  made.frames = 32;
+  made.width = 160;
+  made.height = 90;
   made.samples = 1;
   made.points = 2500;
   write_synthetic_capture(made, folder);
   TrainOptions options = preset("cpu");
-  options.iterations = 200;
+  options.iterations = 240;
   options.specular = Specular::none;
   options.initial.max_points = options.density.max_surfels = 2500;
   Trainer trainer(options, load_capture(folder, {}), folder / "run");
