@@ -168,8 +168,8 @@ void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
 
 void make_solid(const Motion& motion, Surfels& surfels) {
   constexpr float widest = 1.5F;  // medians
-  // Of what they start as, which is as wide as their neighbours are apart. Two of them still cover 0.9 of the
-  // pixel half way between them.
+  // Of what they start as, which is as wide as their neighbours are apart. Two neighbours still cover 0.9 of
+  // what lies half way between them.
   constexpr float share = 0.6F;
   std::vector<std::vector<float>> scales(static_cast<size_t>(motion.bodies()));
   for (int64_t i = 0; i < surfels.count(); ++i) {

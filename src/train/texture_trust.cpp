@@ -17,7 +17,7 @@ constexpr double enough_turned = 0.06;  // radians², Σ over times: as one turn
 constexpr double least_stiffness = 0.45;
 
 // A ball mirrors where its photographs turn as a mirror image does, up to such a share; of a textured one, at
-// rest or turning, it is near 1. The turns of the mirror image are to be seen.
+// rest or turning, it is near 1. The mirror image must have turned enough to tell.
 constexpr double most_unlike = 0.4;
 constexpr double enough_of_mirror_image = 0.02;  // radians²
 

@@ -106,8 +106,11 @@ void Trainer::resume() {
     trust.taken_back_by_colour = file.tensor<double>("texture_trust/taken_back_by_colour");
     trust.taken_back_by_tracks = file.tensor<double>("texture_trust/taken_back_by_tracks");
     trust.stiffness = file.tensor<double>("texture_trust/stiffness");
-    trust.mirror_image = file.tensor<double>("texture_trust/mirror_image");
     const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
+    // Checkpoints of programs before 26 November 2026 have none.
+    trust.mirror_image = file.has("texture_trust/mirror_image")
+                             ? file.tensor<double>("texture_trust/mirror_image")
+                             : Tensor<double>({bodies[0], 2});
     if (trust.turned.shape() != bodies || trust.taken_back_by_colour.shape() != bodies ||
         trust.taken_back_by_tracks.shape() != bodies || trust.stiffness.shape() != Shape{bodies[0], 3} ||
         trust.mirror_image.shape() != Shape{bodies[0], 2})

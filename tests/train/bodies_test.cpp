@@ -409,18 +409,8 @@ TEST(Bodies, BendWhereSilhouettesGetWorse) {
     made.frames = 24;
     made.width = 120;
     made.height = 68;
-    made.samples = 1;
     made.points = 4000;
-    write_synthetic_capture(made, folder);
-    TrainOptions options = preset("cpu");
-    options.iterations = 400;
-    options.specular = Specular::none;
-    options.initial.max_points = options.density.max_surfels = 4000;
-    Trainer trainer(options, load_capture(folder, {}), folder / "run");
-    const auto keys = static_cast<int>(trainer.scene().main_motion->keys());
-    while (trainer.iteration() <= options.iterations / 8 + (keys - 1) * options.deform.track.map_each)
-      trainer.step();
-    return trainer.scene().main_nodes.has_value();
+    return followed(made, 400, folder)->scene().main_nodes.has_value();
   };
   EXPECT_TRUE(bends(SynthScene::soft));
   EXPECT_FALSE(bends(SynthScene::balls));

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <filesystem>
+#include <memory>
 
 #include "capture/synth/synth.h"
 #include "scene/scene_file.h"
@@ -30,6 +31,20 @@ inline const fs::path& capture_folder() {
     return path;
   }();
   return folder;
+}
+
+// A run without reflections on a capture that is made for it, up to where its bodies have been followed.
+inline std::unique_ptr<Trainer> followed(SynthOptions capture, int iterations, const fs::path& folder) {
+  capture.samples = 1;
+  write_synthetic_capture(capture, folder);
+  TrainOptions options = preset("cpu");
+  options.iterations = iterations;
+  options.specular = Specular::none;
+  options.initial.max_points = options.density.max_surfels = capture.points;
+  auto trainer = std::make_unique<Trainer>(options, load_capture(folder, {}), folder / "run");
+  const auto keys = static_cast<int>(trainer->scene().main_motion->keys());
+  while (trainer->iteration() <= iterations / 8 + (keys - 1) * options.deform.track.map_each) trainer->step();
+  return trainer;
 }
 
 inline TrainOptions small_run(int iterations) {

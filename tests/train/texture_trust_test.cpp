@@ -121,19 +121,8 @@ TEST(TextureTrust, FindsTheDemosMirrorBall) {
   made.frames = 32;
   made.width = 160;
   made.height = 90;
-  made.samples = 1;
   made.points = 2500;
-  write_synthetic_capture(made, folder);
-  TrainOptions options = preset("cpu");
-  options.iterations = 240;
-  options.specular = Specular::none;
-  options.initial.max_points = options.density.max_surfels = 2500;
-  Trainer trainer(options, load_capture(folder, {}), folder / "run");
-  const int64_t keys = trainer.scene().main_motion->keys();
-  while (trainer.iteration() <=
-         options.iterations / 8 + static_cast<int>(keys - 1) * options.deform.track.map_each)
-    trainer.step();
-  trainer.save();
+  followed(made, 240, folder)->save();
   TextureTrust trust;
   trust.mirror_image =
       Safetensors::read(RunFolder{folder / "run"}.checkpoint()).tensor<double>("texture_trust/mirror_image");
