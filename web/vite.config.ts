@@ -5,15 +5,18 @@ import { notices } from './dev/notices.ts';
 // While the page is worked on: where the program, or what stands in for it, listens.
 const program = process.env['PROGRAM'] ?? 'http://127.0.0.1:5174';
 
-// Two builds into page/, each with fixed file names so that the same source gives the same bytes: the viewer (a page, a
-// script, a style sheet) and the report (one file that opens from disk).
+// Where the built pages go.
+const pages = process.env['PAGE'] ?? 'page';
+
+// Two builds into one folder, each with fixed file names so that the same source gives the same bytes: the viewer (a
+// page, a script, a style sheet) and the report (one file that opens from disk).
 export default defineConfig(({ mode }) => ({
   root: fileURLToPath(new URL('.', import.meta.url)),
   publicDir: mode === 'report' ? false : 'public',
   plugins: mode === 'report' ? [inline_everything()] : [],
   server: { port: 5173, proxy: { '/ws': { target: program, ws: true, changeOrigin: true, rewriteWsOrigin: true } } },
   build: {
-    outDir: 'page',
+    outDir: pages,
     emptyOutDir: mode !== 'report',
     target: 'es2022',
     modulePreload: false as const,
