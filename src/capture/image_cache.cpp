@@ -32,6 +32,13 @@ const ViewSource& ImageCache::source(const std::string& id) const {
   return found->second;
 }
 
+void ImageCache::leave_masks_out(std::span<const std::string> ids) {
+  for (const std::string& id : ids) views_.at(id).mask = {};
+  by_id_.clear();
+  entries_.clear();
+  bytes_ = 0;
+}
+
 int64_t ImageCache::bytes() const {
   const std::lock_guard lock(mutex_);
   return bytes_;

@@ -3,6 +3,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <unordered_map>
 
@@ -22,6 +23,8 @@ class ImageCache {
   ViewTruth load_truth(const std::string& id) const;
   // Throws InternalError for a view of another capture.
   const ViewSource& source(const std::string& id) const;
+  // Empties the cache; the named views have no mask from then on. Not beside other calls.
+  void leave_masks_out(std::span<const std::string> ids);
   const CaptureSource& capture() const { return capture_; }
   int64_t bytes() const;
   int64_t limit_bytes() const { return limit_bytes_; }
@@ -36,7 +39,7 @@ class ImageCache {
   ViewPixels decode(const std::string& id) const;
   void insert(const std::string& id, const std::shared_ptr<const ViewPixels>& pixels);
 
-  const std::unordered_map<std::string, ViewSource> views_;
+  std::unordered_map<std::string, ViewSource> views_;
   const CaptureSource capture_;
   const int64_t limit_bytes_;
 

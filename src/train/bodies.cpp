@@ -192,11 +192,14 @@ void make_solid(const Motion& motion, Surfels& surfels) {
 }
 
 std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels) {
-  const View& first = *std::min_element(capture.train.begin(), capture.train.end(),
-                                        [](const View& a, const View& b) { return a.time < b.time; });
-  const std::shared_ptr<const ViewImages> images = load_images(capture, first);
-  if (images->mask.empty()) return std::nullopt;
-  const Parts parts = parts_of(images->mask);
+  const View* earliest = nullptr;
+  for (const View& view : capture.train) {
+    if (earliest != nullptr && view.time >= earliest->time) continue;
+    if (!load_images(capture, view)->mask.empty()) earliest = &view;
+  }
+  if (earliest == nullptr) return std::nullopt;
+  const View& first = *earliest;
+  const Parts parts = parts_of(load_images(capture, first)->mask);
   std::vector<std::vector<Candidate>> candidates(parts.area.size());
   for (int64_t i = 0; i < surfels.count(); ++i) {
     const Vec3<float> point = load3<float>(surfels.position.row(i));

@@ -18,7 +18,7 @@ inline constexpr float solid_opacity = 0.95F;
 // picture has shown yet stick out when they come to the rim: silhouettes then push the body away.
 void make_solid(const Motion& motion, Surfels& surfels);
 
-// A body for each connected part of the earliest photograph's mask: it carries the surfels that project into
+// A body for each connected part of the earliest mask: it carries the surfels that project into
 // it and lie no farther behind its front than it is wide. Sets surfels.body and returns bodies that stand
 // still at the times of the training views; nothing where no part has enough surfels.
 std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);

@@ -241,6 +241,11 @@ float cloud_radius(const Tensor<float>& points) {
   return pick(values, (count - 1) * 9 / 10);
 }
 
+bool follows_bodies(const Capture& capture, const TrainOptions& options) {
+  return options.deform.main && options.deform.kind == "nodes" && capture.has_masks &&
+         !capture.masks_are_estimated;
+}
+
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
   const int64_t limit = std::min(options.initial.max_points, options.density.max_surfels);
   // What no photograph shows teaches a main surfel nothing, and a mirror may still show it.
@@ -265,14 +270,12 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
   // mirrors grew into one before the camera, which can show any scene.
   const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks && !capture.masks_are_estimated;
-  const bool finds_bodies = options.deform.main && options.deform.kind == "nodes" && capture.has_masks &&
-                            !capture.masks_are_estimated;
   if (options.initial.colours_from_views || by_masks) {
     const Sightings sightings = look_at(scene.main, earliest_photographs(capture));
     if (options.initial.colours_from_views) set_colours(scene.main, sightings);
     if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
   }
-  if (finds_bodies) scene.main_motion = find_bodies(capture, scene.main);
+  if (follows_bodies(capture, options)) scene.main_motion = find_bodies(capture, scene.main);
   if (options.deform.track.true_poses) take_true_poses(capture, scene);
   if (scene.main_motion) make_solid(*scene.main_motion, scene.main);
   if (options.deform.main)

@@ -14,6 +14,9 @@ struct InitialScene {
   int64_t points_in_view = 0;  // that some training view sees
 };
 
+// Whether what the capture's masks show is followed as bodies.
+bool follows_bodies(const Capture& capture, const TrainOptions& options);
+
 // The scene that training starts from (method §7.8): main surfels at those of the capture's points that some
 // training view sees, or, where there are none, at random ones in the views' common sight; environment
 // surfels (or a map) around all of the points, fields at zero. No set starts larger than its max_surfels.

@@ -118,6 +118,7 @@ Optimiser::Optimiser(const Scene& scene) {
   }
 }
 
+void Optimiser::begin(const Motion& motion) { main_motion_ = zero_states(motion); }
 void Optimiser::begin(const Nodes& nodes) { main_nodes_ = zero_states(nodes); }
 
 void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,

@@ -61,7 +61,8 @@ class Optimiser {
   // What the last step left alone. Waits for the device.
   NonFiniteGradients left_alone() const { return notes_.report(); }
 
-  // Of nodes that the scene has got since.
+  // Of bodies or nodes that the scene has got since.
+  void begin(const Motion& motion);
   void begin(const Nodes& nodes);
 
   SurfelMoments& main() { return main_; }

@@ -147,7 +147,7 @@ Sightings look_at(const Surfels& surfels, std::span<const Photograph> photograph
       const ViewImages& images = *photographs[v].images;
       if (!images.known.empty() && images.known(at.row, at.column) == 0) continue;
       sightings.any[k] = 1;
-      sightings.outside[k] += !images.mask.empty() && images.mask(at.row, at.column) ? -1 : 1;
+      if (!images.mask.empty()) sightings.outside[k] += images.mask(at.row, at.column) != 0 ? -1 : 1;
       for (size_t c = 0; c < 3; ++c) {
         colours[c].push_back(images.colour(at.row, at.column, static_cast<int64_t>(c)));
       }

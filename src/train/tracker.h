@@ -32,11 +32,23 @@ class Tracker {
   void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
              const PoseSteps& steps, const TextureTrust& trust) const;
 
+  // Makes bodies of parts of bodies (train/body_parts.h) that move by themselves: with poses of their own the
+  // keys from 1 to `key` cost clearly less. Those poses are found anew. Returns how many bodies have been
+  // added.
+  int64_t part_bodies(Surfels& main, int64_t points, Motion& motion, int64_t key, float extent) const;
+
   // Surfels for surface that comes into view at a key, at most `limit` (train/new_surface.h).
   Surfels new_surface(const Surfels& main, Motion& motion, int64_t key, float extent, float tint,
                       int64_t limit) const;
 
  private:
+  // The keys from 1 to another followed again from where the motion stands at key 0.
+  struct Refollowed {
+    Motion motion;
+    double cost = 0;    // of all of them
+    double pixels = 0;  // that a body shows, in all of them
+  };
+  Refollowed follow_again(const Surfels& main, Motion motion, int64_t key, int64_t body, float extent) const;
   TrackTarget target_of(const View& view) const;
   PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent) const;
   TrackWeights weights(const Motion& motion, const TextureTrust& trust, const LooseTurns& loose) const;

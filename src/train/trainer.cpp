@@ -12,6 +12,7 @@
 #include "render/frame_kernels.h"
 #include "train/continuation.h"
 #include "train/initialise.h"
+#include "train/odd_masks.h"
 
 namespace traceflow {
 
@@ -69,6 +70,12 @@ TrainOptions within(TrainOptions options, const SurfelCaps& caps) {
   return options;
 }
 
+// Bodies are followed by masks.
+Capture with_likely_masks(Capture capture, const TrainOptions& options) {
+  if (follows_bodies(capture, options)) leave_out_odd_masks(capture);
+  return capture;
+}
+
 Random seeded(int64_t seed) { return Random(static_cast<uint64_t>(seed)); }
 
 std::optional<lpips::Network> network_on(Device device, std::optional<lpips::Network> network) {
@@ -105,7 +112,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
                  Device device)
     : options_(with_whole_paths(options)),
       device_(device),
-      capture_(std::move(capture)),
+      capture_(with_likely_masks(std::move(capture), options)),
       capture_folder_(whole_path(capture_.folder).lexically_normal().string()),
       run_{whole_path(run)},
       schedule_(options),

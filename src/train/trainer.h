@@ -89,6 +89,8 @@ class Trainer {
   Surfels follow_bodies(const Tracking& now);
   // Follows bodies to a new time.
   void follow(int64_t key);
+  // Some times after the first: what moves apart becomes several bodies.
+  void part_bodies(int64_t key);
   // Surfels for surface of bodies that has come into view at the newest time.
   Surfels new_surface(int64_t key) const;
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
@@ -104,8 +106,8 @@ class Trainer {
   void share_among_keys();
   // Adds to the nodes' gradient what holds them together, and none at the first time.
   void hold_nodes();
-  // How far the bodies' silhouettes are off in a view, as a share of the mask's area.
-  double silhouette_misfit(const View& view);
+  // How far the bodies' silhouettes are off in a view, as a share of the mask's area; none without a mask.
+  std::optional<double> silhouette_misfit(const View& view);
   const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();

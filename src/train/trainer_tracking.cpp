@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 
 #include "math/activation.h"
 #include "ops/motion/motion.h"
@@ -43,6 +45,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
   const bool has_come_to_the_end = now.enters && !now.goes_on;
   if (now.enters && now.goes_on) {
     follow(now.key);
+    part_bodies(now.key);
     if (options_.deform.track.new_surface) made = new_surface(now.key);
   }
   if (now.refines || has_come_to_the_end) follow_again();
@@ -95,6 +98,20 @@ void Trainer::follow(int64_t key) {
   health_.expect_fall();
 }
 
+void Trainer::part_bodies(int64_t key) {
+  constexpr std::array<int64_t, 4> at = {5, 10, 20, 40};
+  if (options_.deform.track.true_poses || std::find(at.begin(), at.end(), key) == at.end()) return;
+  Surfels main = scene_.main.on(Device::cpu);
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  const Tracker tracker(options_.deform.track, options_.render, capture_);
+  if (tracker.part_bodies(main, initial_main_count_, motion, key, scene_.extent) == 0) return;
+  scene_.main.body = main.body.on(device_);
+  scene_.main_motion = motion.on(device_);
+  optimiser_.begin(*scene_.main_motion);
+  // What was learned is of the bodies as they were.
+  texture_trust_ = {};
+}
+
 Surfels Trainer::new_surface(int64_t key) const {
   const InitialOptions& initial = options_.initial;
   const float tint = initial.tint_in_mask > 0 ? initial.tint_in_mask : initial.tint;
@@ -126,13 +143,14 @@ void Trainer::let_strays_go(int64_t key) {
   scene_.main.body = main.body.on(device_);
 }
 
-double Trainer::silhouette_misfit(const View& view) {
+std::optional<double> Trainer::silhouette_misfit(const View& view) {
+  const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
+  if (images->coverage.empty()) return std::nullopt;
   FrameRequest request;
   request.camera = view.camera;
   request.time = view.time;
   request.deform_main = request.specular = false;
   request.silhouette = true;
-  const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
   const Tensor<float> silhouette = renderer_.forward(scene_, request, false).silhouette.on(Device::cpu);
   double off = 0, area = 0;
   for (int64_t i = 0; i < images->coverage.size(); ++i) {
@@ -164,12 +182,14 @@ void Trainer::let_bend() {
   for (const View& view : capture_.train) views.push_back(&view);
   std::stable_sort(views.begin(), views.end(),
                    [](const View* a, const View* b) { return a->time < b->time; });
-  const double first = silhouette_misfit(*views.front());
   const size_t step = (views.size() + most_views - 1) / most_views;
-  double sum = 0, count = 0;
-  for (size_t k = 0; k < views.size(); k += step, ++count) sum += silhouette_misfit(*views[k]);
+  std::vector<double> misfits;
+  for (size_t k = 0; k < views.size(); k += step) {
+    if (const std::optional<double> misfit = silhouette_misfit(*views[k])) misfits.push_back(*misfit);
+  }
   const BendOptions& bend = options_.deform.bend;
-  if (sum <= bend.misfit * first * count) return;
+  const double sum = std::accumulate(misfits.begin(), misfits.end(), 0.0);
+  if (misfits.empty() || sum <= bend.misfit * misfits.front() * static_cast<double>(misfits.size())) return;
   const Nodes nodes =
       place_nodes(scene_.main_motion->on(Device::cpu), scene_.main.on(Device::cpu), bend.nodes, bend.every);
   if (nodes.count() == 0) return;
@@ -184,14 +204,16 @@ void Trainer::let_stand() {
   const size_t step = std::max<size_t>(1, capture_.train.size() / most_views);
   for (size_t k = 0; k < capture_.train.size(); k += step) {
     const View& view = capture_.train[k];
+    const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
+    if (images->mask.empty()) continue;
     FrameRequest request;
     request.camera = view.camera;
     request.time = view.time;
     request.sh_degree_main = schedule_.sh_degree_main(iteration_);
     request.deform_main = request.specular = false;
     const Frame& frame = renderer_.forward(scene_, request, false);
-    unrest.look(main, view, *load_images(capture_, view), frame.colour.on(Device::cpu),
-                frame.raster.alpha.on(Device::cpu), frame.raster.depth.on(Device::cpu));
+    unrest.look(main, view, *images, frame.colour.on(Device::cpu), frame.raster.alpha.on(Device::cpu),
+                frame.raster.depth.on(Device::cpu));
   }
   mark_still(unrest, main);
   scene_.main.body = main.body.on(device_);

@@ -8,12 +8,14 @@
 
 #include "base/parallel.h"
 #include "capture/motion_truth.h"
+#include "files/png.h"
 #include "math/activation.h"
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "ops/motion/nodes.h"
 #include "support/refusal.h"
 #include "train/initialise.h"
+#include "train/mask_parts.h"
 #include "train/small_run.h"
 #include "train/tracker.h"
 
@@ -134,23 +136,27 @@ TEST(Bodies, ThereAreNoneWithoutMasksOrWhereTheNetworkMovesSurfels) {
   EXPECT_TRUE(scene.main_field);
 }
 
-// Masks and normals, and a shape that was trained on the first picture for a moment, are enough to follow
-// bodies a third of the way.
-TEST(Tracker, FollowsBodiesFromTimeToTime) {
-  const Tumbling at;
+// How well bodies are followed a third of the way by masks and normals, and a shape that was trained on the
+// first picture for a moment.
+void expect_to_be_followed(const Capture& capture) {
+  Tumbling at;
   const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
   TrainOptions options = preset("cpu");
   options.deform.kind = "nodes";
   options.iterations = 400;
   options.specular = Specular::none;
   options.initial.max_points = options.density.max_surfels = 4000;
-  constexpr int64_t last = 8;
+  constexpr int64_t last = 12;
   const int until = options.iterations / 8 + static_cast<int>(last) * options.deform.track.map_each;
-  Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "followed");
+  Trainer trainer(options, capture, fs::path(::testing::TempDir()) / "followed");
   while (trainer.iteration() < until) trainer.step();
-  const Motion& motion = *trainer.scene().main_motion;
+  at.scene.main_motion = trainer.scene().main_motion;
+  const Motion& motion = *at.scene.main_motion;
+  ASSERT_EQ(motion.bodies(), 2);
+  std::set<int32_t> things;
   for (const int32_t body : {0, 1}) {
     const int32_t thing = thing_of(at, *truth, body);
+    things.insert(thing);
     const auto from = true_points(at.capture, *truth, thing, 0),
                to = true_points(at.capture, *truth, thing, last);
     const Similarity expected = fit_similarity(from, to);
@@ -169,6 +175,44 @@ TEST(Tracker, FollowsBodiesFromTimeToTime) {
               0.6 * rotation_angle_deg(expected.rotation))
         << body;
   }
+  EXPECT_EQ(things.size(), 2U);
+}
+
+TEST(Tracker, FollowsBodiesFromTimeToTime) { expect_to_be_followed(load_capture(tumbling(), {})); }
+
+// The capture with masks of training views changed: by f(its place in time, mask).
+template <class F>
+Capture with_masks(const std::string& name, F&& change) {
+  const fs::path folder = fs::path(::testing::TempDir()) / (name + std::to_string(::getpid()));
+  fs::copy(tumbling(), folder, fs::copy_options::recursive);
+  const Capture whole = load_capture(tumbling(), {});
+  for (size_t k = 0; k < whole.train.size(); ++k) {
+    Tensor<uint8_t> mask = load_images(whole, whole.train[k])->mask;
+    change(k, mask);
+    for (uint8_t& pixel : mask.values()) pixel = pixel != 0 ? 255 : 0;
+    write_png(folder / "mask/1x" / (whole.train[k].id + ".png.png"), mask);
+  }
+  return load_capture(folder, {});
+}
+
+TEST(Tracker, FollowsBodiesPastMasksThatAreBlankOrWhole) {
+  expect_to_be_followed(with_masks("blank_masks", [](size_t k, Tensor<uint8_t>& mask) {
+    if (k == 0 || k == 3 || k == 4) mask.fill(0);
+    if (k == 6) mask.fill(1);
+  }));
+}
+
+// In the first masks the two things hang together.
+TEST(Tracker, PartsABodyWhoseThingsMoveApart) {
+  expect_to_be_followed(with_masks("joined_masks", [](size_t k, Tensor<uint8_t>& mask) {
+    if (k > 0) return;
+    const std::vector<std::vector<int64_t>> parts = mask_parts(mask);
+    ASSERT_GE(parts.size(), 2U);
+    const int64_t width = mask.dim(1), a = parts[0][parts[0].size() / 2], b = parts[1][parts[1].size() / 2];
+    for (int64_t x = std::min(a % width, b % width); x <= std::max(a % width, b % width); ++x) {
+      for (int64_t y = std::min(a, b) / width - 1; y <= std::max(a, b) / width + 1; ++y) mask(y, x) = 1;
+    }
+  }));
 }
 
 // Poses from the truth carry each true point where it truly is, before the first iteration and after the
