@@ -78,6 +78,7 @@ struct Trainable {
   bool main_field = true;
   bool main_motion = true;
   bool main_nodes = true;
+  bool lighting = true;
   bool environment = true;  // environment surfels, or the map
   bool environment_field = true;
   bool camera = true;  // its pose
@@ -90,6 +91,7 @@ struct SceneGradient {
   Field main_field;
   Motion main_motion;
   Nodes main_nodes;
+  Lighting lighting;
   Field environment_field;
   EnvironmentMap environment_map;
   CameraGradient<float> camera;

@@ -57,6 +57,7 @@ void SceneGradient::reset(const Scene& scene) {
   if (scene.main_field) like(main_field, *scene.main_field);
   if (scene.main_motion) like(main_motion, *scene.main_motion);
   if (scene.main_nodes) like(main_nodes, *scene.main_nodes);
+  if (scene.lighting) like(lighting, *scene.lighting);
   if (scene.environment_field) like(environment_field, *scene.environment_field);
   if (scene.environment_map) {
     sized(environment_map.logit, scene.environment_map->logit.shape());
@@ -92,7 +93,7 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
   const Device device = scene.device();
   const int degree = std::min(request.sh_degree_main, stored_degree(scene.main));
   const Motion* motion = motion_if(scene);
-  const bool moves = field != nullptr || motion != nullptr;
+  const bool moves = field != nullptr || motion != nullptr || scene.lighting;
   const Pose pose{moves ? request.time : 0, degree, moves};
   const bool anew = keep_for_backward || request.cull;
   if (!anew && main_pose_ == pose) return;
@@ -115,6 +116,9 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
     nodes::forward(*nodes, scene.main.body, request.time, frame_.subset, frame_.main, *nodes_saved_);
   if (motion)
     motion::forward(*motion, scene.main.body, request.time, frame_.subset, frame_.main, *motion_saved_);
+  if (scene.lighting)
+    lighting::forward(*scene.lighting, scene.main.body, request.time, frame_.subset, frame_.main,
+                      *lighting_saved_);
   if (!request.cull) main_pose_ = pose;
 }
 
@@ -282,7 +286,11 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   parallel_for(scene.device(), "render: place signals", frame_.main.count(),
                PlaceSignal{stored_row(frame_), grad_raster_input_.screen_gradient.data(), drawn_.data(),
                            gradient.main_signal.data(), gradient.main_visible.data()});
-  // Move and deform.
+  // Light, move and deform.
+  if (scene.lighting) {
+    lighting::backward(*scene.lighting, request.time, frame_.main, *lighting_saved_,
+                       grad_raster_input_.surfels, trainable.lighting ? &gradient.lighting : nullptr);
+  }
   if (const Motion* motion = motion_if(scene)) {
     motion::backward(*motion, scene.main.body, request.time, frame_.subset, frame_.main, *motion_saved_,
                      grad_raster_input_.surfels, trainable.main_motion ? &gradient.main_motion : nullptr);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "ops/deform/deform.h"
+#include "ops/lighting/lighting.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 #include "render/frame.h"
@@ -61,6 +62,7 @@ class Renderer {
   deform::Saved main_saved_, environment_saved_;
   motion::SavedPtr motion_saved_ = motion::make_saved();
   nodes::SavedPtr nodes_saved_ = nodes::make_saved();
+  lighting::SavedPtr lighting_saved_ = lighting::make_saved();
   raster::SavedPtr raster_saved_ = raster::make_saved();
   // The carried surfels white, the others black.
   PosedSurfels carried_;

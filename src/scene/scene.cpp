@@ -9,6 +9,7 @@ void Scene::move_to(Device device) {
   if (main_field) move(*main_field);
   if (main_motion) move(*main_motion);
   if (main_nodes) move(*main_nodes);
+  if (lighting) move(*lighting);
   if (environment_field) move(*environment_field);
   if (environment_map) move(*environment_map);
   move(main_reach);

@@ -6,6 +6,7 @@
 
 #include "scene/environment_map.h"
 #include "scene/field.h"
+#include "scene/lighting.h"
 #include "scene/motion.h"
 #include "scene/nodes.h"
 #include "scene/normalisation.h"
@@ -27,6 +28,7 @@ struct Scene {
   std::optional<Field> main_field;
   std::optional<Motion> main_motion;  // of the bodies that main.body names
   std::optional<Nodes> main_nodes;    // of those of them that bend
+  std::optional<Lighting> lighting;   // of main surfels that no body carries
   std::optional<Field> environment_field;
   std::optional<EnvironmentMap> environment_map;
   Specular specular = Specular::environment_gaussians;

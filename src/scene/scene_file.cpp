@@ -153,6 +153,36 @@ Nodes get_nodes(const Safetensors& file, int64_t bodies) {
   return nodes;
 }
 
+void put_lighting(const Lighting& lighting, Safetensors& file) {
+  file.add("scene/lighting/box", lighting.box);
+  file.add("scene/lighting/time", lighting.time);
+  file.add("scene/lighting/brightness", lighting.brightness);
+}
+
+Lighting get_lighting(const Safetensors& file) {
+  constexpr int64_t most_points = 1 << 24;  // cells are counted in 32 bits
+  Lighting lighting;
+  lighting.box = take(file, "scene/lighting/box", {2, 3});
+  lighting.time = file.tensor<float>("scene/lighting/time");
+  lighting.brightness = file.tensor<float>("scene/lighting/brightness");
+  const Shape& shape = lighting.brightness.shape();
+  bool fits = lighting.time.shape().rank() == 1 && lighting.times() > 0 && shape.rank() == 4 &&
+              shape[0] == lighting.times() &&
+              std::is_sorted(lighting.time.data(), lighting.time.data() + lighting.times());
+  for (int axis = 1; fits && axis < 4; ++axis) fits = shape[axis] >= 3 && shape[axis] <= most_points;
+  if (!fits || lighting.points() > most_points) {
+    throw InputError(file.origin(), "scene/lighting",
+                     "shapes " + lighting.time.shape().to_string() + " and " + shape.to_string(),
+                     "L ascending times and L×Z×Y×X numbers, Z, Y, X of 3 or more");
+  }
+  for (int64_t axis = 0; axis < 3; ++axis) {
+    if (!(lighting.box(0, axis) < lighting.box(1, axis)))
+      throw InputError(file.origin(), "scene/lighting/box", number_text(lighting.box(0, axis)),
+                       "below " + number_text(lighting.box(1, axis)));
+  }
+  return lighting;
+}
+
 EnvironmentMap get_map(const JsonField& json, const Safetensors& file) {
   EnvironmentMap map;
   map.logit = file.tensor<float>("scene/map/logit");
@@ -187,6 +217,7 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
   if (json.has("motion") && json["motion"].yes()) get_motion(file, scene);
   if (scene.main_motion && json.has("nodes") && json["nodes"].yes())
     scene.main_nodes = get_nodes(file, scene.main_motion->bodies());
+  if (json.has("lighting") && json["lighting"].yes()) scene.lighting = get_lighting(file);
   if (json.has("environment_field")) {
     scene.environment_field =
         get_field(json["environment_field"], residual::environment_outputs, "scene/environment_field/", file);
@@ -213,6 +244,8 @@ void put_scene(const Scene& scene, Safetensors& file) {
   if (scene.main_motion) put_motion(*scene.main_motion, scene.main.body, file);
   json["nodes"] = scene.main_nodes.has_value();
   if (scene.main_nodes) put_nodes(*scene.main_nodes, file);
+  json["lighting"] = scene.lighting.has_value();
+  if (scene.lighting) put_lighting(*scene.lighting, file);
   if (scene.main_field) put_field(*scene.main_field, "scene/main_field/", file, json["main_field"]);
   if (scene.environment_field) {
     put_field(*scene.environment_field, "scene/environment_field/", file, json["environment_field"]);

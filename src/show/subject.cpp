@@ -8,6 +8,7 @@
 
 #include "files/options_json.h"
 #include "ops/deform/deform.h"
+#include "ops/lighting/lighting.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 #include "scene/ply.h"
@@ -55,11 +56,12 @@ bool finite_row(const Tensor<float>& tensor, int64_t row) {
 // Stored values with the field's residuals added, still before activation. Surfels that are not finite are
 // left out, as pictures leave them out.
 Surfels posed(const Surfels& stored, const Field* field, const Nodes* nodes, const Motion* motion,
-              std::optional<float> time, field::Precision precision) {
+              const Lighting* lighting, std::optional<float> time, field::Precision precision) {
   Surfels result =
       field != nullptr && time ? deform::displaced(stored, *field, *time, precision) : Surfels(stored);
   if (nodes != nullptr && time) nodes::bend(*nodes, stored.body, *time, result);
   if (motion != nullptr && time) motion::move(*motion, stored.body, *time, result);
+  if (lighting != nullptr && time) lighting::light(*lighting, stored.body, *time, result);
   RowEdit finite;
   for (int64_t i = 0; i < result.count(); ++i) {
     bool all = true;
@@ -124,10 +126,10 @@ std::vector<std::filesystem::path> export_subject(const Subject& subject, std::o
   const Scene& scene = subject.scene;
   const FrameRequest& request = subject.request;
   const auto make = [&](const Surfels& stored, const std::optional<Field>& field, const Nodes* nodes,
-                        const Motion* motion, bool deform) {
+                        const Motion* motion, const Lighting* lighting, bool deform) {
     PlyScene file;
-    file.surfels =
-        posed(stored, deform && field ? &*field : nullptr, nodes, motion, time, subject.render.precision);
+    file.surfels = posed(stored, deform && field ? &*field : nullptr, nodes, motion, lighting, time,
+                         subject.render.precision);
     undo_normalisation(scene.normalisation, file.surfels);
     file.notes[extent_note] = fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale));
     return file;
@@ -138,13 +140,14 @@ std::vector<std::filesystem::path> export_subject(const Subject& subject, std::o
   std::filesystem::create_directories(folder);
   std::vector<std::filesystem::path> written = {folder / main_file};
   PlyScene main = make(scene.main, scene.main_field, scene.main_nodes ? &*scene.main_nodes : nullptr,
-                       scene.main_motion ? &*scene.main_motion : nullptr, request.deform_main);
+                       scene.main_motion ? &*scene.main_motion : nullptr,
+                       scene.lighting ? &*scene.lighting : nullptr, request.deform_main);
   main.notes[render_note] = options_to_json(subject.render);
   if (reflects) {
     written.push_back(folder / environment_file);
     main.notes[environment_note] = environment_file;
-    write_ply(written[1],
-              make(scene.environment, scene.environment_field, nullptr, nullptr, request.deform_environment));
+    write_ply(written[1], make(scene.environment, scene.environment_field, nullptr, nullptr, nullptr,
+                               request.deform_environment));
   }
   write_ply(written[0], main);
   return written;

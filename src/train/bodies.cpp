@@ -310,6 +310,47 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
   return nodes;
 }
 
+Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every) {
+  constexpr float margin = 0.4F;
+  std::vector<float> times;
+  for (int64_t k = 0; k < motion.keys(); k += every) times.push_back(motion.time[k]);
+  Vec3<float> low(std::numeric_limits<float>::infinity()), high(-low);
+  for (const float time : times) {
+    Surfels moved;
+    moved.position = surfels.position;
+    moved.rotation = surfels.rotation;
+    moved.sh.reset({surfels.count(), 1, 3});
+    motion::move(motion, surfels.body, time, moved);
+    for (int64_t i = 0; i < surfels.count(); ++i) {
+      if (surfels.body[i] < 0 || surfels.opacity_logit[i] < 0) continue;
+      const Vec3<float> point = load3<float>(moved.position.row(i));
+      low = min(low, point);
+      high = max(high, point);
+    }
+  }
+  Vec3<float> size = high - low;
+  float longest = std::max({size.x, size.y, size.z});
+  if (!(longest > 0)) {  // nothing opaque is carried
+    low = Vec3<float>(0);
+    high = size = Vec3<float>(1);
+    longest = 1;
+  }
+  low -= Vec3<float>(margin * longest);
+  high += Vec3<float>(margin * longest);
+  const float cell = longest * (1 + 2 * margin) / static_cast<float>(cells);
+  const auto points = [&](float length) {
+    return std::max<int64_t>(3, 1 + static_cast<int64_t>(std::lround(length / cell)));
+  };
+  Lighting lighting;
+  lighting.box.reset({2, 3});
+  store3(lighting.box.row(0), low);
+  store3(lighting.box.row(1), high);
+  lighting.time = tensor_of(times);
+  lighting.brightness.reset(
+      {lighting.times(), points(high.z - low.z), points(high.y - low.y), points(high.x - low.x)});
+  return lighting;
+}
+
 void Unrest::look(const Surfels& main, const View& view, const ViewImages& images,
                   const Tensor<float>& colour, const Tensor<float>& alpha, const Tensor<float>& depth) {
   constexpr float behind = 1.04F;

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "capture/capture.h"
+#include "scene/lighting.h"
 #include "scene/motion.h"
 #include "scene/nodes.h"
 #include "scene/surfels.h"
@@ -30,6 +31,11 @@ int64_t release_strays(const Capture& capture, const Motion& motion, float lates
 // Nodes that let bodies bend, up to `each` of every body: spread evenly over its surfels of an opacity above
 // one half, at rest at every `every`th time of the motion. surfels and motion on the CPU.
 Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, int64_t every);
+
+// Light that has not changed yet, in the box around all places of the bodies' opaque surfels, wider by 0.4 of
+// its longest side in each direction, at every `every`th time of the motion. cells: along the longest side.
+// On the CPU.
+Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every);
 
 // How far pictures are from the photographs where surfels show that no body carries.
 struct Unrest {

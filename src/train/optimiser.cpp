@@ -14,7 +14,7 @@ optimize::AdamState zero_state(const Tensor<float>& parameter) {
 // Of the rate of poses: those have been found when nodes begin.
 constexpr double node_rates = 4;
 
-// Of a field, a motion or nodes.
+// Of a field, a motion, nodes or lighting.
 template <class Parameters>
 std::vector<optimize::AdamState> zero_states(const Parameters& parameters) {
   std::vector<optimize::AdamState> states;
@@ -111,6 +111,7 @@ Optimiser::Optimiser(const Scene& scene) {
   if (scene.main_field) main_field_ = zero_states(*scene.main_field);
   if (scene.main_motion) main_motion_ = zero_states(*scene.main_motion);
   if (scene.main_nodes) begin(*scene.main_nodes);
+  if (scene.lighting) begin(*scene.lighting);
   if (scene.environment_field) environment_field_ = zero_states(*scene.environment_field);
   if (scene.environment_map) {
     map_ = zero_state(scene.environment_map->logit);
@@ -120,6 +121,7 @@ Optimiser::Optimiser(const Scene& scene) {
 
 void Optimiser::begin(const Motion& motion) { main_motion_ = zero_states(motion); }
 void Optimiser::begin(const Nodes& nodes) { main_nodes_ = zero_states(nodes); }
+void Optimiser::begin(const Lighting& lighting) { lighting_ = zero_states(lighting); }
 
 void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
                      const Schedule& schedule, const RateOptions& rates, int iteration,
@@ -146,6 +148,10 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
     const double rate = node_rates * schedule.motion_rate(iteration);
     step("main_nodes.turn", nodes.turn, gradient.main_nodes.turn, main_nodes_[0], rate);
     step("main_nodes.shift", nodes.shift, gradient.main_nodes.shift, main_nodes_[1], rate * scene.extent);
+  }
+  if (trainable.lighting && scene.lighting) {
+    step("lighting.brightness", scene.lighting->brightness, gradient.lighting.brightness, lighting_[0],
+         rates.lighting);
   }
   if (trainable.environment && scene.environment.count() > 0) {
     step_surfels(step, "environment", scene.environment, gradient.environment, environment_, position_rate,
@@ -179,6 +185,7 @@ void Optimiser::for_each(Self& self, F&& f) {
   surfels("environment", self.environment_);
   fields("main_motion", self.main_motion_);
   fields("main_nodes", self.main_nodes_);
+  fields("lighting", self.lighting_);
   fields("main_field", self.main_field_);
   fields("environment_field", self.environment_field_);
   fields("map_field", self.map_field_);

@@ -61,9 +61,10 @@ class Optimiser {
   // What the last step left alone. Waits for the device.
   NonFiniteGradients left_alone() const { return notes_.report(); }
 
-  // Of bodies or nodes that the scene has got since.
+  // Of parameters that the scene has got since.
   void begin(const Motion& motion);
   void begin(const Nodes& nodes);
+  void begin(const Lighting& lighting);
 
   SurfelMoments& main() { return main_; }
   SurfelMoments& environment() { return environment_; }
@@ -78,7 +79,7 @@ class Optimiser {
   static void for_each(Self& self, F&& f);
 
   SurfelMoments main_, environment_;
-  std::vector<optimize::AdamState> main_motion_, main_nodes_;
+  std::vector<optimize::AdamState> main_motion_, main_nodes_, lighting_;
   std::vector<optimize::AdamState> main_field_, environment_field_, map_field_;
   optimize::AdamState map_;
   StepNotes notes_;

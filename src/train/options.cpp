@@ -177,6 +177,14 @@ void TrackOptions::validate() const {
   check_not_negative(tracks, "deform.track.tracks");
 }
 
+void LightingOptions::validate() const {
+  check_not_negative(cells, "deform.lighting.cells");
+  check_option(cells == 0 || (cells >= 2 && cells <= 64), "deform.lighting.cells", cells, "0, or 2 to 64");
+  check_option(every > 0, "deform.lighting.every", every, "a positive number");
+  check_not_negative(size, "deform.lighting.size");
+  check_not_negative(haste, "deform.lighting.haste");
+  check_not_negative(roughness, "deform.lighting.roughness");
+}
 void BendOptions::validate() const {
   check_not_negative(nodes, "deform.bend.nodes");
   check_option(nodes <= 64, "deform.bend.nodes", nodes, "64 or fewer");
@@ -190,6 +198,7 @@ void DeformOptions::validate() const {
   check_option(kind == "network" || kind == "nodes", "deform.kind", kind, "network or nodes");
   track.validate();
   bend.validate();
+  lighting.validate();
   network.validate();
   environment_network.validate();
 }

@@ -62,6 +62,7 @@ struct RateOptions {
   float field_end = 1.6e-6F;
   float motion = 5e-4F;
   float motion_end = 5e-5F;
+  float lighting = 0.01F;
   float map = 0.016F;
   float map_end = 1.6e-4F;
   float beta1 = 0.9F;
@@ -82,6 +83,7 @@ struct RateOptions {
     v.field("field_end", field_end, "", "Residual fields, last iteration (log-linear between).");
     v.field("motion", motion, "radians", "Poses of bodies, first iteration; shifts in extents.");
     v.field("motion_end", motion_end, "radians", "Poses of bodies, last iteration (log-linear between).");
+    v.field("lighting", lighting, "", "Logarithms of brightness (deform.lighting).");
     v.field("map", map, "", "Environment map, first iteration.");
     v.field("map_end", map_end, "", "Environment map, last iteration (log-linear between).");
     v.field("beta1", beta1, "", "Adam's decay of the first moment.");
@@ -230,6 +232,26 @@ struct BendOptions {
   void validate() const;
 };
 
+// How the light on what stands still changes, as where shadows of bodies move (scene/lighting.h).
+struct LightingOptions {
+  int cells = 32;
+  int every = 3;
+  float size = 1e-7F;
+  float haste = 1e-6F;
+  float roughness = 1e-6F;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.field("cells", cells, "cells",
+            "Cells of the grid along the longest side of the box around bodies; 0: the light stays.");
+    v.field("every", every, "times", "The grid has a brightness at one of so many times.");
+    v.field("size", size, "", "Weight of the loss on brightness other than 1.");
+    v.field("haste", haste, "", "Weight of the loss that keeps brightness slow.");
+    v.field("roughness", roughness, "", "Weight of the loss that keeps brightness smooth in space.");
+  }
+  void validate() const;
+};
+
 // Which fields there are, and their networks (method §1.2, §9).
 struct DeformOptions {
   std::string kind = "network";
@@ -237,6 +259,7 @@ struct DeformOptions {
   bool environment = true;
   TrackOptions track;
   BendOptions bend;
+  LightingOptions lighting;
   NetworkOptions network;
   NetworkOptions environment_network;
 
@@ -250,6 +273,7 @@ struct DeformOptions {
     v.field("environment", environment, "", "The environment moves.");
     v.group("track", track);
     v.group("bend", bend);
+    v.group("lighting", lighting);
     v.group("network", network);
     v.group("environment_network", environment_network);
   }

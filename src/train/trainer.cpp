@@ -7,6 +7,7 @@
 #include "base/options.h"
 #include "base/parallel.h"
 #include "base/version.h"
+#include "ops/lighting/lighting.h"
 #include "ops/loss/rigidity.h"
 #include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
@@ -131,7 +132,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
-      before_step_{random_, views_, -1, {}, {}, {}, {}} {
+      before_step_{random_, views_, -1, {}, {}, {}, {}, {}} {
   density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
@@ -188,6 +189,7 @@ LossTerms Trainer::step() {
   const bool bodies_move = trainable.main && scene_.main_motion && !now.goes_on;
   trainable.main_motion = bodies_move && !options_.deform.track.true_poses;
   trainable.main_nodes = bodies_move && scene_.main_nodes;
+  trainable.lighting = bodies_move && scene_.lighting;
   // Gradients through reflections hold back the rotation of a body, so it is followed without them.
   if (now.goes_on) {
     request.specular = false;
@@ -219,6 +221,10 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   if (trainable.main_motion) share_among_keys();
   if (trainable.main_nodes) hold_nodes();
+  if (trainable.lighting) {
+    const LightingOptions& light = options_.deform.lighting;
+    lighting::resist(*scene_.lighting, {light.size, light.haste, light.roughness}, gradient_.lighting);
+  }
   const bool follows = tracking(iteration_).goes_on;
   // New surface that was wrong may fade.
   if (follows) motion::hold_opacities(scene_.main.body, initial_main_count_, gradient_.main);
@@ -354,10 +360,11 @@ std::string Trainer::tell_iteration() {
     tell_measured();
     stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
-  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}, {}};
+  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}, {}, {}};
   if (const Tracking now = tracking(iteration_); now.enters || now.refines) {
     before_step_.motion = scene_.main_motion;
     before_step_.nodes = scene_.main_nodes;
+    before_step_.lighting = scene_.lighting;
     before_step_.body = scene_.main.body;
     before_step_.texture_trust = texture_trust_;
   }
@@ -469,6 +476,7 @@ void Trainer::step_back() {
     if (before_step_.motion) {
       scene_.main_motion = before_step_.motion;
       scene_.main_nodes = before_step_.nodes;
+      scene_.lighting = before_step_.lighting;
       scene_.main.body = before_step_.body;
       texture_trust_ = before_step_.texture_trust;
     }

@@ -102,10 +102,13 @@ class Trainer {
   void let_stand();
   // Gives bodies nodes, so that they may bend, where silhouettes get worse by much after the first time.
   void let_bend();
+  // From then on the light on what stands still may change.
+  void let_light_change();
   // Spreads the gradient of poses over times that are near; none at the first.
   void share_among_keys();
   // Adds to the nodes' gradient what holds them together, and none at the first time.
   void hold_nodes();
+
   // How far the bodies' silhouettes are off in a view, as a share of the mask's area; none without a mask.
   std::optional<double> silhouette_misfit(const View& view);
   const View& draw_tracked_view(const Tracking& now);
@@ -146,6 +149,7 @@ class Trainer {
     // As the step found them, where it solves poses.
     std::optional<Motion> motion;
     std::optional<Nodes> nodes;
+    std::optional<Lighting> lighting;
     Tensor<int32_t> body;
     TextureTrust texture_trust;
   };

@@ -52,6 +52,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
   if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);
   if (has_come_to_the_end) let_stand();
   if (has_come_to_the_end && options_.deform.bend.nodes > 0) let_bend();
+  if (has_come_to_the_end && options_.deform.lighting.cells > 0) let_light_change();
   return made;
 }
 
@@ -195,6 +196,14 @@ void Trainer::let_bend() {
   if (nodes.count() == 0) return;
   scene_.main_nodes = nodes.on(device_);
   optimiser_.begin(*scene_.main_nodes);
+}
+
+void Trainer::let_light_change() {
+  const LightingOptions& light = options_.deform.lighting;
+  scene_.lighting = lighting_around(scene_.main_motion->on(Device::cpu), scene_.main.on(Device::cpu),
+                                    light.cells, light.every)
+                        .on(device_);
+  optimiser_.begin(*scene_.lighting);
 }
 
 void Trainer::let_stand() {

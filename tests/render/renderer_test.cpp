@@ -185,6 +185,70 @@ TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {
   expect_equal(gradient.main.position, expected, "position");
 }
 
+// Light that changes reaches the picture at its time alone, and the picture's gradient reaches it.
+TEST(Renderer, LightThatChangesIsSeenAndLearned) {
+  Fixture f;
+  f.request.specular = false;
+  Random random(9);
+  Lighting lighting{Tensor<float>({2, 3}), tensor_of(std::vector<float>{0, 0.6F, 1}),
+                    Tensor<float>({3, 4, 4, 4})};
+  for (int64_t axis = 0; axis < 3; ++axis) {
+    lighting.box(0, axis) = -2;
+    lighting.box(1, axis) = 2;
+  }
+  std::vector<int64_t> inner;  // at the second time
+  for (int64_t i = 64; i < 128; ++i) {
+    const int64_t x = i % 4, y = i / 4 % 4, z = i / 16 % 4;
+    if (std::min({x, y, z}) > 0 && std::max({x, y, z}) < 3) inner.push_back(i);
+  }
+  for (const int64_t i : inner) lighting.brightness[i] = 0.3F * static_cast<float>(random.normal());
+  Renderer renderer(RenderOptions{});
+  const Tensor<float> plain = renderer.forward(f.scene, f.request).colour;
+  f.scene.lighting = lighting;
+  FrameRequest first = f.request;
+  first.time = 0;
+  const Tensor<float> then = renderer.forward(f.scene, first).colour;
+  f.scene.lighting.reset();
+  expect_equal(then, renderer.forward(f.scene, first).colour, "where the brightness is 1");
+
+  f.scene.lighting = lighting;
+  FrameGradient by_frame;
+  by_frame.colour.resize(plain.shape());
+  for (float& v : by_frame.colour.values()) v = static_cast<float>(random.normal());
+  const auto loss = [&] {
+    const Tensor<float> colour = renderer.forward(f.scene, f.request).colour;
+    double sum = 0;
+    for (int64_t i = 0; i < colour.size(); ++i) sum += static_cast<double>(by_frame.colour[i]) * colour[i];
+    return sum;
+  };
+  const Tensor<float> lit = renderer.forward(f.scene, f.request, true).colour;
+  EXPECT_FALSE(std::equal(lit.data(), lit.data() + lit.size(), plain.data()));
+  SceneGradient gradient;
+  gradient.reset(f.scene);
+  renderer.backward(f.scene, f.request, Trainable{}, by_frame, gradient);
+  double most = 0;
+  for (const float by : gradient.lighting.brightness.values()) most = std::max(most, std::abs(double{by}));
+  ASSERT_GT(most, 0.1);
+  for (const int64_t i : inner) {
+    constexpr float step = 4e-3F;
+    float& value = f.scene.lighting->brightness[i];
+    const float before = value;
+    value = before + step;
+    const double above = loss();
+    value = before - step;
+    const double below = loss();
+    value = before;
+    EXPECT_NEAR(gradient.lighting.brightness[i], (above - below) / (2 * step), 5e-3 * most) << i;
+  }
+  for (int64_t i = 0; i < 64; ++i) EXPECT_EQ(gradient.lighting.brightness[i], 0);
+  Trainable frozen;
+  frozen.lighting = false;
+  gradient.reset(f.scene);
+  renderer.forward(f.scene, f.request, true);
+  renderer.backward(f.scene, f.request, frozen, by_frame, gradient);
+  for (const float by : gradient.lighting.brightness.values()) EXPECT_EQ(by, 0);
+}
+
 TEST(Renderer, DensityControlIsToldNormsOfWhatWasDrawn) {
   Fixture f;
   f.request.cull = true;

@@ -56,6 +56,9 @@ Scene full_scene() {
                            tensor_of(std::vector<float>{1, 2, 3}),
                            noise({3, 2, 3}, random),
                            noise({3, 2, 3}, random)};
+  scene.lighting = Lighting{tensor_of(std::vector<float>{0, 0, 0, 1, 2, 3}),
+                            tensor_of(std::vector<float>{0, 1}), noise({2, 3, 4, 5}, random)};
+  scene.lighting->box.resize({2, 3});
   return scene;
 }
 
@@ -78,6 +81,11 @@ std::vector<float> all_numbers(const Scene& scene) {
     take("", scene.main_nodes->centre);
     take("", scene.main_nodes->radius);
     for (const int32_t body : scene.main_nodes->body.values()) all.push_back(static_cast<float>(body));
+  }
+  if (scene.lighting) {
+    scene.lighting->for_each(take);
+    take("", scene.lighting->box);
+    take("", scene.lighting->time);
   }
   for (const int32_t body : scene.main.body.values()) all.push_back(static_cast<float>(body));
   if (scene.environment_field) scene.environment_field->for_each(take);
@@ -142,6 +150,26 @@ TEST(SceneFile, NodesThatFitNoBodyOrHaveNoSizeAreRefused) {
   EXPECT_NE(says([](Nodes& nodes) {
               nodes.turn.resize({3, 1, 3});
             }).find("scene/nodes/turn"),
+            std::string::npos);
+}
+
+TEST(SceneFile, LightingWithoutASizeOrWithoutItsTimesIsRefused) {
+  const auto says = [](auto&& spoil) {
+    Scene scene = full_scene();
+    spoil(*scene.lighting);
+    Safetensors file;
+    put_scene(scene, file);
+    return refusal_of([&] { get_scene(file); });
+  };
+  EXPECT_EQ(says([](Lighting&) {}), "accepted");
+  EXPECT_EQ(says([](Lighting& lighting) { lighting.box(1, 2) = 0; }),
+            "safetensors: scene/lighting/box: found 0, expected below 0");
+  EXPECT_NE(says([](Lighting& lighting) { lighting.time[0] = 2; }).find("ascending times"),
+            std::string::npos);
+  EXPECT_NE(says([](Lighting& lighting) { lighting.time.resize({1}); }).find("L×Z×Y×X"), std::string::npos);
+  EXPECT_NE(says([](Lighting& lighting) {
+              lighting.brightness.resize({2, 2, 4, 5});
+            }).find("of 3 or more"),
             std::string::npos);
 }
 

@@ -168,6 +168,7 @@ TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   });
   whole.run(never);
   EXPECT_EQ(whole.scene().main_nodes.has_value(), bends);
+  EXPECT_EQ(whole.scene().lighting.has_value(), whole.scene().main_motion.has_value());
   EXPECT_EQ(added > 0, whole.scene().main_motion.has_value());
 
   // Interrupt once in each phase.

@@ -1,0 +1,102 @@
+#include "ops/lighting/lighting.h"
+
+#include "base/parallel.h"
+#include "ops/lighting/lighting_kernels.h"
+#include "primitives/lists.h"
+
+namespace traceflow::lighting {
+
+struct Saved {
+  Tensor<Place> places;
+  // Memory of backward.
+  Tensor<float> pulls;
+  Tensor<int32_t> cells;
+  cuda::Lists lists;
+};
+void SavedDeleter::operator()(Saved* saved) const { delete saved; }
+SavedPtr make_saved() { return SavedPtr(new Saved); }
+
+namespace {
+
+GridSize size_of(const Shape& brightness) { return {brightness[3], brightness[2], brightness[1]}; }
+
+Grid grid_of(const Lighting& lighting, float time) {
+  return {size_of(lighting.brightness.shape()), lighting.box.data(), lighting.time.data(),
+          lighting.brightness.data(),           lighting.times(),    double{time}};
+}
+
+// Lists 0 to n − 1 by their keys, as cuda::list_by_key does.
+void list_by_key_on_host(const Tensor<int32_t>& key, int64_t keys, cuda::Lists& lists) {
+  lists.begin.reset({keys + 1});
+  for (const int32_t k : key.values()) {
+    if (k >= 0) ++lists.begin[k + 1];
+  }
+  for (int64_t k = 0; k < keys; ++k) lists.begin[k + 1] += lists.begin[k];
+  lists.filled.resize({keys});
+  std::copy_n(lists.begin.data(), keys, lists.filled.data());
+  lists.entry.resize({lists.begin[keys]});
+  for (int64_t i = 0; i < key.size(); ++i) {
+    if (key[i] >= 0) lists.entry[lists.filled[key[i]]++] = static_cast<int32_t>(i);
+  }
+}
+
+}  // namespace
+
+void forward(const Lighting& lighting, const Tensor<int32_t>& body, float time, const Tensor<int32_t>& subset,
+             PosedSurfels& posed, Saved& saved) {
+  const int64_t count = posed.count();
+  saved.places.place(lighting.device()).resize({count});
+  if (count == 0) return;
+  parallel_for(lighting.device(), "lighting: light", count,
+               LightSurfel{grid_of(lighting, time),
+                           {body.empty() ? nullptr : body.data(), subset.empty() ? nullptr : subset.data()},
+                           posed.position.data(),
+                           posed.sh.data(),
+                           posed.sh.row_size(),
+                           saved.places.data()});
+}
+
+void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Saved& saved,
+              PosedSurfels& grad_posed, Lighting* grad_lighting) {
+  const Device device = lighting.device();
+  const int64_t count = lit.count();
+  if (count == 0) return;
+  require(saved.places.size() == count, "backward follows forward of the same surfels",
+          std::to_string(count));
+  const Grid grid = grid_of(lighting, time);
+  saved.pulls.place(device).resize({count});
+  saved.cells.place(device).resize({count});
+  parallel_for(device, "lighting: gradients back", count,
+               LightBack{grid, saved.places.data(), lit.sh.data(), lit.sh.row_size(), grad_posed.sh.data(),
+                         grad_posed.position.data(), saved.pulls.data(), saved.cells.data()});
+  if (grad_lighting == nullptr) return;
+  if (device == Device::cpu)
+    list_by_key_on_host(saved.cells, grid.size.points(), saved.lists);
+  else
+    cuda::list_by_key(saved.cells.data(), count, grid.size.points(), saved.lists);
+  parallel_for(device, "lighting: collect", grid.size.points(),
+               CollectAtPoint{grid, saved.lists.begin.data(), saved.lists.entry.data(), saved.places.data(),
+                              saved.pulls.data(), grad_lighting->brightness.data()});
+}
+
+void light(const Lighting& lighting, const Tensor<int32_t>& body, float time, Surfels& surfels) {
+  const int64_t count = surfels.count();
+  if (count == 0) return;
+  Tensor<Place> places;
+  places.place(lighting.device()).resize({count});
+  parallel_for(lighting.device(), "lighting: light", count,
+               LightSurfel{grid_of(lighting, time),
+                           {body.empty() ? nullptr : body.data(), nullptr},
+                           surfels.position.data(),
+                           surfels.sh.data(),
+                           surfels.sh.row_size(),
+                           places.data()});
+}
+
+void resist(const Lighting& lighting, const Stiffness& weights, Lighting& gradient) {
+  parallel_for(lighting.device(), "lighting: resist", lighting.brightness.size(),
+               ResistAtPoint{size_of(lighting.brightness.shape()), lighting.times(), weights,
+                             lighting.brightness.data(), gradient.brightness.data()});
+}
+
+}  // namespace traceflow::lighting

@@ -1,0 +1,11 @@
+#include "base/kernel.h"
+#include "ops/lighting/lighting_kernels.h"
+
+namespace traceflow {
+
+template void cuda::for_each_index(const char*, int64_t, const lighting::LightSurfel&);
+template void cuda::for_each_index(const char*, int64_t, const lighting::LightBack&);
+template void cuda::for_each_index(const char*, int64_t, const lighting::CollectAtPoint&);
+template void cuda::for_each_index(const char*, int64_t, const lighting::ResistAtPoint&);
+
+}  // namespace traceflow

@@ -1,0 +1,188 @@
+#pragma once
+
+#include <cstdint>
+
+#include "math/spherical_harmonics.h"
+#include "ops/lighting/lighting.h"
+#include "ops/motion/key_span.h"
+#include "ops/motion/motion_kernels.h"
+
+// The steps of lighting; on either device.
+namespace traceflow::lighting {
+
+// A colour is half above what its harmonics sum to.
+inline constexpr float half_in_harmonics = static_cast<float>(0.5 / sh_c0);
+
+struct GridSize {
+  int64_t x, y, z;
+
+  TRACEFLOW_HD int64_t points() const { return x * y * z; }
+  TRACEFLOW_HD int64_t at(int64_t column, int64_t row, int64_t layer) const {
+    return (layer * y + row) * x + column;
+  }
+  // Of the eight corners of a cell, from the one with the lowest coordinates.
+  TRACEFLOW_HD int64_t corner(int k) const { return at(k & 1, (k >> 1) & 1, k >> 2); }
+};
+
+// Where a surfel lies in the grid.
+struct Place {
+  int32_t cell =
+      -1;  // its corner with the lowest coordinates; −1 outside the box, or where a body carries it
+  Vec3<float> share{0};  // from that corner to the opposite one
+  float gain = 1;
+
+  TRACEFLOW_HD float weight(int corner) const {
+    return ((corner & 1) != 0 ? share.x : 1 - share.x) * ((corner & 2) != 0 ? share.y : 1 - share.y) *
+           ((corner & 4) != 0 ? share.z : 1 - share.z);
+  }
+  // ∂weight/∂share.
+  TRACEFLOW_HD Vec3<float> slope(int corner) const {
+    const float wx = (corner & 1) != 0 ? share.x : 1 - share.x,
+                wy = (corner & 2) != 0 ? share.y : 1 - share.y,
+                wz = (corner & 4) != 0 ? share.z : 1 - share.z;
+    return {((corner & 1) != 0 ? 1.0F : -1.0F) * wy * wz, ((corner & 2) != 0 ? 1.0F : -1.0F) * wx * wz,
+            ((corner & 4) != 0 ? 1.0F : -1.0F) * wx * wy};
+  }
+};
+
+// The grid at one time.
+struct Grid {
+  GridSize size;
+  const float* box;
+  const float *times, *brightness;
+  int64_t keys;
+  double time;
+
+  TRACEFLOW_HD motion::KeySpan<float> span() const { return {times, keys, time}; }
+  TRACEFLOW_HD float at(const motion::KeySpan<float>& span, int64_t point) const {
+    const auto share = static_cast<float>(span.share);
+    return (1 - share) * brightness[span.from * size.points() + point] +
+           share * brightness[span.to * size.points() + point];
+  }
+  // Cells in a unit of length.
+  TRACEFLOW_HD Vec3<float> density() const {
+    return Vec3<float>(static_cast<float>(size.x - 1), static_cast<float>(size.y - 1),
+                       static_cast<float>(size.z - 1)) /
+           (load3<float>(box + 3) - load3<float>(box));
+  }
+  TRACEFLOW_HD Place place_of(const Vec3<float>& point) const {
+    const Vec3<float> at = (point - load3<float>(box)) * density();
+    Place place;
+    const bool is_inside = at.x >= 0 && at.y >= 0 && at.z >= 0 && at.x < static_cast<float>(size.x - 1) &&
+                           at.y < static_cast<float>(size.y - 1) && at.z < static_cast<float>(size.z - 1);
+    if (!is_inside) return place;
+    const auto x = static_cast<int64_t>(at.x), y = static_cast<int64_t>(at.y), z = static_cast<int64_t>(at.z);
+    place.cell = static_cast<int32_t>(size.at(x, y, z));
+    place.share = at - Vec3<float>(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z));
+    float sum = 0;
+    const motion::KeySpan<float> keys_now = span();
+    for (int k = 0; k < 8; ++k) sum += place.weight(k) * this->at(keys_now, place.cell + size.corner(k));
+    place.gain = std::exp(sum);
+    return place;
+  }
+};
+
+struct LightSurfel {
+  Grid grid;
+  motion::CarrierOf carrier;  // body null: none is carried
+  const float* position;
+  float* sh;
+  int64_t numbers;  // of a surfel's harmonics
+  Place* places;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const bool is_carried = carrier.body != nullptr && carrier(i) >= 0;
+    const Place place = is_carried ? Place{} : grid.place_of(load3<float>(position + 3 * i));
+    places[i] = place;
+    if (place.gain == 1) return;  // as it is, to the bit
+    float* const harmonics = sh + i * numbers;
+    for (int64_t k = 0; k < numbers; ++k) {
+      const float half = k < 3 ? half_in_harmonics : 0;
+      harmonics[k] = place.gain * (harmonics[k] + half) - half;
+    }
+  }
+};
+
+// Takes surfel i's gradient back; what goes to the logarithm at its place goes to pulls.
+struct LightBack {
+  Grid grid;
+  const Place* places;
+  const float* lit;  // harmonics
+  int64_t numbers;
+  float *grad_sh, *grad_position;
+  float* pulls;
+  int32_t* cells;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const Place place = places[i];
+    pulls[i] = 0;
+    cells[i] = -1;
+    if (place.cell < 0) return;
+    double pull = 0;
+    for (int64_t k = i * numbers; k < (i + 1) * numbers; ++k) {
+      const float half = k < i * numbers + 3 ? half_in_harmonics : 0;
+      pull += static_cast<double>(grad_sh[k]) * (lit[k] + half);
+      grad_sh[k] *= place.gain;
+    }
+    if (!(pull * 0 == 0) || pull == 0) return;
+    pulls[i] = static_cast<float>(pull);
+    cells[i] = place.cell;
+    Vec3<float> slope(0);
+    const motion::KeySpan<float> span = grid.span();
+    for (int k = 0; k < 8; ++k) slope += grid.at(span, place.cell + grid.size.corner(k)) * place.slope(k);
+    add3(grad_position + 3 * i, Vec3<double>(pulls[i] * (slope * grid.density())));
+  }
+};
+
+// Collects at a point what the surfels in the cells around it send there.
+struct CollectAtPoint {
+  Grid grid;
+  const int32_t *begin, *entry;  // the surfels of each cell
+  const Place* places;
+  const float* pulls;
+  float* grad_brightness;
+
+  TRACEFLOW_HD void operator()(int64_t point) const {
+    const int64_t column = point % grid.size.x, row = point / grid.size.x % grid.size.y,
+                  layer = point / grid.size.x / grid.size.y;
+    double sum = 0;
+    for (int k = 0; k < 8; ++k) {
+      if (column < (k & 1) || row < ((k >> 1) & 1) || layer < (k >> 2)) continue;
+      const int64_t cell = point - grid.size.corner(k);
+      for (int32_t e = begin[cell]; e < begin[cell + 1]; ++e)
+        sum += static_cast<double>(places[entry[e]].weight(k)) * pulls[entry[e]];
+    }
+    if (sum == 0) return;
+    const motion::KeySpan<float> span = grid.span();
+    grad_brightness[span.from * grid.size.points() + point] += static_cast<float>((1 - span.share) * sum);
+    grad_brightness[span.to * grid.size.points() + point] += static_cast<float>(span.share * sum);
+  }
+};
+
+struct ResistAtPoint {
+  GridSize size;
+  int64_t keys;
+  Stiffness weights;
+  const float* brightness;
+  float* gradient;
+
+  // i: a point at a time.
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const int64_t point = i % size.points(), key = i / size.points();
+    const int64_t column = point % size.x, row = point / size.x % size.y, layer = point / size.x / size.y;
+    if (column == 0 || row == 0 || layer == 0 || column + 1 == size.x || row + 1 == size.y ||
+        layer + 1 == size.z) {
+      gradient[i] = 0;
+      return;
+    }
+    const double here = brightness[i];
+    double sum = weights.size * here;
+    if (key > 0) sum += weights.haste * (here - brightness[i - size.points()]);
+    if (key + 1 < keys) sum += weights.haste * (here - brightness[i + size.points()]);
+    for (const int64_t step : {size.at(1, 0, 0), size.at(0, 1, 0), size.at(0, 0, 1)})
+      sum += weights.roughness * (2 * here - brightness[i - step] - brightness[i + step]);
+    gradient[i] += static_cast<float>(sum);
+  }
+};
+
+}  // namespace traceflow::lighting
