@@ -15,7 +15,8 @@ namespace traceflow {
 // wall behind an object to the wall beside it.
 struct Sightings {
   Tensor<float> colour;      // N×3, the median of its colours: it forgives the odd wrong one
-  std::vector<int> outside;  // sightings outside the masks less those inside: < 0 on the moving object
+  std::vector<int> outside;  // sightings outside the masks less those inside: < 0 on the moving object,
+                             // 0 where no photograph with a mask shows it
   std::vector<uint8_t> any;  // 0 where nothing is known, which is only when no surfel is seen at all
 };
 
