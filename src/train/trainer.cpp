@@ -474,6 +474,9 @@ void Trainer::step_back() {
     random_ = before_step_.random;
     views_ = before_step_.views;
     if (before_step_.motion) {
+      // A body that was parted in the step has moments that no checkpoint without it could hold.
+      if (scene_.main_motion->bodies() != before_step_.motion->bodies())
+        optimiser_.begin(*before_step_.motion);
       scene_.main_motion = before_step_.motion;
       scene_.main_nodes = before_step_.nodes;
       scene_.lighting = before_step_.lighting;

@@ -1,5 +1,8 @@
 #include "ops/lighting/lighting.h"
 
+#include <algorithm>
+#include <string>
+
 #include "base/parallel.h"
 #include "ops/lighting/lighting_kernels.h"
 #include "primitives/lists.h"
