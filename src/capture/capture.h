@@ -55,6 +55,8 @@ struct Capture {
   float extent = 1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6)
   bool has_masks = false;
   bool masks_are_estimated = false;  // they show, coarsely and in parts, what moves, be it shiny or not
+  // Training found masks of what moves, be it shiny or not (train/found_masks.h): its views have those.
+  bool masks_are_found = false;
   bool has_normal_priors = false;
   bool has_truth = false;
   PriorAxes prior_axes = PriorAxes::opengl;  // the axes in use, never `automatic`

@@ -32,8 +32,50 @@ const ViewSource& ImageCache::source(const std::string& id) const {
   return found->second;
 }
 
+bool ImageCache::has_mask(const std::string& id) const {
+  return given_masks_.contains(id) || source(id).mask;
+}
+
+std::optional<DecodedMask> ImageCache::mask(const std::string& id) const {
+  if (!has_mask(id)) return std::nullopt;
+  const auto given = given_masks_.find(id);
+  if (given == given_masks_.end()) return decode_mask(source(id));
+  constexpr uint8_t half = 128;
+  DecodedMask mask{Tensor<uint8_t>(given->second.shape()), given->second};
+  for (int64_t i = 0; i < mask.mask.size(); ++i) mask.mask[i] = mask.coverage[i] >= half ? 1 : 0;
+  return mask;
+}
+
+Tensor<uint8_t> ImageCache::fine_coverage(const std::string& id, const ViewSource& fine) const {
+  const auto given = given_masks_.find(id);
+  if (given == given_masks_.end()) return fine.mask ? decode_mask(fine).coverage : Tensor<uint8_t>();
+  const Tensor<uint8_t>& coarse = given->second;
+  Tensor<uint8_t> result({fine.height(), fine.width()});
+  for (int64_t y = 0; y < result.dim(0); ++y) {
+    for (int64_t x = 0; x < result.dim(1); ++x)
+      result(y, x) = coarse(y * coarse.dim(0) / result.dim(0), x * coarse.dim(1) / result.dim(1));
+  }
+  return result;
+}
+
 void ImageCache::leave_masks_out(std::span<const std::string> ids) {
-  for (const std::string& id : ids) views_.at(id).mask = {};
+  for (const std::string& id : ids) {
+    views_.at(id).mask = {};
+    given_masks_.erase(id);
+  }
+  empty();
+}
+
+void ImageCache::give_masks(std::unordered_map<std::string, Tensor<uint8_t>> coverage) {
+  for (const auto& [id, mask] : coverage) {
+    const ViewSource& view = source(id);
+    require(mask.shape() == Shape{view.height(), view.width()}, "a mask is as large as its view", id);
+  }
+  given_masks_ = std::move(coverage);
+  empty();
+}
+
+void ImageCache::empty() {
   by_id_.clear();
   entries_.clear();
   bytes_ = 0;
@@ -47,7 +89,7 @@ int64_t ImageCache::bytes() const {
 int64_t ImageCache::bytes_of(const std::string& id) const {
   const ViewSource& view = source(id);
   return view.width() * view.height() *
-         (3 + (view.transparent_is_unknown ? 1 : 0) + (view.mask ? 2 : 0) + (view.has_prior() ? 6 : 0));
+         (3 + (view.transparent_is_unknown ? 1 : 0) + (has_mask(id) ? 2 : 0) + (view.has_prior() ? 6 : 0));
 }
 
 std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
@@ -71,10 +113,9 @@ ViewPixels ImageCache::decode(const std::string& id) const {
   DecodedColour decoded = decode_colour(view);
   pixels.colour = std::move(decoded.colour);
   pixels.known = std::move(decoded.known);
-  if (view.mask) {
-    DecodedMask decoded_mask = decode_mask(view);
-    pixels.mask = std::move(decoded_mask.mask);
-    pixels.coverage = std::move(decoded_mask.coverage);
+  if (std::optional<DecodedMask> decoded_mask = mask(id)) {
+    pixels.mask = std::move(decoded_mask->mask);
+    pixels.coverage = std::move(decoded_mask->coverage);
   }
   if (view.has_prior()) {
     Tensor<float> normals = decode_prior(view, capture_);
@@ -112,7 +153,7 @@ FinePhotograph load_fine_photograph(const Capture& capture, const View& view, in
   source.factor = static_cast<int>(factor);
   ViewPixels pixels;
   pixels.colour = decode_colour(source).colour;
-  if (source.mask) pixels.coverage = decode_mask(source).coverage;
+  pixels.coverage = capture.images->fine_coverage(view.id, source);
   ViewImages images;
   widen(pixels, images);
   FinePhotograph photograph{view.camera, std::move(images.colour), std::move(images.coverage)};

@@ -3,11 +3,13 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
 
 #include "capture/capture.h"
+#include "capture/decode.h"
 #include "capture/pixels.h"
 #include "capture/view_source.h"
 
@@ -23,8 +25,17 @@ class ImageCache {
   ViewTruth load_truth(const std::string& id) const;
   // Throws InternalError for a view of another capture.
   const ViewSource& source(const std::string& id) const;
+  bool has_mask(const std::string& id) const;
+  // A view's mask, or nothing where it has none.
+  std::optional<DecodedMask> mask(const std::string& id) const;
+  // The coverage of its mask on a grid finer than the view's: `fine` is source(id) with a lower factor. Empty
+  // where it has none.
+  Tensor<uint8_t> fine_coverage(const std::string& id, const ViewSource& fine) const;
   // Empties the cache; the named views have no mask from then on. Not beside other calls.
   void leave_masks_out(std::span<const std::string> ids);
+  // Empties the cache; the named views have these masks from then on, in place of their files': H×W as the
+  // views are, 255 where the mask covers all of a pixel. Not beside other calls.
+  void give_masks(std::unordered_map<std::string, Tensor<uint8_t>> coverage);
   const CaptureSource& capture() const { return capture_; }
   int64_t bytes() const;
   int64_t limit_bytes() const { return limit_bytes_; }
@@ -37,9 +48,11 @@ class ImageCache {
     std::shared_ptr<const ViewPixels> pixels;
   };
   ViewPixels decode(const std::string& id) const;
+  void empty();
   void insert(const std::string& id, const std::shared_ptr<const ViewPixels>& pixels);
 
   std::unordered_map<std::string, ViewSource> views_;
+  std::unordered_map<std::string, Tensor<uint8_t>> given_masks_;
   const CaptureSource capture_;
   const int64_t limit_bytes_;
 

@@ -16,6 +16,8 @@ struct RunFolder {
   // One that a resumed training found damaged, kept for whoever wants to know why.
   std::filesystem::path damaged_checkpoint() const { return folder / "checkpoint.damaged.safetensors"; }
   std::filesystem::path log() const { return folder / "log.jsonl"; }
+  // Of what moves, where training found them.
+  std::filesystem::path masks() const { return folder / "masks"; }
   std::filesystem::path lock() const { return folder / "lock"; }
 
   // Throws InputError where the system does not say.

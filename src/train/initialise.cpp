@@ -242,8 +242,8 @@ float cloud_radius(const Tensor<float>& points) {
 }
 
 bool follows_bodies(const Capture& capture, const TrainOptions& options) {
-  return options.deform.main && options.deform.kind == "nodes" && capture.has_masks &&
-         !capture.masks_are_estimated;
+  return options.deform.main && options.deform.kind == "nodes" &&
+         ((capture.has_masks && !capture.masks_are_estimated) || capture.masks_are_found);
 }
 
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
@@ -269,7 +269,8 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   scene.main = surfels_at_points(thinned(seen, limit, random), options.initial, random);
   // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
   // mirrors grew into one before the camera, which can show any scene.
-  const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks && !capture.masks_are_estimated;
+  const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks &&
+                        !capture.masks_are_estimated && !capture.masks_are_found;
   if (options.initial.colours_from_views || by_masks) {
     const Sightings sightings = look_at(scene.main, earliest_photographs(capture));
     if (options.initial.colours_from_views) set_colours(scene.main, sightings);
@@ -286,7 +287,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
     scene.environment = surfels_around(points, capture.train, cap, options.initial, random);
     const int64_t room = cap - scene.environment.count();
     const int64_t copies = std::min<int64_t>(options.initial.environment_points, room);
-    if (copies > 0 && capture.has_masks) {
+    if (copies > 0 && (capture.has_masks || capture.masks_are_found)) {
       append_rows(scene.environment,
                   surroundings_at_points(capture, points, copies, options.initial, random));
     }

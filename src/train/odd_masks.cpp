@@ -6,7 +6,6 @@
 #include <map>
 
 #include "base/parallel.h"
-#include "capture/decode.h"
 #include "capture/image_cache.h"
 
 namespace traceflow {
@@ -70,7 +69,7 @@ std::vector<size_t> odd_extents(const std::vector<MaskExtent>& extents) {
 void leave_out_odd_masks(Capture& capture) {
   std::vector<const View*> views;
   for (const View& view : capture.train) {
-    if (capture.images->source(view.id).mask) views.push_back(&view);
+    if (capture.images->has_mask(view.id)) views.push_back(&view);
   }
   std::stable_sort(views.begin(), views.end(),
                    [](const View* a, const View* b) { return a->time < b->time; });
@@ -79,7 +78,7 @@ void leave_out_odd_masks(Capture& capture) {
       "masks: measure", static_cast<int64_t>(views.size()),
       [&](int64_t i) {
         const std::string& id = views[static_cast<size_t>(i)]->id;
-        extents[static_cast<size_t>(i)] = extent_of(id, decode_mask(capture.images->source(id)).mask);
+        extents[static_cast<size_t>(i)] = extent_of(id, capture.images->mask(id)->mask);
       },
       1);
   std::map<std::string, std::vector<MaskExtent>> cameras;

@@ -195,6 +195,7 @@ void BendOptions::validate() const {
 }
 
 void DeformOptions::validate() const {
+  check_not_negative(find, "deform.find");
   check_option(kind == "network" || kind == "nodes", "deform.kind", kind, "network or nodes");
   track.validate();
   bend.validate();

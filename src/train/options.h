@@ -257,6 +257,7 @@ struct DeformOptions {
   std::string kind = "network";
   bool main = true;
   bool environment = true;
+  int find = 1000;
   TrackOptions track;
   BendOptions bend;
   LightingOptions lighting;
@@ -271,6 +272,10 @@ struct DeformOptions {
             "where there are none).");
     v.field("main", main, "", "The main surfels move.");
     v.field("environment", environment, "", "The environment moves.");
+    v.field(
+        "find", find, "iterations",
+        "Where no masks show the objects that move: training of a still scene that finds them, at most two "
+        "fifths of the run (kind = nodes); 0: none are found.");
     v.group("track", track);
     v.group("bend", bend);
     v.group("lighting", lighting);

@@ -177,6 +177,13 @@ const View& Trainer::draw_view() {
   }
 }
 
+void Trainer::fade(std::span<const int64_t> rows) {
+  constexpr float transparent = -12;
+  Tensor<float> opacity = scene_.main.opacity_logit.on(Device::cpu);
+  for (const int64_t row : rows) opacity[row] = transparent;
+  scene_.main.opacity_logit = opacity.on(device_);
+}
+
 LossTerms Trainer::step() {
   density_changes_.clear();
   const Tracking now = tracking(iteration_);
@@ -206,6 +213,7 @@ LossTerms Trainer::step() {
   evaluate_objective(frame, target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main,
                      grad_frame_, means_, schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   leave_unknown(target, grad_frame_.colour);
+  if (review_) review_(frame, target, grad_frame_);
   if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
   const bool learns = std::isfinite(terms.total);

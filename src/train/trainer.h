@@ -2,7 +2,9 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "base/random.h"
@@ -61,6 +63,13 @@ class Trainer {
 
   // One iteration of the loop, without saving; returns the loss.
   LossTerms step();
+
+  // Is called with each picture, its photograph and the gradient by the picture: what it sets to zero teaches
+  // nothing.
+  using Review = std::function<void(const Frame&, const ViewImages&, FrameGradient&)>;
+  void review_gradients(Review review) { review_ = std::move(review); }
+  // Makes main surfels transparent: density control removes them.
+  void fade(std::span<const int64_t> rows);
 
   // Ends run() after the iteration that goes on. On any thread.
   void stop_soon() { stop_soon_ = true; }
@@ -194,6 +203,7 @@ class Trainer {
   StepMeter meter_;
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
   Draws before_step_;
+  Review review_;
   TextureTrust texture_trust_;  // while bodies are followed
   // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
   bool torn_ = false;

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <chrono>
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
@@ -11,6 +12,7 @@
 #include "cli/arguments/option_arguments.h"
 #include "cli/arguments/server_arguments.h"
 #include "cli/runs/trained_run.h"
+#include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/progress.h"
 #include "cli/terminal/stop_request.h"
@@ -18,6 +20,7 @@
 #include "serve/live_view.h"
 #include "train/continuation.h"
 #include "train/event_log.h"
+#include "train/found_masks.h"
 #include "train/log_history.h"
 #include "train/trainer.h"
 
@@ -142,6 +145,37 @@ class Watched {
   std::unique_ptr<serve::Server> server_;
 };
 
+// Masks of what moves where the capture has none: those that the run was begun with, or new ones. Nothing
+// where there is nothing to look for.
+std::optional<FoundMasks> masks_for(const Capture& capture, const TrainOptions& options,
+                                    const TrainArguments& arguments, const std::atomic<bool>& stop) {
+  const int iterations = iterations_to_find_masks(capture, options);
+  if (iterations == 0) return std::nullopt;
+  if (arguments.resume) {
+    if (std::optional<FoundMasks> kept = read_masks(RunFolder{arguments.output}.masks(), capture))
+      return kept;
+  }
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  CountProgress progress = CountProgress::for_stderr();
+  std::optional<FoundMasks> found = find_masks(capture, options, iterations, [&](int64_t done, int64_t all) {
+    if (!arguments.quiet) {
+      progress.show({"what moves", "iterations", done, all},
+                    std::chrono::duration<double>(Clock::now() - start).count());
+    }
+    return !stop;
+  });
+  progress.finish();
+  if (!found) throw Exit{exit_interrupted};
+  if (!arguments.quiet) {
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    std::cerr << fmt::format("no masks: what moves covers {:.1f}% of the pixels, as {} shows ({})\n",
+                             100 * covered_share(*found), RunFolder{arguments.output}.masks().string(),
+                             duration_text(seconds));
+  }
+  return found;
+}
+
 void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices,
            const ServerArguments& where) {
   arguments.view_options.validate();
@@ -154,8 +188,12 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
 
   Capture capture = load_capture(data, options.capture);
   const Device device = devices.choose(arguments.quiet);
+  const std::atomic<bool>& stop = stop_on_signals();
+  const std::optional<FoundMasks> masks = masks_for(capture, options, arguments, stop);
+  if (masks) give_masks(*masks, capture);
   Trainer trainer(options, std::move(capture), arguments.output, device);
   folder.make();
+  if (masks) write_masks(*masks, RunFolder{arguments.output}.masks());
   if (arguments.quiet) {
     trainer.stream().listen(warnings_alone(std::cerr));
   } else {
@@ -169,7 +207,6 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
         arguments.output + " is on a file system without locks: see that no second training writes there"});
   }
   if (arguments.resume) trainer.resume();
-  const std::atomic<bool>& stop = stop_on_signals();
   std::optional<Watched> watched;
   if (arguments.view) watched.emplace(trainer, arguments, where, stop);
 

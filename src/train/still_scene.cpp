@@ -1,0 +1,153 @@
+#include "train/still_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "math/spherical_harmonics.h"
+#include "train/trainer.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr int64_t reach = 2;  // pixels to each side
+// Differences in [0, 1]. A pixel that differs by more teaches nothing; a photograph that differs by less
+// agrees.
+constexpr float teaches_below = 0.06F, agrees_below = 0.045F;
+// Every so many times in training, surfels are tested, from the start of the last three fifths on.
+constexpr int tests = 6;
+constexpr double first_test = 0.4;
+constexpr double least_share = 0.5;
+constexpr int least_views = 3;
+constexpr float behind = 1.04F;
+
+FrameRequest request_of(const View& view, const Scene& scene) {
+  FrameRequest request;
+  request.camera = view.camera;
+  request.time = view.time;
+  request.sh_degree_main = sh_degree(scene.main.sh.dim(1));
+  request.deform_main = request.specular = false;
+  return request;
+}
+
+// Of each surfel, how many photographs show it, and how many of them agree with it.
+struct Votes {
+  std::vector<int32_t> shown, agree;
+
+  double share(size_t i) const {
+    return shown[i] == 0 ? 0 : static_cast<double>(agree[i]) / static_cast<double>(shown[i]);
+  }
+};
+
+Votes vote(const Scene& scene, const Capture& capture, const RenderOptions& options) {
+  const Surfels& main = scene.main;
+  const auto count = static_cast<size_t>(main.count());
+  Votes votes{std::vector<int32_t>(count), std::vector<int32_t>(count)};
+  Renderer renderer(options);
+  for (const View& view : capture.train) {
+    const Frame& frame = renderer.forward(scene, request_of(view, scene), false);
+    const Tensor<float> off = mean_difference(frame.colour, load_images(capture, view)->colour);
+    parallel_for("still scene: vote", main.count(), [&](int64_t i) {
+      const Vec3<float> point = load3<float>(main.position.row(i));
+      if (!view.camera.sees(point)) return;
+      const Vec3<float> in_camera = view.camera.point_in_camera(point);
+      const Vec2<float> at = view.camera.project(in_camera);
+      const auto row = static_cast<int64_t>(at.y), column = static_cast<int64_t>(at.x);
+      if (in_camera.z * frame.raster.alpha(row, column) > behind * frame.raster.depth(row, column)) return;
+      ++votes.shown[static_cast<size_t>(i)];
+      votes.agree[static_cast<size_t>(i)] += off(row, column) < agrees_below ? 1 : 0;
+    });
+  }
+  return votes;
+}
+
+// What the object hides in a photograph, and the object, teach nothing. A hole may still be filled.
+void leave_what_differs(const Frame& frame, const ViewImages& target, FrameGradient& gradient) {
+  constexpr float whole = 0.9F;
+  const Tensor<float> off = mean_difference(frame.colour, target.colour);
+  for (int64_t i = 0; i < off.size(); ++i) {
+    if (off[i] < teaches_below || frame.raster.alpha[i] < whole) continue;
+    for (int64_t k = 3 * i; k < 3 * i + 3; ++k) gradient.colour[k] = 0;
+  }
+}
+
+TrainOptions still(const TrainOptions& options, int iterations) {
+  TrainOptions o = preset("cpu");
+  o.seed = options.seed;
+  o.capture = options.capture;
+  o.render = options.render;
+  o.iterations = iterations;
+  o.specular = Specular::none;
+  o.deform.main = o.deform.environment = false;
+  o.loss.normal = o.loss.normal_prior = o.loss.rigidity = 0;
+  return o;
+}
+
+}  // namespace
+
+Tensor<float> mean_difference(const Tensor<float>& a, const Tensor<float>& b) {
+  const int64_t height = a.dim(0), width = a.dim(1);
+  Tensor<float> along({height, width, 3}), off({height, width});
+  parallel_for("still scene: compare rows", height, [&](int64_t y) {
+    for (int64_t x = 0; x < width; ++x) {
+      for (int64_t at = std::max<int64_t>(0, x - reach); at <= std::min(width - 1, x + reach); ++at) {
+        for (int64_t c = 0; c < 3; ++c) along(y, x, c) += a(y, at, c) - b(y, at, c);
+      }
+    }
+  });
+  parallel_for("still scene: compare columns", height, [&](int64_t y) {
+    const int64_t top = std::max<int64_t>(0, y - reach), bottom = std::min(height - 1, y + reach);
+    for (int64_t x = 0; x < width; ++x) {
+      Vec3<float> sum(0);
+      for (int64_t at = top; at <= bottom; ++at) sum += load3<float>(&along(at, x, 0));
+      const int64_t columns = std::min(width - 1, x + reach) - std::max<int64_t>(0, x - reach) + 1;
+      const Vec3<float> size = abs(sum) / static_cast<float>(columns * (bottom - top + 1));
+      off(y, x) = std::max({size.x, size.y, size.z});
+    }
+  });
+  return off;
+}
+
+StillScene::StillScene(const Capture& capture, const TrainOptions& options, int iterations,
+                       const StepsDone& told)
+    : renderer_(options.render), agreement_renderer_(options.render) {
+  Trainer trainer(still(options, iterations), capture, {});
+  const int first = static_cast<int>(first_test * iterations);
+  const int every = std::max(1, (iterations - first) / tests);
+  for (int k = 0; k < iterations; ++k) {
+    if (!told(k, iterations)) return;
+    if (k == first) trainer.review_gradients(leave_what_differs);
+    if (k >= first && (k - first) % every == 0) {
+      const Votes votes = vote(trainer.scene(), capture, options.render);
+      std::vector<int64_t> moving;
+      for (size_t i = 0; i < votes.shown.size(); ++i) {
+        if (votes.shown[i] >= least_views && votes.share(i) < least_share)
+          moving.push_back(static_cast<int64_t>(i));
+      }
+      trainer.fade(moving);
+    }
+    trainer.step();
+  }
+  scene_ = trainer.scene();
+  const Votes votes = vote(scene_, capture, options.render);
+  agreement_ = scene_;
+  Surfels& grey = agreement_.main;
+  grey.sh.reset({grey.count(), 1, 3});
+  for (int64_t i = 0; i < grey.count(); ++i) {
+    const auto share = static_cast<float>(votes.share(static_cast<size_t>(i)));
+    for (int64_t c = 0; c < 3; ++c) grey.sh(i, 0, c) = (share - 0.5F) / static_cast<float>(sh_c0);
+  }
+}
+
+StillScene::Look StillScene::look(const View& view) {
+  Look result;
+  result.colour = renderer_.forward(scene_, request_of(view, scene_), false).colour;
+  const Tensor<float> grey =
+      agreement_renderer_.forward(agreement_, request_of(view, agreement_), false).raster.colour;
+  result.agreement.resize({grey.dim(0), grey.dim(1)});
+  for (int64_t i = 0; i < result.agreement.size(); ++i) result.agreement[i] = grey[3 * i];
+  return result;
+}
+
+}  // namespace traceflow
