@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "capture/image_cache.h"
 #include "files/png.h"
+#include "train/initialise.h"
 #include "train/mask_parts.h"
 #include "train/random_walk.h"
 
@@ -135,10 +136,7 @@ std::filesystem::path picture_of(const std::filesystem::path& folder, const std:
 
 int iterations_to_find_masks(const Capture& capture, const TrainOptions& options) {
   constexpr int share = 5, shares = 2;  // two fifths of the run
-  const bool has_masks = !capture.masks_are_estimated &&
-                         std::any_of(capture.train.begin(), capture.train.end(),
-                                     [&](const View& view) { return capture.images->has_mask(view.id); });
-  if (has_masks || !options.deform.main || options.deform.kind != "nodes") return 0;
+  if (shows_objects(capture) || !options.deform.main || options.deform.kind != "nodes") return 0;
   const int iterations = std::min(options.deform.find, options.iterations * shares / share);
   const bool is_too_short = iterations < least_iterations || capture.train.size() < least_views;
   return is_too_short ? 0 : iterations;
@@ -228,7 +226,7 @@ std::optional<FoundMasks> read_masks(const std::filesystem::path& folder, const 
     const Shape wanted{view.camera.height, view.camera.width};
     if (mask.shape() != Shape{wanted[0], wanted[1], 1})
       throw InputError(path.string(), "size", mask.shape().to_string(), wanted.to_string(),
-                       "delete the folder, and the masks are found again");
+                       "put the run's masks back, or begin again");
     mask.resize(wanted);
     masks.emplace(view.id, std::move(mask));
   }

@@ -33,7 +33,7 @@ void give_masks(FoundMasks masks, Capture& capture);
 
 // A run keeps them, as pictures, for whoever resumes it or wants to see them.
 void write_masks(const FoundMasks& masks, const std::filesystem::path& folder);
-// Nothing where one of the views has none there. Throws InputError for one of another size.
+// Nothing where a training view has none there. Throws InputError for one of another size.
 std::optional<FoundMasks> read_masks(const std::filesystem::path& folder, const Capture& capture);
 
 }  // namespace traceflow

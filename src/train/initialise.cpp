@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "capture/image_cache.h"
 #include "math/rotation.h"
 #include "math/rotation_group.h"
 #include "math/spherical_harmonics.h"
@@ -241,9 +242,14 @@ float cloud_radius(const Tensor<float>& points) {
   return pick(values, (count - 1) * 9 / 10);
 }
 
+bool shows_objects(const Capture& capture) {
+  if (capture.masks_are_estimated && !capture.masks_are_found) return false;
+  return std::any_of(capture.train.begin(), capture.train.end(),
+                     [&](const View& view) { return capture.images->has_mask(view.id); });
+}
+
 bool follows_bodies(const Capture& capture, const TrainOptions& options) {
-  return options.deform.main && options.deform.kind == "nodes" &&
-         ((capture.has_masks && !capture.masks_are_estimated) || capture.masks_are_found);
+  return options.deform.main && options.deform.kind == "nodes" && shows_objects(capture);
 }
 
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {

@@ -14,6 +14,8 @@ struct InitialScene {
   int64_t points_in_view = 0;  // that some training view sees
 };
 
+// Whether a training view has a mask of the objects, be it the capture's or one that was found.
+bool shows_objects(const Capture& capture);
 // Whether what the capture's masks show is followed as bodies.
 bool follows_bodies(const Capture& capture, const TrainOptions& options);
 

@@ -84,6 +84,10 @@ void Trainer::resume() {
   const Safetensors file = read_checkpoint(run_, note);
   Scene scene = get_scene(file);
   check_views(file, scene.normalisation, capture_);
+  if (scene.main_motion && !follows_bodies(capture_, options_)) {
+    throw InputError(run_.masks().string(), "", "no masks there and none in the capture",
+                     "those that the run's bodies were found by", "put them back, or begin again");
+  }
   scene.move_to(device_);
   scene_ = std::move(scene);
   optimiser_ = Optimiser(scene_);

@@ -247,7 +247,7 @@ TEST_F(Films, KeepTheMasksThatAreGiven) {
     read_masks(kept, film);
     ADD_FAILURE() << "a mask of another size";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("the masks are found again"));
+    EXPECT_THAT(error.what(), HasSubstr("begin again"));
   }
 }
 

@@ -149,12 +149,9 @@ class Watched {
 // where there is nothing to look for.
 std::optional<FoundMasks> masks_for(const Capture& capture, const TrainOptions& options,
                                     const TrainArguments& arguments, const std::atomic<bool>& stop) {
+  if (arguments.resume) return read_masks(RunFolder{arguments.output}.masks(), capture);
   const int iterations = iterations_to_find_masks(capture, options);
   if (iterations == 0) return std::nullopt;
-  if (arguments.resume) {
-    if (std::optional<FoundMasks> kept = read_masks(RunFolder{arguments.output}.masks(), capture))
-      return kept;
-  }
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   CountProgress progress = CountProgress::for_stderr();
