@@ -48,7 +48,9 @@ struct Capture {
   std::vector<View> train;
   std::vector<View> test;
   Tensor<float> points;  // P×3, normalised scene; may be empty
-  PointTracks tracks;    // may be empty
+  // Of the points those that training saw to stand still (train/found_masks.h); empty where it did not look.
+  Tensor<float> standing_points;
+  PointTracks tracks;  // may be empty
   SceneNormalisation normalisation;
   float near_plane = 0;  // scene.json's, normalised scene units; 0 when absent
   float far_plane = 0;

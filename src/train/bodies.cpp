@@ -103,6 +103,19 @@ std::vector<int64_t> within_thickness(const std::vector<Candidate>& candidates, 
   return rows;
 }
 
+// Whether at least half of a part's surfels are points that were seen to stand still: what is behind a thing
+// that has no points itself.
+bool is_background(const Surfels& surfels, const std::vector<int64_t>& part, const Tensor<float>& standing) {
+  if (part.empty() || standing.empty()) return false;
+  Tensor<float> points({static_cast<int64_t>(part.size()), 3});
+  for (size_t k = 0; k < part.size(); ++k)
+    std::copy_n(surfels.position.row(part[k]), 3, points.row(static_cast<int64_t>(k)));
+  const Neighbours nearest = nearest_of(standing, points, 1);
+  int64_t stand = 0;
+  for (const float distance2 : nearest.distance2.values()) stand += distance2 == 0 ? 1 : 0;
+  return 2 * stand >= points.dim(0);
+}
+
 Tensor<float> times_of(const std::vector<View>& views) {
   std::set<float> times;
   for (const View& view : views) times.insert(view.time);
@@ -213,7 +226,10 @@ std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels) {
   for (size_t part = 0; part < candidates.size(); ++part) {
     rows.push_back(within_thickness(candidates[part], parts.area[part], first.camera));
   }
-  std::erase_if(rows, [](const auto& part) { return static_cast<int64_t>(part.size()) < least_surfels; });
+  std::erase_if(rows, [&](const auto& part) {
+    return static_cast<int64_t>(part.size()) < least_surfels ||
+           is_background(surfels, part, capture.standing_points);
+  });
   std::stable_sort(rows.begin(), rows.end(),
                    [](const auto& a, const auto& b) { return a.size() > b.size(); });
   if (rows.size() > static_cast<size_t>(most_bodies)) rows.resize(static_cast<size_t>(most_bodies));

@@ -20,8 +20,9 @@ inline constexpr float solid_opacity = 0.95F;
 void make_solid(const Motion& motion, Surfels& surfels);
 
 // A body for each connected part of the earliest mask: it carries the surfels that project into
-// it and lie no farther behind its front than it is wide. Sets surfels.body and returns bodies that stand
-// still at the times of the training views; nothing where no part has enough surfels.
+// it and lie no farther behind its front than it is wide, unless most of these are standing points. Sets
+// surfels.body and returns bodies that stand still at the times of the training views; nothing where no part
+// has enough surfels.
 std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);
 
 // Lets carried surfels go that their body takes out of the masks of the views up to the time

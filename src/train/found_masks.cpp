@@ -134,7 +134,7 @@ std::filesystem::path picture_of(const std::filesystem::path& folder, const std:
 
 }  // namespace
 
-int iterations_to_find_masks(const Capture& capture, const TrainOptions& options) {
+int iterations_to_find_objects(const Capture& capture, const TrainOptions& options) {
   constexpr int share = 5, shares = 2;  // two fifths of the run
   if (shows_objects(capture) || !options.deform.main || options.deform.kind != "nodes") return 0;
   const int iterations = std::min(options.deform.find, options.iterations * shares / share);
@@ -163,8 +163,8 @@ Tensor<float> moving_share(const StillScene::Look& still, const ViewImages& phot
   return random_walk(terms);
 }
 
-std::optional<FoundMasks> find_masks(const Capture& capture, const TrainOptions& options, int iterations,
-                                     const StepsDone& told) {
+std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOptions& options, int iterations,
+                                         const StepsDone& told) {
   const int width = capture.train.front().camera.width;
   const int factor = (width + widest - 1) / widest;
   TrainOptions small = options;
@@ -190,9 +190,10 @@ std::optional<FoundMasks> find_masks(const Capture& capture, const TrainOptions&
             coverage_above(share, moves_above, camera.height, camera.width, static_cast<float>(factor));
       },
       1);
-  FoundMasks masks;
-  for (size_t k = 0; k < covers.size(); ++k) masks.emplace(capture.train[k].id, std::move(covers[k]));
-  return masks;
+  FoundObjects found;
+  for (size_t k = 0; k < covers.size(); ++k) found.masks.emplace(capture.train[k].id, std::move(covers[k]));
+  found.standing_points = still.standing(capture.points);
+  return found;
 }
 
 double covered_share(const FoundMasks& masks) {
@@ -204,8 +205,9 @@ double covered_share(const FoundMasks& masks) {
   return most > 0 ? static_cast<double>(sum) / static_cast<double>(most) : 0;
 }
 
-void give_masks(FoundMasks masks, Capture& capture) {
-  capture.images->give_masks(std::move(masks));
+void give_objects(const FoundObjects& found, Capture& capture) {
+  capture.images->give_masks(found.masks);
+  capture.standing_points = found.standing_points;
   capture.masks_are_found = true;
 }
 

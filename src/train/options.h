@@ -267,15 +267,14 @@ struct DeformOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("kind", kind, "",
-            "How main surfels move: network (a residual field), or nodes (bodies found in masks and "
-            "tracked, which bend where they must; of all else the field moves what is seen to move; network "
-            "where there are none).");
+            "How main surfels move: network (a residual field), or nodes (bodies, which masks or the film "
+            "show, are tracked and bend where they must; of all else the field moves what is seen to move; "
+            "network where there are none).");
     v.field("main", main, "", "The main surfels move.");
     v.field("environment", environment, "", "The environment moves.");
-    v.field(
-        "find", find, "iterations",
-        "Where no masks show the objects that move: training of a still scene that finds them, at most two "
-        "fifths of the run (kind = nodes); 0: none are found.");
+    v.field("find", find, "iterations",
+            "Without masks: training of a still scene that finds what moves, at most two fifths of the run "
+            "(kind = nodes); 0: nothing is looked for.");
     v.group("track", track);
     v.group("bend", bend);
     v.group("lighting", lighting);

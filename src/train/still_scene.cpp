@@ -5,6 +5,8 @@
 
 #include "base/parallel.h"
 #include "math/spherical_harmonics.h"
+#include "scene/neighbours.h"
+#include "train/initialise.h"
 #include "train/trainer.h"
 
 namespace traceflow {
@@ -19,7 +21,8 @@ constexpr float teaches_below = 0.06F, agrees_below = 0.045F;
 constexpr int tests = 6;
 constexpr double first_test = 0.4;
 constexpr double least_share = 0.5;
-constexpr int least_views = 3;
+constexpr float most_agree = 0.6F;
+constexpr int least_shown = 3;
 constexpr float behind = 1.04F;
 
 FrameRequest request_of(const View& view, const Scene& scene) {
@@ -122,7 +125,7 @@ StillScene::StillScene(const Capture& capture, const TrainOptions& options, int 
       const Votes votes = vote(trainer.scene(), capture, options.render);
       std::vector<int64_t> moving;
       for (size_t i = 0; i < votes.shown.size(); ++i) {
-        if (votes.shown[i] >= least_views && votes.share(i) < least_share)
+        if (votes.shown[i] >= least_shown && votes.share(i) < least_share)
           moving.push_back(static_cast<int64_t>(i));
       }
       trainer.fade(moving);
@@ -134,10 +137,31 @@ StillScene::StillScene(const Capture& capture, const TrainOptions& options, int 
   agreement_ = scene_;
   Surfels& grey = agreement_.main;
   grey.sh.reset({grey.count(), 1, 3});
+  std::vector<int64_t> agreed;
   for (int64_t i = 0; i < grey.count(); ++i) {
     const auto share = static_cast<float>(votes.share(static_cast<size_t>(i)));
+    if (share >= most_agree && votes.shown[static_cast<size_t>(i)] >= least_shown) agreed.push_back(i);
     for (int64_t c = 0; c < 3; ++c) grey.sh(i, 0, c) = (share - 0.5F) / static_cast<float>(sh_c0);
   }
+  agreed_.resize({static_cast<int64_t>(agreed.size()), 3});
+  for (size_t k = 0; k < agreed.size(); ++k)
+    std::copy_n(grey.position.row(agreed[k]), 3, agreed_.row(static_cast<int64_t>(k)));
+}
+
+Tensor<float> StillScene::standing(const Tensor<float>& points) const {
+  constexpr float beside = 1.5F;  // distances between neighbours
+  if (points.empty() || agreed_.empty()) return Tensor<float>({0, 3});
+  const Tensor<int32_t> nearest = nearest_of(agreed_, points);
+  const Tensor<float> log_distance = log_spacing(points);
+  Tensor<float> result(points.shape());
+  int64_t count = 0;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const Vec3<float> point = load3<float>(points.row(i));
+    const float distance = glm::length(point - load3<float>(agreed_.row(nearest[i])));
+    if (distance <= beside * std::exp(log_distance[i])) store3(result.row(count++), point);
+  }
+  result.resize({count, 3});
+  return result;
 }
 
 StillScene::Look StillScene::look(const View& view) {

@@ -29,10 +29,13 @@ class StillScene {
     Tensor<float> agreement;  // H×W, blended over what is seen: the share of photographs that agree with it
   };
   Look look(const View& view);
+  // Of points (P×3), those beside which a surfel stands that most photographs agree with.
+  Tensor<float> standing(const Tensor<float>& points) const;
 
  private:
-  Scene scene_;      // as it looks
-  Scene agreement_;  // as grey as its photographs agree
+  Scene scene_;           // as it looks
+  Scene agreement_;       // as grey as its photographs agree
+  Tensor<float> agreed_;  // M×3, where surfels are that most photographs agree with
   Renderer renderer_, agreement_renderer_;
 };
 

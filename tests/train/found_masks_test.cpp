@@ -160,51 +160,57 @@ class Films : public ::testing::Test {
 
 TEST_F(Films, AreLookedAtWhereNoMaskShowsWhatMoves) {
   TrainOptions options = preset("cpu");
-  EXPECT_EQ(iterations_to_find_masks(without(), options), 1000);
-  EXPECT_EQ(iterations_to_find_masks(with(), options), 0);
+  EXPECT_EQ(iterations_to_find_objects(without(), options), 1000);
+  EXPECT_EQ(iterations_to_find_objects(with(), options), 0);
   options.iterations = 1000;
-  EXPECT_EQ(iterations_to_find_masks(without(), options), 400);
+  EXPECT_EQ(iterations_to_find_objects(without(), options), 400);
   options.iterations = 400;
-  EXPECT_EQ(iterations_to_find_masks(without(), options), 0) << "too short a run";
+  EXPECT_EQ(iterations_to_find_objects(without(), options), 0) << "too short a run";
   options = preset("cpu");
   options.deform.find = 0;
-  EXPECT_EQ(iterations_to_find_masks(without(), options), 0);
+  EXPECT_EQ(iterations_to_find_objects(without(), options), 0);
   options = preset("paper");
-  EXPECT_EQ(iterations_to_find_masks(without(), options), 0);
+  EXPECT_EQ(iterations_to_find_objects(without(), options), 0);
   Capture short_film = without();
   short_film.train.resize(9);
-  EXPECT_EQ(iterations_to_find_masks(short_film, preset("cpu")), 0);
+  EXPECT_EQ(iterations_to_find_objects(short_film, preset("cpu")), 0);
 }
 
 TEST_F(Films, ShowWhatMoves) {
   Capture film = without();
   const Capture truth = with();
-  std::optional<FoundMasks> found = find_masks(film, preset("cpu"), 500, always);
+  std::optional<FoundObjects> found = find_objects(film, preset("cpu"), 500, always);
   ASSERT_TRUE(found.has_value());
-  ASSERT_EQ(found->size(), film.train.size());
+  ASSERT_EQ(found->masks.size(), film.train.size());
   int64_t both = 0, any = 0;
   for (const View& view : truth.train) {
     const Tensor<uint8_t> mask = load_images(truth, view)->mask;
     for (int64_t i = 0; i < mask.size(); ++i) {
-      const bool is_found = found->at(view.id)[i] >= 128;
+      const bool is_found = found->masks.at(view.id)[i] >= 128;
       both += is_found && mask[i] != 0 ? 1 : 0;
       any += is_found || mask[i] != 0 ? 1 : 0;
     }
   }
   EXPECT_GT(static_cast<double>(both) / static_cast<double>(any), 0.6);
   // Bodies are followed by them, and they say nothing of mirrors.
-  give_masks(*found, film);
+  give_objects(*found, film);
   const TrainOptions options = preset("cpu");
   EXPECT_TRUE(follows_bodies(film, options));
   const Trainer trainer(options, film, folder() / "run");
   ASSERT_TRUE(trainer.scene().main_motion.has_value());
   for (const float tint : trainer.scene().main.tint_logit.values())
     EXPECT_FLOAT_EQ(tint, trainer.scene().main.tint_logit[0]);
+  // What stands is not carried: where all points stood, none would be left for bodies.
+  const double standing = static_cast<double>(film.standing_points.dim(0));
+  EXPECT_GT(standing, 0.4 * static_cast<double>(film.points.dim(0)));
+  EXPECT_LT(standing, 0.95 * static_cast<double>(film.points.dim(0)));
+  film.standing_points = film.points;
+  EXPECT_FALSE(Trainer(options, film, folder() / "run").scene().main_motion.has_value());
 }
 
 TEST_F(Films, AreLeftWhereWhoeverWaitsSaysSo) {
   int64_t told = 0;
-  EXPECT_FALSE(find_masks(without(), preset("cpu"), 600, [&](int64_t done, int64_t all) {
+  EXPECT_FALSE(find_objects(without(), preset("cpu"), 600, [&](int64_t done, int64_t all) {
                  EXPECT_EQ(all, 600);
                  told = done;
                  return done < 3;
@@ -228,7 +234,7 @@ TEST_F(Films, KeepTheMasksThatAreGiven) {
   EXPECT_TRUE(same(*read, masks));
 
   EXPECT_TRUE(load_images(film, film.train[0])->mask.empty());
-  give_masks(masks, film);
+  give_objects({masks, {}}, film);
   for (const View& view : film.train) {
     const auto pixels = load_pixels(film, view);
     EXPECT_TRUE(same(pixels->coverage, masks.at(view.id)));
@@ -253,13 +259,13 @@ TEST_F(Films, KeepTheMasksThatAreGiven) {
 
 TEST_F(Films, AreSeenAlikeAtAnyThreadCount) {
   const Capture film = without();
-  std::optional<FoundMasks> first;
+  std::optional<FoundObjects> first;
   for (const int threads : {1, 3}) {
     set_threads(threads);
-    const std::optional<FoundMasks> found = find_masks(film, preset("cpu"), 200, always);
+    const std::optional<FoundObjects> found = find_objects(film, preset("cpu"), 200, always);
     ASSERT_TRUE(found.has_value());
     if (!first) first = found;
-    EXPECT_TRUE(same(*found, *first));
+    EXPECT_TRUE(same(found->masks, first->masks));
   }
   set_threads(0);
 }

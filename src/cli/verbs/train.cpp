@@ -145,30 +145,34 @@ class Watched {
   std::unique_ptr<serve::Server> server_;
 };
 
-// Masks of what moves where the capture has none: those that the run was begun with, or new ones. Nothing
-// where there is nothing to look for.
-std::optional<FoundMasks> masks_for(const Capture& capture, const TrainOptions& options,
-                                    const TrainArguments& arguments, const std::atomic<bool>& stop) {
-  if (arguments.resume) return read_masks(RunFolder{arguments.output}.masks(), capture);
-  const int iterations = iterations_to_find_masks(capture, options);
+// What moves where the capture has no masks: what the run was begun with, or what is found now. Nothing where
+// there is nothing to look for.
+std::optional<FoundObjects> objects_for(const Capture& capture, const TrainOptions& options,
+                                        const TrainArguments& arguments, const std::atomic<bool>& stop) {
+  const std::filesystem::path folder = RunFolder{arguments.output}.masks();
+  if (arguments.resume) {
+    std::optional<FoundMasks> kept = read_masks(folder, capture);
+    return kept ? std::optional(FoundObjects{std::move(*kept), {}}) : std::nullopt;
+  }
+  const int iterations = iterations_to_find_objects(capture, options);
   if (iterations == 0) return std::nullopt;
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   CountProgress progress = CountProgress::for_stderr();
-  std::optional<FoundMasks> found = find_masks(capture, options, iterations, [&](int64_t done, int64_t all) {
-    if (!arguments.quiet) {
-      progress.show({"what moves", "iterations", done, all},
-                    std::chrono::duration<double>(Clock::now() - start).count());
-    }
-    return !stop;
-  });
+  std::optional<FoundObjects> found =
+      find_objects(capture, options, iterations, [&](int64_t done, int64_t all) {
+        if (!arguments.quiet) {
+          progress.show({"what moves", "iterations", done, all},
+                        std::chrono::duration<double>(Clock::now() - start).count());
+        }
+        return !stop;
+      });
   progress.finish();
   if (!found) throw Exit{exit_interrupted};
   if (!arguments.quiet) {
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     std::cerr << fmt::format("no masks: what moves covers {:.1f}% of the pixels, as {} shows ({})\n",
-                             100 * covered_share(*found), RunFolder{arguments.output}.masks().string(),
-                             duration_text(seconds));
+                             100 * covered_share(found->masks), folder.string(), duration_text(seconds));
   }
   return found;
 }
@@ -186,11 +190,11 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   Capture capture = load_capture(data, options.capture);
   const Device device = devices.choose(arguments.quiet);
   const std::atomic<bool>& stop = stop_on_signals();
-  const std::optional<FoundMasks> masks = masks_for(capture, options, arguments, stop);
-  if (masks) give_masks(*masks, capture);
+  const std::optional<FoundObjects> objects = objects_for(capture, options, arguments, stop);
+  if (objects) give_objects(*objects, capture);
   Trainer trainer(options, std::move(capture), arguments.output, device);
   folder.make();
-  if (masks) write_masks(*masks, RunFolder{arguments.output}.masks());
+  if (objects) write_masks(objects->masks, RunFolder{arguments.output}.masks());
   if (arguments.quiet) {
     trainer.stream().listen(warnings_alone(std::cerr));
   } else {
