@@ -57,7 +57,7 @@ struct Capture {
   float extent = 1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6)
   bool has_masks = false;
   bool masks_are_estimated = false;  // they show, coarsely and in parts, what moves, be it shiny or not
-  // Training found masks of what moves, be it shiny or not (train/found_masks.h): its views have those.
+  // No masks but those that training found, of what moves, be it shiny or not (train/found_masks.h).
   bool masks_are_found = false;
   bool has_normal_priors = false;
   bool has_truth = false;

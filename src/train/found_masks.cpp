@@ -128,6 +128,19 @@ void leave_out_specks(Tensor<float>& share) {
   }
 }
 
+bool has_object_mask(const Capture& capture, const View& view) {
+  return !capture.masks_are_estimated && capture.images->has_mask(view.id);
+}
+
+// Whether a view of the first time has a mask of the objects.
+bool shows_first_objects(const Capture& capture) {
+  const auto earlier = [](const View& a, const View& b) { return a.time < b.time; };
+  const auto first = std::min_element(capture.train.begin(), capture.train.end(), earlier);
+  return std::any_of(capture.train.begin(), capture.train.end(), [&](const View& view) {
+    return view.time == first->time && has_object_mask(capture, view);
+  });
+}
+
 std::filesystem::path picture_of(const std::filesystem::path& folder, const std::string& id) {
   return folder / (id + ".png");
 }
@@ -136,7 +149,7 @@ std::filesystem::path picture_of(const std::filesystem::path& folder, const std:
 
 int iterations_to_find_objects(const Capture& capture, const TrainOptions& options) {
   constexpr int share = 5, shares = 2;  // two fifths of the run
-  if (shows_objects(capture) || !options.deform.main || options.deform.kind != "nodes") return 0;
+  if (shows_first_objects(capture) || !options.deform.main || options.deform.kind != "nodes") return 0;
   const int iterations = std::min(options.deform.find, options.iterations * shares / share);
   const bool is_too_short = iterations < least_iterations || capture.train.size() < least_views;
   return is_too_short ? 0 : iterations;
@@ -191,7 +204,10 @@ std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOpti
       },
       1);
   FoundObjects found;
-  for (size_t k = 0; k < covers.size(); ++k) found.masks.emplace(capture.train[k].id, std::move(covers[k]));
+  for (size_t k = 0; k < covers.size(); ++k) {
+    const View& view = capture.train[k];
+    if (!has_object_mask(capture, view)) found.masks.emplace(view.id, std::move(covers[k]));
+  }
   found.standing_points = still.standing(capture.points);
   return found;
 }
@@ -206,9 +222,12 @@ double covered_share(const FoundMasks& masks) {
 }
 
 void give_objects(const FoundObjects& found, Capture& capture) {
+  const bool has_others = std::any_of(capture.train.begin(), capture.train.end(), [&](const View& view) {
+    return has_object_mask(capture, view) && !found.masks.contains(view.id);
+  });
+  capture.masks_are_found = !has_others;
   capture.images->give_masks(found.masks);
   capture.standing_points = found.standing_points;
-  capture.masks_are_found = true;
 }
 
 void write_masks(const FoundMasks& masks, const std::filesystem::path& folder) {
@@ -219,11 +238,11 @@ void write_masks(const FoundMasks& masks, const std::filesystem::path& folder) {
   }
 }
 
-std::optional<FoundMasks> read_masks(const std::filesystem::path& folder, const Capture& capture) {
+FoundMasks read_masks(const std::filesystem::path& folder, const Capture& capture) {
   FoundMasks masks;
   for (const View& view : capture.train) {
     const std::filesystem::path path = picture_of(folder, view.id);
-    if (!std::filesystem::exists(path)) return std::nullopt;
+    if (!std::filesystem::exists(path)) continue;
     Tensor<uint8_t> mask = read_png(path);
     const Shape wanted{view.camera.height, view.camera.width};
     if (mask.shape() != Shape{wanted[0], wanted[1], 1})

@@ -39,7 +39,7 @@ void give_objects(const FoundObjects& found, Capture& capture);
 
 // A run keeps them, as pictures, for whoever resumes it or wants to see them.
 void write_masks(const FoundMasks& masks, const std::filesystem::path& folder);
-// Nothing where a training view has none there. Throws InputError for one of another size.
-std::optional<FoundMasks> read_masks(const std::filesystem::path& folder, const Capture& capture);
+// Those of the training views that are there. Throws InputError for one of another size.
+FoundMasks read_masks(const std::filesystem::path& folder, const Capture& capture);
 
 }  // namespace traceflow

@@ -43,7 +43,7 @@ TEST(TrainWithoutMasks, FindsThemAndResumesWithThem) {
       "500",   "--set", "density.max_surfels=1500", "--specular", "none"};
   const Outcome first = run_with(train);
   ASSERT_EQ(first.code, exit_done) << first.err;
-  EXPECT_THAT(first.err, HasSubstr("no masks: what moves covers "));
+  EXPECT_THAT(first.err, HasSubstr("found what moves in 12 pictures without masks: "));
   for (const View& view : views) {
     const PngSize size = read_png_size(run / "masks" / (view.id + ".png"));
     EXPECT_EQ(size.width, 40);
@@ -55,7 +55,7 @@ TEST(TrainWithoutMasks, FindsThemAndResumesWithThem) {
   fs::copy(run, folder / "copy", fs::copy_options::recursive);
   const Outcome second = run_with(resume);
   EXPECT_EQ(second.code, exit_done) << second.err;
-  EXPECT_THAT(second.err, Not(HasSubstr("what moves")));
+  EXPECT_THAT(second.err, Not(HasSubstr("found what moves")));
 
   // Without them the run is refused, and stays as it is.
   resume[4] = (folder / "copy").string();

@@ -22,6 +22,7 @@
 #include "train/event_log.h"
 #include "train/found_masks.h"
 #include "train/log_history.h"
+#include "train/odd_masks.h"
 #include "train/trainer.h"
 
 namespace traceflow::cli {
@@ -145,15 +146,16 @@ class Watched {
   std::unique_ptr<serve::Server> server_;
 };
 
-// What moves where the capture has no masks: what the run was begun with, or what is found now. Nothing where
-// there is nothing to look for.
-std::optional<FoundObjects> objects_for(const Capture& capture, const TrainOptions& options,
+// What moves where masks are missing, of the first time or all: what the run was begun with, or what is found
+// now. Nothing where there is nothing to look for.
+std::optional<FoundObjects> objects_for(Capture& capture, const TrainOptions& options,
                                         const TrainArguments& arguments, const std::atomic<bool>& stop) {
   const std::filesystem::path folder = RunFolder{arguments.output}.masks();
   if (arguments.resume) {
-    std::optional<FoundMasks> kept = read_masks(folder, capture);
-    return kept ? std::optional(FoundObjects{std::move(*kept), {}}) : std::nullopt;
+    FoundMasks kept = read_masks(folder, capture);
+    return kept.empty() ? std::nullopt : std::optional(FoundObjects{std::move(kept), {}});
   }
+  if (follows_bodies(capture, options)) leave_out_odd_masks(capture);
   const int iterations = iterations_to_find_objects(capture, options);
   if (iterations == 0) return std::nullopt;
   using Clock = std::chrono::steady_clock;
@@ -171,8 +173,9 @@ std::optional<FoundObjects> objects_for(const Capture& capture, const TrainOptio
   if (!found) throw Exit{exit_interrupted};
   if (!arguments.quiet) {
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-    std::cerr << fmt::format("no masks: what moves covers {:.1f}% of the pixels, as {} shows ({})\n",
-                             100 * covered_share(found->masks), folder.string(), duration_text(seconds));
+    std::cerr << fmt::format(
+        "found what moves in {} pictures without masks: {:.1f}% of their pixels, as {} shows ({})\n",
+        found->masks.size(), 100 * covered_share(found->masks), folder.string(), duration_text(seconds));
   }
   return found;
 }
