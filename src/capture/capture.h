@@ -59,6 +59,7 @@ struct Capture {
   bool masks_are_estimated = false;  // they show, coarsely and in parts, what moves, be it shiny or not
   // No masks but those that training found, of what moves, be it shiny or not (train/found_masks.h).
   bool masks_are_found = false;
+  int64_t found_masks = 0;  // that training found and gave to views
   bool has_normal_priors = false;
   bool has_truth = false;
   PriorAxes prior_axes = PriorAxes::opengl;  // the axes in use, never `automatic`

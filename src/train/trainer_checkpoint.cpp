@@ -70,6 +70,7 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["options"] = options_to_json(options_);
   file.metadata["capture"] = capture_.name;
   file.metadata["capture_folder"] = capture_folder_;
+  file.metadata["found_masks"] = std::to_string(capture_.found_masks);
   file.metadata["initial_main_count"] = std::to_string(initial_main_count_);
   file.metadata["environment_radius"] = fmt::format("{}", environment_radius_);
   put_views(capture_, file);
@@ -84,9 +85,12 @@ void Trainer::resume() {
   const Safetensors file = read_checkpoint(run_, note);
   Scene scene = get_scene(file);
   check_views(file, scene.normalisation, capture_);
-  if (scene.main_motion && !follows_bodies(capture_, options_)) {
-    throw InputError(run_.masks().string(), "", "no masks there and none in the capture",
-                     "those that the run's bodies were found by", "put them back, or begin again");
+  const int64_t found_masks =
+      file.metadata.contains("found_masks") ? count_in(file, "found_masks") : int64_t{0};
+  if (found_masks != capture_.found_masks) {
+    throw InputError(run_.masks().string(), "", std::to_string(capture_.found_masks) + " masks",
+                     "the " + std::to_string(found_masks) + " that the run found",
+                     "put them back, or begin again");
   }
   scene.move_to(device_);
   scene_ = std::move(scene);
