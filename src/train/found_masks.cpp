@@ -155,6 +155,7 @@ std::vector<std::vector<double>> areas_of(const Capture& film, const std::vector
     cameras[film.images->source(film.train[k].id).rig_camera].push_back(static_cast<double>(sum) / 255);
   }
   std::vector<std::vector<double>> areas;
+  areas.reserve(cameras.size());
   for (auto& [camera, of_camera] : cameras) areas.push_back(std::move(of_camera));
   return areas;
 }
