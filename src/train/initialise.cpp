@@ -243,7 +243,7 @@ float cloud_radius(const Tensor<float>& points) {
 }
 
 bool shows_objects(const Capture& capture) {
-  if (capture.masks_are_estimated && !capture.masks_are_found) return false;
+  if (!capture.masks_are_found && (!capture.has_masks || capture.masks_are_estimated)) return false;
   return std::any_of(capture.train.begin(), capture.train.end(),
                      [&](const View& view) { return capture.images->has_mask(view.id); });
 }
