@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/parallel.h"
+#include "base/robust.h"
 #include "capture/image_cache.h"
 #include "files/png.h"
 #include "train/small_run.h"
@@ -235,6 +236,18 @@ TEST_F(Films, ShowWhatMoves) {
   EXPECT_LT(standing, 0.95 * static_cast<double>(film.points.dim(0)));
   film.standing_points = film.points;
   EXPECT_FALSE(Trainer(options, film, folder() / "run").scene().main_motion.has_value());
+}
+
+TEST_F(Films, LeaveAStillSceneWithoutWhatMoves) {
+  const Capture film = without(), truth = with();
+  StillScene still(film, preset("cpu"), 300, always);
+  const std::shared_ptr<const ViewImages> images = load_images(truth, truth.train[0]);
+  const ViewImages& photograph = *images;
+  const Tensor<float> off = mean_difference(still.look(film.train[0]).colour, photograph.colour);
+  std::vector<double> inside, outside;
+  for (int64_t i = 0; i < off.size(); ++i) (photograph.mask[i] != 0 ? inside : outside).push_back(off[i]);
+  EXPECT_GT(median(inside), 0.08);
+  EXPECT_LT(median(outside), 0.04);
 }
 
 TEST_F(Films, AreLeftWhereWhoeverWaitsSaysSo) {
