@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 
+#include "base/atomic_file.h"
 #include "base/parallel.h"
 #include "base/robust.h"
 #include "capture/image_cache.h"
@@ -167,9 +168,8 @@ std::filesystem::path picture_of(const std::filesystem::path& folder, const std:
 }  // namespace
 
 int iterations_to_find_objects(const Capture& capture, const TrainOptions& options) {
-  constexpr int share = 5, shares = 2;  // two fifths of the run
   if (shows_first_objects(capture) || !options.deform.main || options.deform.kind != "nodes") return 0;
-  const int iterations = std::min(options.deform.find, options.iterations * shares / share);
+  const int iterations = std::min(options.deform.find, options.iterations / 5 * 2);
   const bool is_too_short = iterations < least_iterations || capture.train.size() < least_views;
   return is_too_short ? 0 : iterations;
 }
@@ -202,6 +202,7 @@ std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOpti
   TrainOptions small = options;
   small.capture.downscale *= factor;
   const Capture film = load_capture(capture.folder, small.capture);
+  require(film.train.size() == capture.train.size(), "a capture has the same views at any size", "");
   bool stopped = false;
   StillScene still(film, small, iterations, [&](int64_t done, int64_t all) {
     stopped = !told(done, all);
@@ -228,7 +229,7 @@ std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOpti
     const View& view = capture.train[k];
     if (!has_object_mask(capture, view)) found.masks.emplace(view.id, std::move(covers[k]));
   }
-  found.standing_points = still.standing(capture.points);
+  found.standing_points = still.standing(finite_points(capture.points));
   return found;
 }
 
@@ -265,7 +266,7 @@ void give_objects(const FoundObjects& found, Capture& capture) {
 void write_masks(const FoundMasks& masks, const std::filesystem::path& folder) {
   for (const auto& [id, mask] : masks) {
     const std::filesystem::path path = picture_of(folder, id);
-    std::filesystem::create_directories(path.parent_path());
+    make_folder(path.parent_path());
     write_png(path, mask);
   }
 }

@@ -94,18 +94,6 @@ Tensor<float> thinned(const Tensor<float>& points, int64_t limit, Random& random
   return kept;
 }
 
-Tensor<float> finite_points(const Tensor<float>& points) {
-  Tensor<float> kept(points.shape());
-  int64_t count = 0;
-  for (int64_t i = 0; i < points.dim(0); ++i) {
-    const float* p = points.row(i);
-    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))
-      std::copy_n(p, 3, kept.row(count++));
-  }
-  kept.resize({count, 3});
-  return kept;
-}
-
 // The range of one coordinate without its outermost half per cent on either side.
 Vec2<float> robust_range(std::vector<float> values) {
   std::sort(values.begin(), values.end());
@@ -123,6 +111,19 @@ void take_true_poses(const Capture& capture, Scene& scene) {
 }
 
 }  // namespace
+
+Tensor<float> finite_points(const Tensor<float>& points) {
+  if (points.empty()) return Tensor<float>({0, 3});
+  Tensor<float> kept(points.shape());
+  int64_t count = 0;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const float* p = points.row(i);
+    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))
+      std::copy_n(p, 3, kept.row(count++));
+  }
+  kept.resize({count, 3});
+  return kept;
+}
 
 Tensor<float> log_spacing(const Tensor<float>& points) {
   const Neighbours near = nearest_neighbours(points, neighbours_for_scale);
@@ -223,7 +224,7 @@ float half_diagonal(const Tensor<float>& points) {
 }
 
 float cloud_radius(const Tensor<float>& points) {
-  const Tensor<float> finite = points.empty() ? Tensor<float>({0, 3}) : finite_points(points);
+  const Tensor<float> finite = finite_points(points);
   const auto count = static_cast<size_t>(finite.dim(0));
   if (count == 0) return 1;
   const auto pick = [](std::vector<float>& values, size_t place) {
@@ -255,7 +256,7 @@ bool follows_bodies(const Capture& capture, const TrainOptions& options) {
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
   const int64_t limit = std::min(options.initial.max_points, options.density.max_surfels);
   // What no photograph shows teaches a main surfel nothing, and a mirror may still show it.
-  Tensor<float> points = capture.points.empty() ? Tensor<float>({0, 3}) : finite_points(capture.points);
+  Tensor<float> points = finite_points(capture.points);
   Tensor<float> seen =
       points_in_view(points, capture.train, options.render.raster_options(capture.extent).near_plane);
   InitialScene made{{}, points.dim(0), seen.dim(0)};

@@ -25,6 +25,9 @@ bool follows_bodies(const Capture& capture, const TrainOptions& options);
 // Throws InputError when there is no such place either.
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random);
 
+// Those of the points (P×3, or empty) whose coordinates are all finite, in their order.
+Tensor<float> finite_points(const Tensor<float>& points);
+
 // The logarithm of how far each of the points (P×3) is from its neighbours: the root mean square distance of
 // three.
 Tensor<float> log_spacing(const Tensor<float>& points);

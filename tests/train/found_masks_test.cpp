@@ -238,6 +238,23 @@ TEST_F(Films, ShowWhatMoves) {
   EXPECT_FALSE(Trainer(options, film, folder() / "run").scene().main_motion.has_value());
 }
 
+TEST_F(Films, GiveFinerPhotographsTheSameMasks) {
+  CaptureOptions half_size;
+  half_size.downscale = 2;
+  Capture film = load_capture(folder() / "without", half_size);
+  const View& view = film.train[0];
+  FoundMasks masks;
+  masks[view.id].resize({view.camera.height, view.camera.width});
+  for (int64_t i = 0; i < masks[view.id].size(); ++i) masks[view.id][i] = static_cast<uint8_t>(7 * i % 256);
+  give_objects({masks, {}}, film);
+  const FinePhotograph fine = load_fine_photograph(film, view, 64);
+  ASSERT_EQ(fine.coverage.dim(1), 2 * view.camera.width);
+  for (int64_t y = 0; y < fine.coverage.dim(0); ++y) {
+    for (int64_t x = 0; x < fine.coverage.dim(1); ++x)
+      ASSERT_FLOAT_EQ(fine.coverage(y, x), static_cast<float>(masks[view.id](y / 2, x / 2)) / 255);
+  }
+}
+
 TEST_F(Films, LeaveAStillSceneWithoutWhatMoves) {
   const Capture film = without(), truth = with();
   StillScene still(film, preset("cpu"), 300, always);
