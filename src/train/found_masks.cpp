@@ -10,6 +10,7 @@
 #include "base/robust.h"
 #include "capture/image_cache.h"
 #include "files/png.h"
+#include "train/box_mean.h"
 #include "train/initialise.h"
 #include "train/mask_parts.h"
 #include "train/random_walk.h"
@@ -24,24 +25,6 @@ constexpr int least_views = 10;
 constexpr float moves_above = 0.4F;
 
 float ramp(float value, float from, float to) { return std::clamp((value - from) / (to - from), 0.0F, 1.0F); }
-
-Tensor<float> square_means(const Tensor<float>& image, int64_t reach) {
-  const int64_t height = image.dim(0), width = image.dim(1);
-  Tensor<float> along({height, width}), result({height, width});
-  for (int64_t y = 0; y < height; ++y) {
-    for (int64_t x = 0; x < width; ++x) {
-      const int64_t from = std::max<int64_t>(0, x - reach), to = std::min(width - 1, x + reach);
-      for (int64_t at = from; at <= to; ++at) along(y, x) += image(y, at) / static_cast<float>(to - from + 1);
-    }
-  }
-  for (int64_t y = 0; y < height; ++y) {
-    const int64_t from = std::max<int64_t>(0, y - reach), to = std::min(height - 1, y + reach);
-    for (int64_t at = from; at <= to; ++at) {
-      for (int64_t x = 0; x < width; ++x) result(y, x) += along(at, x) / static_cast<float>(to - from + 1);
-    }
-  }
-  return result;
-}
 
 // f of each pixel's numbers.
 template <class F>
@@ -58,7 +41,7 @@ Tensor<float> difference(const Tensor<float>& still, const Tensor<float>& photog
   constexpr float darkest = 0.55F, brightest = 1.25F, rough = 0.6F;
   const int64_t height = still.dim(0), width = still.dim(1);
   const auto mean_of = [&](auto&& f, int64_t to_each_side) {
-    return square_means(per_pixel(height, width, f), to_each_side);
+    return box_mean(per_pixel(height, width, f), to_each_side);
   };
   const auto at = [](const Tensor<float>& image, int64_t i) { return load3<float>(&image[3 * i]); };
   const Tensor<float> size = mean_of([&](int64_t i) { return dot(at(still, i), at(still, i)); }, reach);
@@ -180,7 +163,7 @@ Tensor<float> moving_share(const StillScene::Look& still, const ViewImages& phot
   constexpr float same_to = 0.02F, undecided = 0.05F, differs_from = 0.13F;
   constexpr float weight = 0.3F, doubt = 2e-4F;
   const Tensor<float> off = difference(still.colour, photograph.colour);
-  const Tensor<float> agreement = square_means(still.agreement, 1);
+  const Tensor<float> agreement = box_mean(still.agreement, 1);
   const int64_t height = off.dim(0), width = off.dim(1);
   WalkTerms terms{Tensor<float>(off.shape()), Tensor<float>(off.shape()), Tensor<float>(off.shape()),
                   Tensor<float>(off.shape())};

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "math/spherical_harmonics.h"
 #include "scene/neighbours.h"
+#include "train/box_mean.h"
 #include "train/initialise.h"
 #include "train/trainer.h"
 
@@ -13,7 +14,6 @@ namespace traceflow {
 
 namespace {
 
-constexpr int64_t reach = 2;  // pixels to each side
 // Differences in [0, 1]. A pixel that differs by more teaches nothing; a photograph that differs by less
 // agrees.
 constexpr float teaches_below = 0.06F, agrees_below = 0.045F;
@@ -90,25 +90,13 @@ TrainOptions still(const TrainOptions& options, int iterations) {
 }  // namespace
 
 Tensor<float> mean_difference(const Tensor<float>& a, const Tensor<float>& b) {
-  const int64_t height = a.dim(0), width = a.dim(1);
-  Tensor<float> along({height, width, 3}), off({height, width});
-  parallel_for("still scene: compare rows", height, [&](int64_t y) {
-    for (int64_t x = 0; x < width; ++x) {
-      for (int64_t at = std::max<int64_t>(0, x - reach); at <= std::min(width - 1, x + reach); ++at) {
-        for (int64_t c = 0; c < 3; ++c) along(y, x, c) += a(y, at, c) - b(y, at, c);
-      }
-    }
-  });
-  parallel_for("still scene: compare columns", height, [&](int64_t y) {
-    const int64_t top = std::max<int64_t>(0, y - reach), bottom = std::min(height - 1, y + reach);
-    for (int64_t x = 0; x < width; ++x) {
-      Vec3<float> sum(0);
-      for (int64_t at = top; at <= bottom; ++at) sum += load3<float>(&along(at, x, 0));
-      const int64_t columns = std::min(width - 1, x + reach) - std::max<int64_t>(0, x - reach) + 1;
-      const Vec3<float> size = abs(sum) / static_cast<float>(columns * (bottom - top + 1));
-      off(y, x) = std::max({size.x, size.y, size.z});
-    }
-  });
+  constexpr int64_t reach = 2;  // pixels to each side
+  Tensor<float> signed_difference(a.shape());
+  for (int64_t i = 0; i < a.size(); ++i) signed_difference[i] = a[i] - b[i];
+  const Tensor<float> mean = box_mean(signed_difference, reach);
+  Tensor<float> off({a.dim(0), a.dim(1)});
+  for (int64_t i = 0; i < off.size(); ++i)
+    off[i] = std::max({std::abs(mean[3 * i]), std::abs(mean[3 * i + 1]), std::abs(mean[3 * i + 2])});
   return off;
 }
 

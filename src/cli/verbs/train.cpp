@@ -164,7 +164,7 @@ std::optional<FoundObjects> objects_for(Capture& capture, const TrainOptions& op
   std::optional<FoundObjects> found =
       find_objects(capture, options, iterations, [&](int64_t done, int64_t all) {
         if (!arguments.quiet) {
-          progress.show({"what moves", "iterations", done, all},
+          progress.show({"masks", "iterations", done, all},
                         std::chrono::duration<double>(Clock::now() - start).count());
         }
         return !stop;
