@@ -12,6 +12,7 @@
 #include "math/activation.h"
 #include "ops/motion/motion.h"
 #include "scene/neighbours.h"
+#include "train/inflation.h"
 #include "train/mask_parts.h"
 
 namespace traceflow {
@@ -33,8 +34,8 @@ constexpr double unrest_reach = 1.0 / 80;
 
 // Connected parts of a mask.
 struct Parts {
-  Tensor<int32_t> label;      // H×W, of the part that a pixel lies in or beside, -1 for none
-  std::vector<int64_t> area;  // pixels of each
+  Tensor<int32_t> label;                     // H×W, of the part that a pixel lies in or beside, -1 for none
+  std::vector<std::vector<int64_t>> pixels;  // of each
 };
 
 // Labels reach one pixel beyond the mask at a time.
@@ -59,17 +60,17 @@ Parts parts_of(const Tensor<uint8_t>& mask) {
   const int64_t height = mask.dim(0), width = mask.dim(1);
   Parts parts{Tensor<int32_t>({height, width}), {}};
   parts.label.fill(-1);
-  for (const std::vector<int64_t>& part : mask_parts(mask)) {
+  for (std::vector<int64_t>& part : mask_parts(mask)) {
     if (static_cast<int64_t>(part.size()) < least_pixels) continue;
-    for (const int64_t pixel : part) parts.label[pixel] = static_cast<int32_t>(parts.area.size());
-    parts.area.push_back(static_cast<int64_t>(part.size()));
+    for (const int64_t pixel : part) parts.label[pixel] = static_cast<int32_t>(parts.pixels.size());
+    parts.pixels.push_back(std::move(part));
   }
   const int64_t margin = std::max<int64_t>(1, std::llround(label_margin * static_cast<double>(width)));
   for (int64_t k = 0; k < margin; ++k) grow(parts.label);
   return parts;
 }
 
-// A surfel that projects into a part of a mask.
+// A point that projects into a part of a mask.
 struct Candidate {
   int64_t row;
   Vec2<float> pixel;
@@ -103,17 +104,83 @@ std::vector<int64_t> within_thickness(const std::vector<Candidate>& candidates, 
   return rows;
 }
 
-// Whether at least half of a part's surfels are points that were seen to stand still: what is behind a thing
-// that has no points itself.
-bool is_background(const Surfels& surfels, const std::vector<int64_t>& part, const Tensor<float>& standing) {
+// Whether at least half of a part's points were seen to stand still: what is behind a thing that has no
+// points itself.
+bool is_background(const Tensor<float>& position, const std::vector<int64_t>& part,
+                   const Tensor<float>& standing) {
   if (part.empty() || standing.empty()) return false;
   Tensor<float> points({static_cast<int64_t>(part.size()), 3});
   for (size_t k = 0; k < part.size(); ++k)
-    std::copy_n(surfels.position.row(part[k]), 3, points.row(static_cast<int64_t>(k)));
+    std::copy_n(position.row(part[k]), 3, points.row(static_cast<int64_t>(k)));
   const Neighbours nearest = nearest_of(standing, points, 1);
   int64_t stand = 0;
   for (const float distance2 : nearest.distance2.values()) stand += distance2 == 0 ? 1 : 0;
   return 2 * stand >= points.dim(0);
+}
+
+// Whether the front of a part's points lies behind what stands beside the part.
+bool is_behind(std::vector<Candidate> points, const std::optional<float>& beside) {
+  constexpr float farther = 1.08F;
+  if (points.empty() || !beside) return false;
+  const auto front = points.begin() + static_cast<std::ptrdiff_t>(points.size() / 10);
+  std::nth_element(points.begin(), front, points.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.z < b.z; });
+  return front->z > farther * *beside;
+}
+
+// A part of a mask, and the rows of the points on the thing that it shows.
+struct Thing {
+  std::vector<int64_t> pixels, rows;
+  bool has_points = true;  // of the capture
+  std::optional<float> depth_beside;
+};
+
+// position: the capture's points, `points` of them, and behind them such as were made up for things that have
+// none.
+std::vector<Thing> things_in(const Capture& capture, const View& view, const Tensor<float>& position,
+                             int64_t points) {
+  const std::shared_ptr<const ViewImages> images = load_images(capture, view);
+  Parts parts = parts_of(images->mask);
+  std::vector<std::vector<Candidate>> candidates(parts.pixels.size());
+  std::vector<std::vector<int64_t>> made_up(parts.pixels.size());
+  std::vector<int64_t> in_mask(parts.pixels.size());
+  for (int64_t i = 0; i < position.dim(0); ++i) {
+    const Vec3<float> point = load3<float>(position.row(i));
+    if (!view.camera.sees(point)) continue;
+    const Vec3<float> at = view.camera.point_in_camera(point);
+    const Vec2<float> pixel = view.camera.project(at);
+    const auto row = static_cast<int64_t>(pixel.y), column = static_cast<int64_t>(pixel.x);
+    if (parts.label(row, column) < 0) continue;
+    const auto part = static_cast<size_t>(parts.label(row, column));
+    if (i >= points) {
+      made_up[part].push_back(i);
+      continue;
+    }
+    candidates[part].push_back({i, pixel, at.z});
+    in_mask[part] += images->mask(row, column) != 0 ? 1 : 0;
+  }
+  std::vector<Thing> things;
+  for (size_t part = 0; part < candidates.size(); ++part) {
+    Thing thing;
+    thing.pixels = std::move(parts.pixels[part]);
+    thing.rows = within_thickness(candidates[part], static_cast<int64_t>(thing.pixels.size()), view.camera);
+    thing.depth_beside = depth_beside(thing.pixels, images->mask, view.camera, position);
+    thing.has_points = in_mask[part] >= least_surfels && !is_behind(candidates[part], thing.depth_beside) &&
+                       !is_background(position, thing.rows, capture.standing_points);
+    if (!thing.has_points) thing.rows = std::move(made_up[part]);
+    things.push_back(std::move(thing));
+  }
+  return things;
+}
+
+// The first view that has a mask; null where none has.
+const View* earliest_with_mask(const Capture& capture) {
+  const View* earliest = nullptr;
+  for (const View& view : capture.train) {
+    if (earliest != nullptr && view.time >= earliest->time) continue;
+    if (!load_images(capture, view)->mask.empty()) earliest = &view;
+  }
+  return earliest;
 }
 
 Tensor<float> times_of(const std::vector<View>& views) {
@@ -204,32 +271,28 @@ void make_solid(const Motion& motion, Surfels& surfels) {
   }
 }
 
-std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels) {
-  const View* earliest = nullptr;
-  for (const View& view : capture.train) {
-    if (earliest != nullptr && view.time >= earliest->time) continue;
-    if (!load_images(capture, view)->mask.empty()) earliest = &view;
+Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>& points) {
+  constexpr int64_t most_points = 1500;  // of a thing
+  std::vector<float> made;
+  if (const View* const first = earliest_with_mask(capture)) {
+    for (const Thing& thing : things_in(capture, *first, points, points.dim(0))) {
+      if (thing.has_points || !thing.depth_beside) continue;
+      const Tensor<float> surface = inflated(thing.pixels, first->camera, *thing.depth_beside, most_points);
+      made.insert(made.end(), surface.values().begin(), surface.values().end());
+    }
   }
-  if (earliest == nullptr) return std::nullopt;
-  const View& first = *earliest;
-  const Parts parts = parts_of(load_images(capture, first)->mask);
-  std::vector<std::vector<Candidate>> candidates(parts.area.size());
-  for (int64_t i = 0; i < surfels.count(); ++i) {
-    const Vec3<float> point = load3<float>(surfels.position.row(i));
-    if (!first.camera.sees(point)) continue;
-    const Vec3<float> at = first.camera.point_in_camera(point);
-    const Vec2<float> pixel = first.camera.project(at);
-    const int32_t part = parts.label(static_cast<int64_t>(pixel.y), static_cast<int64_t>(pixel.x));
-    if (part >= 0) candidates[static_cast<size_t>(part)].push_back({i, pixel, at.z});
-  }
+  Tensor<float> result({static_cast<int64_t>(made.size()) / 3, 3});
+  std::copy(made.begin(), made.end(), result.data());
+  return result;
+}
+
+std::optional<Motion> find_bodies(const Capture& capture, int64_t points, Surfels& surfels) {
+  const View* const first = earliest_with_mask(capture);
+  if (first == nullptr) return std::nullopt;
   std::vector<std::vector<int64_t>> rows;
-  for (size_t part = 0; part < candidates.size(); ++part) {
-    rows.push_back(within_thickness(candidates[part], parts.area[part], first.camera));
+  for (Thing& thing : things_in(capture, *first, surfels.position, points)) {
+    if (static_cast<int64_t>(thing.rows.size()) >= least_surfels) rows.push_back(std::move(thing.rows));
   }
-  std::erase_if(rows, [&](const auto& part) {
-    return static_cast<int64_t>(part.size()) < least_surfels ||
-           is_background(surfels, part, capture.standing_points);
-  });
   std::stable_sort(rows.begin(), rows.end(),
                    [](const auto& a, const auto& b) { return a.size() > b.size(); });
   if (rows.size() > static_cast<size_t>(most_bodies)) rows.resize(static_cast<size_t>(most_bodies));

@@ -19,11 +19,16 @@ inline constexpr float solid_opacity = 0.95F;
 // picture has shown yet stick out when they come to the rim: silhouettes then push the body away.
 void make_solid(const Motion& motion, Surfels& surfels);
 
-// A body for each connected part of the earliest mask: it carries the surfels that project into
-// it and lie no farther behind its front than it is wide, unless most of these are standing points. Sets
-// surfels.body and returns bodies that stand still at the times of the training views; nothing where no part
-// has enough surfels.
-std::optional<Motion> find_bodies(const Capture& capture, Surfels& surfels);
+// Points (P×3) of an inflated surface (train/inflation.h) for each part of the earliest mask that shows a
+// thing without points: fewer than 24 of `points` (P×3) lie in it, or what lies there is farther away than
+// what stands beside it, or most of it are standing points.
+Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>& points);
+
+// A body for each connected part of the earliest mask. It carries the surfels that project into the part and
+// lie no farther behind its front than it is wide; of a thing without points it carries those that stand at
+// points made up for it, which are surfels from row `points` on. Sets surfels.body and returns bodies that
+// stand still at the times of the training views; nothing where no part has enough surfels.
+std::optional<Motion> find_bodies(const Capture& capture, int64_t points, Surfels& surfels);
 
 // Lets carried surfels go that their body takes out of the masks of the views up to the time
 // `latest`: they lay behind it, or beside it. surfels and motion on the CPU. Returns how many.

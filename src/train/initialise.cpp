@@ -94,6 +94,13 @@ Tensor<float> thinned(const Tensor<float>& points, int64_t limit, Random& random
   return kept;
 }
 
+Tensor<float> joined(const Tensor<float>& a, const Tensor<float>& b) {
+  Tensor<float> both({a.dim(0) + b.dim(0), 3});
+  std::copy_n(a.data(), a.size(), both.data());
+  std::copy_n(b.data(), b.size(), both.data() + a.size());
+  return both;
+}
+
 // The range of one coordinate without its outermost half per cent on either side.
 Vec2<float> robust_range(std::vector<float> values) {
   std::sort(values.begin(), values.end());
@@ -259,7 +266,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   Tensor<float> points = finite_points(capture.points);
   Tensor<float> seen =
       points_in_view(points, capture.train, options.render.raster_options(capture.extent).near_plane);
-  InitialScene made{{}, points.dim(0), seen.dim(0)};
+  InitialScene made{{}, points.dim(0), seen.dim(0), 0};
   if (seen.dim(0) == 0) {
     constexpr int64_t random_points = 100000;
     seen = points_in_common_view(capture.train, capture.extent, std::min(limit, random_points), random);
@@ -273,7 +280,12 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   scene.specular = options.specular;
   scene.normalisation = capture.normalisation;
   scene.extent = capture.extent;
-  scene.main = surfels_at_points(thinned(seen, limit, random), options.initial, random);
+  Tensor<float> made_up({0, 3});
+  if (made.points_in_view > 0 && follows_bodies(capture, options))
+    made_up = points_on_bare_things(capture, seen);
+  const Tensor<float> kept = thinned(seen, std::max<int64_t>(0, limit - made_up.dim(0)), random);
+  made.at_points = kept.dim(0);
+  scene.main = surfels_at_points(joined(kept, made_up), options.initial, random);
   // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
   // mirrors grew into one before the camera, which can show any scene.
   const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks &&
@@ -283,7 +295,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
     if (options.initial.colours_from_views) set_colours(scene.main, sightings);
     if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
   }
-  if (follows_bodies(capture, options)) scene.main_motion = find_bodies(capture, scene.main);
+  if (follows_bodies(capture, options)) scene.main_motion = find_bodies(capture, made.at_points, scene.main);
   if (options.deform.track.true_poses) take_true_poses(capture, scene);
   if (scene.main_motion) make_solid(*scene.main_motion, scene.main);
   if (options.deform.main)

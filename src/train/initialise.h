@@ -12,6 +12,7 @@ struct InitialScene {
   Scene scene;
   int64_t points = 0;          // of the capture, finite
   int64_t points_in_view = 0;  // that some training view sees
+  int64_t at_points = 0;       // main surfels that stand at points; those behind them at points made up
 };
 
 // Whether a training view has a mask of the objects, be it the capture's or one that was found.

@@ -122,7 +122,6 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       memory_(plan_memory({options_, device, largest_view(capture_)})),
       targets_(device, memory_.image_bytes),
       scene_(scene_on(device, begin(initial_scene(capture_, within(options, memory_.caps), random_)))),
-      initial_main_count_(scene_.main.count()),
       optimiser_(scene_),
       main_density_("main", options.density, scene_.main.count(), device),
       environment_density_("environment", options.environment_density, scene_.environment.count(), device),
@@ -140,6 +139,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
 Scene Trainer::begin(InitialScene made) {
   points_ = made.points;
   points_in_view_ = made.points_in_view;
+  initial_main_count_ = made.at_points;
   return std::move(made.scene);
 }
 

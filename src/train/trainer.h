@@ -183,8 +183,9 @@ class Trainer {
   MemoryPlan memory_;
   Targets targets_;
   int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
+  // Main surfels at these points; those made up, or added while bodies are followed, come after.
+  int64_t initial_main_count_ = 0;
   Scene scene_;
-  int64_t initial_main_count_;  // at the start of the run; those added while bodies are followed come after
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
   static constexpr int bonds_each = 8;  // of a surfel

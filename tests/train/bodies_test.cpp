@@ -180,6 +180,61 @@ void expect_to_be_followed(const Capture& capture) {
 
 TEST(Tracker, FollowsBodiesFromTimeToTime) { expect_to_be_followed(load_capture(tumbling(), {})); }
 
+// The capture without the points that its first view sees in its mask or beside it.
+Capture without_points_of_things() {
+  Capture capture = load_capture(tumbling(), {});
+  const View& first = capture.train.front();
+  const Tensor<uint8_t> mask = load_images(capture, first)->mask;
+  std::vector<float> left;
+  for (int64_t i = 0; i < capture.points.dim(0); ++i) {
+    const Vec3<float> x = load3<float>(capture.points.row(i));
+    if (first.camera.sees(x)) {
+      const Vec2<float> at = first.camera.project(first.camera.point_in_camera(x));
+      bool is_beside = false;
+      for (const float y : {at.y - 2, at.y, at.y + 2}) {
+        for (const float column : {at.x - 2, at.x, at.x + 2})
+          is_beside |= mask(std::clamp<int64_t>(static_cast<int64_t>(y), 0, mask.dim(0) - 1),
+                            std::clamp<int64_t>(static_cast<int64_t>(column), 0, mask.dim(1) - 1)) != 0;
+      }
+      if (is_beside) continue;
+    }
+    left.insert(left.end(), capture.points.row(i), capture.points.row(i) + 3);
+  }
+  capture.points.reset({static_cast<int64_t>(left.size()) / 3, 3});
+  std::copy(left.begin(), left.end(), capture.points.data());
+  return capture;
+}
+
+TEST(Bodies, ThingsWithoutPointsGetAnInflatedSurfaceWhereTheyAre) {
+  Tumbling at;
+  const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
+  const Capture bare = without_points_of_things();
+  ASSERT_LT(bare.points.dim(0), at.capture.points.dim(0) - 500);
+  Random random(1);
+  at.scene = initial_scene(bare, preset("cpu"), random).scene;
+  ASSERT_TRUE(at.scene.main_motion);
+  ASSERT_EQ(at.scene.main_motion->bodies(), 2);
+  const Vec3<double> eye(bare.train.front().camera.position);
+  for (const int32_t body : {0, 1}) {
+    const auto points = true_points(at.capture, *truth, thing_of(at, *truth, body), 0);
+    Vec3<double> middle(0), carried_middle(0);
+    for (const Vec3<double>& p : points) middle += p / static_cast<double>(points.size());
+    int64_t carried = 0;
+    for (int64_t i = 0; i < at.scene.main.count(); ++i) {
+      if (at.scene.main.body[i] != body) continue;
+      ++carried;
+      carried_middle += load3<double>(at.scene.main.position.row(i));
+    }
+    ASSERT_GT(carried, 100);
+    carried_middle /= static_cast<double>(carried);
+    // Where it is seen, and as far away as what it stands on.
+    EXPECT_GT(dot(normalize(carried_middle - eye), normalize(middle - eye)), std::cos(0.02));
+    EXPECT_NEAR(length(carried_middle - eye) / length(middle - eye), 1, 0.15);
+  }
+}
+
+TEST(Tracker, FollowsThingsWithoutPoints) { expect_to_be_followed(without_points_of_things()); }
+
 // The capture with masks of training views changed: by f(its place in time, mask).
 template <class F>
 Capture with_masks(const std::string& name, F&& change) {
