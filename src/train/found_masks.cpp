@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "base/atomic_file.h"
 #include "base/parallel.h"
-#include "base/robust.h"
 #include "capture/image_cache.h"
 #include "files/png.h"
 #include "train/box_mean.h"
@@ -127,23 +125,6 @@ bool shows_first_objects(const Capture& capture) {
   });
 }
 
-// The pixels that masks of a film's training views cover (255 a pixel), each camera's in the order of time.
-std::vector<std::vector<double>> areas_of(const Capture& film, const std::vector<Tensor<uint8_t>>& masks) {
-  std::vector<size_t> order(masks.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return film.train[a].time < film.train[b].time; });
-  std::map<std::string, std::vector<double>> cameras;
-  for (const size_t k : order) {
-    const int64_t sum = std::accumulate(masks[k].values().begin(), masks[k].values().end(), int64_t{0});
-    cameras[film.images->source(film.train[k].id).rig_camera].push_back(static_cast<double>(sum) / 255);
-  }
-  std::vector<std::vector<double>> areas;
-  areas.reserve(cameras.size());
-  for (auto& [camera, of_camera] : cameras) areas.push_back(std::move(of_camera));
-  return areas;
-}
-
 std::filesystem::path picture_of(const std::filesystem::path& folder, const std::string& id) {
   return folder / (id + ".png");
 }
@@ -207,24 +188,12 @@ std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOpti
       },
       1);
   FoundObjects found;
-  found.flicker = flicker_of(areas_of(capture, covers));
   for (size_t k = 0; k < covers.size(); ++k) {
     const View& view = capture.train[k];
     if (!has_object_mask(capture, view)) found.masks.emplace(view.id, std::move(covers[k]));
   }
   found.standing_points = still.standing(finite_points(capture.points));
   return found;
-}
-
-double flicker_of(const std::vector<std::vector<double>>& cameras) {
-  std::vector<double> changes;
-  const auto log_of = [](double area) { return std::log(area + 1); };
-  for (const std::vector<double>& areas : cameras) {
-    for (size_t k = 1; k + 1 < areas.size(); ++k) {
-      changes.push_back(std::abs(log_of(areas[k]) - (log_of(areas[k - 1]) + log_of(areas[k + 1])) / 2));
-    }
-  }
-  return median(std::move(changes));
 }
 
 double covered_share(const FoundMasks& masks) {

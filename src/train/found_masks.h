@@ -19,14 +19,7 @@ using FoundMasks = std::unordered_map<std::string, Tensor<uint8_t>>;
 struct FoundObjects {
   FoundMasks masks;
   Tensor<float> standing_points;  // those of the capture's points that are seen to stand still
-  double flicker = 0;             // of masks of all training views
 };
-
-// How much areas change back and forth between times: the median of |log a_k − (log a_k−1 + log a_k+1)/2|
-// over the times of each camera, whose areas (pixels) are in the order of time.
-double flicker_of(const std::vector<std::vector<double>>& cameras);
-// Masks that flicker by more show parts of things that stand, or parts of things alone.
-inline constexpr double most_flicker = 0.025;
 
 // For how many iterations a still scene is trained to find them; 0 where the options or the capture say that
 // there is nothing to look for. A run that is too short finds nothing.

@@ -169,8 +169,9 @@ const View& Trainer::draw_view() {
       std::minmax_element(capture_.train.begin(), capture_.train.end(),
                           [](const View& a, const View& b) { return a.time < b.time; });
   // Bodies have been followed through all times.
-  const double latest =
-      scene_.main_motion ? last->time : schedule_.latest_time(iteration_, first->time, last->time);
+  const double latest = scene_.main_motion && carries_
+                            ? last->time
+                            : schedule_.latest_time(iteration_, first->time, last->time);
   for (;;) {
     const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
     if (view.time <= latest || view.time == first->time) return view;
@@ -191,7 +192,8 @@ LossTerms Trainer::step() {
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
-  request.silhouette = scene_.main_motion && options_.loss.silhouette > 0 && !target.coverage.empty();
+  request.silhouette =
+      scene_.main_motion && carries_ && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);
   const bool bodies_move = trainable.main && scene_.main_motion && !now.goes_on;
   trainable.main_motion = bodies_move && !options_.deform.track.true_poses;

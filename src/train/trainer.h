@@ -107,10 +107,16 @@ class Trainer {
   void follow_again();
   // What lies behind a body may have been taken for a part of it: the times up to this one tell.
   void let_strays_go(int64_t key);
+  // What bodies become when the film has been followed.
+  void settle();
+  // Bodies that do not fit carry nothing: a field moves all that moves.
+  void let_everything_go();
+  // Makes a beginning of the surfels that are no longer carried as `carried` says. Everything on the CPU.
+  void begin_anew(const Tensor<int32_t>& carried, Surfels main);
   // What no body carries stands still, unless the pictures are far from the photographs there.
   void let_stand();
   // Gives bodies nodes, so that they may bend, where silhouettes get worse by much after the first time.
-  void let_bend();
+  void let_bend(const std::vector<double>& misfits);
   // From then on the light on what stands still may change.
   void let_light_change();
   // Spreads the gradient of poses over times that are near; none at the first.
@@ -120,6 +126,8 @@ class Trainer {
 
   // How far the bodies' silhouettes are off in a view, as a share of the mask's area; none without a mask.
   std::optional<double> silhouette_misfit(const View& view);
+  // In some views, in the order of time.
+  std::vector<double> silhouette_misfits();
   const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();
@@ -185,6 +193,7 @@ class Trainer {
   int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
   // Main surfels at these points; those made up, or added while bodies are followed, come after.
   int64_t initial_main_count_ = 0;
+  bool carries_ = true;  // bodies carry something
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;

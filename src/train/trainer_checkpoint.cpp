@@ -140,6 +140,8 @@ void Trainer::resume() {
   initial_main_count_ = file.metadata.contains("initial_main_count")
                             ? static_cast<int64_t>(count_in(file, "initial_main_count"))
                             : scene_.main.count();
+  const Tensor<int32_t> body = scene_.main.body.on(Device::cpu);
+  carries_ = std::any_of(body.values().begin(), body.values().end(), [](int32_t b) { return b >= 0; });
   // Drawn with as many surfels as there was memory for then.
   const bool tells_radius = file.metadata.contains("environment_radius");
   environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -18,6 +20,14 @@ namespace {
 // Of times that are known better now than when they were new.
 constexpr int few_steps = 3;
 constexpr double little_blur = 0.35;
+
+// Silhouettes that are off by more, as a share of the masks' area, are not of what the masks show.
+constexpr double most_misfit = 1.0 / 3;
+
+double mean_of(const std::vector<double>& values) {
+  if (values.empty()) return 0;
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
 
 }  // namespace
 
@@ -48,12 +58,24 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
     part_bodies(now.key);
     if (options_.deform.track.new_surface) made = new_surface(now.key);
   }
-  if (now.refines || has_come_to_the_end) follow_again();
+  if ((now.refines && carries_) || has_come_to_the_end) follow_again();
   if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);
-  if (has_come_to_the_end) let_stand();
-  if (has_come_to_the_end && options_.deform.bend.nodes > 0) let_bend();
-  if (has_come_to_the_end && options_.deform.lighting.cells > 0) let_light_change();
+  if (has_come_to_the_end) settle();
   return made;
+}
+
+void Trainer::settle() {
+  const std::vector<double> misfits = silhouette_misfits();
+  if (mean_of(misfits) > most_misfit) {
+    warn(
+        fmt::format("the bodies' silhouettes are off by {:.0f}% of the masks' area: a field moves what moves",
+                    100 * mean_of(misfits)));
+    let_everything_go();
+  }
+  let_stand();
+  if (!carries_) return;
+  if (options_.deform.bend.nodes > 0) let_bend(misfits);
+  if (options_.deform.lighting.cells > 0) let_light_change();
 }
 
 void Trainer::follow_again() {
@@ -127,6 +149,18 @@ void Trainer::let_strays_go(int64_t key) {
   const Motion motion = scene_.main_motion->on(Device::cpu);
   const Tensor<int32_t> carried = main.body;
   release_strays(capture_, motion, motion.time[key], main);
+  begin_anew(carried, std::move(main));
+}
+
+void Trainer::let_everything_go() {
+  Surfels main = scene_.main.on(Device::cpu);
+  const Tensor<int32_t> carried = main.body;
+  main.body.fill(moved_by_field);
+  begin_anew(carried, std::move(main));
+  carries_ = false;
+}
+
+void Trainer::begin_anew(const Tensor<int32_t>& carried, Surfels main) {
   // A released point of the capture stands still where it is, and begins as what no body carried. New surface
   // was never seen to stand still.
   constexpr float unseen = -8;
@@ -177,7 +211,7 @@ void Trainer::hold_nodes() {
   nodes::hold_first(gradient_.main_nodes);
 }
 
-void Trainer::let_bend() {
+std::vector<double> Trainer::silhouette_misfits() {
   constexpr size_t most_views = 20;
   std::vector<const View*> views;
   for (const View& view : capture_.train) views.push_back(&view);
@@ -188,9 +222,12 @@ void Trainer::let_bend() {
   for (size_t k = 0; k < views.size(); k += step) {
     if (const std::optional<double> misfit = silhouette_misfit(*views[k])) misfits.push_back(*misfit);
   }
+  return misfits;
+}
+
+void Trainer::let_bend(const std::vector<double>& misfits) {
   const BendOptions& bend = options_.deform.bend;
-  const double sum = std::accumulate(misfits.begin(), misfits.end(), 0.0);
-  if (misfits.empty() || sum <= bend.misfit * misfits.front() * static_cast<double>(misfits.size())) return;
+  if (misfits.empty() || mean_of(misfits) <= bend.misfit * misfits.front()) return;
   const Nodes nodes =
       place_nodes(scene_.main_motion->on(Device::cpu), scene_.main.on(Device::cpu), bend.nodes, bend.every);
   if (nodes.count() == 0) return;

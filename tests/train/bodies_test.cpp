@@ -474,6 +474,45 @@ TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
 
 // Nodes lie among the surfels of their bodies, apart from each other, and change nothing before they are
 // trained.
+// Masks that no body can show: after the first time, a bar at one side of the picture or the other.
+TEST(Tracker, LetsBodiesGoThatDoNotShowWhatTheMasksShow) {
+  const Capture capture = with_masks("jumping_masks", [](size_t k, Tensor<uint8_t>& mask) {
+    if (k == 0) return;
+    const int64_t area =
+        std::count_if(mask.values().begin(), mask.values().end(), [](uint8_t m) { return m != 0; });
+    const int64_t bar = std::max<int64_t>(1, area / mask.dim(0));
+    mask.fill(0);
+    for (int64_t y = 0; y < mask.dim(0); ++y) {
+      for (int64_t x = 0; x < bar; ++x) mask(y, k % 2 == 0 ? x : mask.dim(1) - 1 - x) = 1;
+    }
+  });
+  const TrainOptions options = little_following();
+  const fs::path folder = fs::path(::testing::TempDir()) / ("let_go_" + std::to_string(::getpid()));
+  Trainer trainer(options, capture, folder);
+  const auto carries = [&] {
+    const Tensor<int32_t>& body = trainer.scene().main.body;
+    return std::any_of(body.values().begin(), body.values().end(), [](int32_t b) { return b >= 0; });
+  };
+  std::string warning;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* told = std::get_if<events::Warning>(&event)) warning = told->text;
+  });
+  while (carries() && trainer.iteration() < options.iterations) trainer.step();
+  EXPECT_LT(trainer.iteration(), options.iterations);
+  EXPECT_NE(warning.find("silhouettes"), std::string::npos) << warning;
+  // What stands still is told from what moves, and the rest of the run goes on, also where it is resumed.
+  const Tensor<int32_t>& body = trainer.scene().main.body;
+  EXPECT_GT(std::count(body.values().begin(), body.values().end(), stands_still), 100);
+  trainer.save();
+  Trainer resumed(options, capture, folder);
+  resumed.resume();
+  while (trainer.iteration() < options.iterations) {
+    const double loss = trainer.step().total;
+    EXPECT_TRUE(std::isfinite(loss));
+    ASSERT_EQ(resumed.step().total, loss);
+  }
+}
+
 TEST(Bodies, GetNodesThatAreSpreadOverThem) {
   Tumbling at;
   Surfels& main = at.scene.main;

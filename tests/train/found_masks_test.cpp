@@ -108,15 +108,6 @@ TEST(FoundMasks, ReachWhatTheStillSceneDoesNotKnow) {
   expect_box(moving_share(seen.still, seen.photograph));
 }
 
-TEST(FoundMasks, FlickerWhereTheirAreaGoesBackAndForth) {
-  EXPECT_EQ(flicker_of({}), 0);
-  EXPECT_EQ(flicker_of({{99, 99}}), 0);
-  // What grows evenly does not flicker.
-  EXPECT_NEAR(flicker_of({{99, 199, 399, 799}, {99, 49, 24}}), 0, 1e-12);
-  EXPECT_NEAR(flicker_of({{99, 199, 99, 199}}), std::log(2.0), 1e-12);
-  EXPECT_NEAR(flicker_of({{99, 99, 99, 99, 199}}), 0, 1e-12) << "once is no flicker";
-}
-
 TEST(MeanDifference, IsThatOfSquares) {
   Random random(3);
   Tensor<float> a({6, 9, 3}), b({6, 9, 3});

@@ -172,15 +172,12 @@ std::optional<FoundObjects> objects_for(Capture& capture, const TrainOptions& op
   progress.finish();
   if (!found) throw Exit{exit_interrupted};
   const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  const bool is_steady = found->flicker <= most_flicker || found->masks.size() < capture.train.size();
-  const std::string result = is_steady ? fmt::format("{:.1f}% of their pixels, as {} shows",
-                                                     100 * covered_share(found->masks), folder.string())
-                                       : "nothing that keeps its size";
   if (!arguments.quiet) {
-    std::cerr << fmt::format("found what moves in {} pictures without masks: {} ({})\n", found->masks.size(),
-                             result, duration_text(seconds));
+    std::cerr << fmt::format(
+        "found what moves in {} pictures without masks: {:.1f}% of their pixels, as {} shows ({})\n",
+        found->masks.size(), 100 * covered_share(found->masks), folder.string(), duration_text(seconds));
   }
-  return is_steady ? found : std::nullopt;
+  return found;
 }
 
 void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices,
