@@ -169,9 +169,8 @@ const View& Trainer::draw_view() {
       std::minmax_element(capture_.train.begin(), capture_.train.end(),
                           [](const View& a, const View& b) { return a.time < b.time; });
   // Bodies have been followed through all times.
-  const double latest = scene_.main_motion && carries_
-                            ? last->time
-                            : schedule_.latest_time(iteration_, first->time, last->time);
+  const double latest =
+      scene_.main_motion ? last->time : schedule_.latest_time(iteration_, first->time, last->time);
   for (;;) {
     const View& view = capture_.train[static_cast<size_t>(views_.draw(random_))];
     if (view.time <= latest || view.time == first->time) return view;
