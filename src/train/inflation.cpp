@@ -12,7 +12,8 @@ namespace traceflow {
 namespace {
 
 Vec2<float> middle_of(int64_t pixel, int64_t width) {
-  return {static_cast<float>(pixel % width) + 0.5F, static_cast<float>(pixel / width) + 0.5F};
+  const int64_t row = pixel / width, column = pixel % width;
+  return {static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F};
 }
 
 // The part's pixels that have a neighbour outside of it. The picture's border is none.

@@ -22,8 +22,8 @@ Camera<float> camera_of(int64_t height, int64_t width) {
 std::vector<int64_t> disc(const Camera<float>& camera, const Vec2<float>& centre, float radius) {
   std::vector<int64_t> pixels;
   for (int64_t i = 0; i < static_cast<int64_t>(camera.width) * camera.height; ++i) {
-    const Vec2<float> at(static_cast<float>(i % camera.width) + 0.5F,
-                         static_cast<float>(i / camera.width) + 0.5F);
+    const int64_t row = i / camera.width, column = i % camera.width;
+    const Vec2<float> at(static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F);
     if (length(at - centre) < radius) pixels.push_back(i);
   }
   return pixels;
