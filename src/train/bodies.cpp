@@ -128,10 +128,11 @@ bool is_behind(std::vector<Candidate> points, const std::optional<float>& beside
   return front->z > farther * *beside;
 }
 
-// A part of a mask, and the rows of the points on the thing that it shows.
+// A part of a mask, and the rows of points on the thing that it shows.
 struct Thing {
-  std::vector<int64_t> pixels, rows;
-  bool has_points = true;  // of the capture
+  std::vector<int64_t> pixels;
+  std::vector<int64_t> rows, made_up;  // of the capture, and not
+  bool is_bare = false;                // the capture's are too few, or behind it
   std::optional<float> depth_beside;
 };
 
@@ -142,7 +143,7 @@ std::vector<Thing> things_in(const Capture& capture, const View& view, const Ten
   const std::shared_ptr<const ViewImages> images = load_images(capture, view);
   Parts parts = parts_of(images->mask);
   std::vector<std::vector<Candidate>> candidates(parts.pixels.size());
-  std::vector<std::vector<int64_t>> made_up(parts.pixels.size());
+  std::vector<Thing> things(parts.pixels.size());
   std::vector<int64_t> in_mask(parts.pixels.size());
   for (int64_t i = 0; i < position.dim(0); ++i) {
     const Vec3<float> point = load3<float>(position.row(i));
@@ -153,22 +154,20 @@ std::vector<Thing> things_in(const Capture& capture, const View& view, const Ten
     if (parts.label(row, column) < 0) continue;
     const auto part = static_cast<size_t>(parts.label(row, column));
     if (i >= points) {
-      made_up[part].push_back(i);
+      things[part].made_up.push_back(i);
       continue;
     }
     candidates[part].push_back({i, pixel, at.z});
     in_mask[part] += images->mask(row, column) != 0 ? 1 : 0;
   }
-  std::vector<Thing> things;
-  for (size_t part = 0; part < candidates.size(); ++part) {
-    Thing thing;
+  for (size_t part = 0; part < things.size(); ++part) {
+    Thing& thing = things[part];
     thing.pixels = std::move(parts.pixels[part]);
     thing.rows = within_thickness(candidates[part], static_cast<int64_t>(thing.pixels.size()), view.camera);
     thing.depth_beside = depth_beside(thing.pixels, images->mask, view.camera, position);
-    thing.has_points = in_mask[part] >= least_surfels && !is_behind(candidates[part], thing.depth_beside) &&
-                       !is_background(position, thing.rows, capture.standing_points);
-    if (!thing.has_points) thing.rows = std::move(made_up[part]);
-    things.push_back(std::move(thing));
+    if (is_background(position, thing.rows, capture.standing_points)) thing.rows.clear();
+    thing.is_bare = thing.rows.empty() || in_mask[part] < least_surfels ||
+                    is_behind(candidates[part], thing.depth_beside);
   }
   return things;
 }
@@ -276,7 +275,7 @@ Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>&
   std::vector<float> made;
   if (const View* const first = earliest_with_mask(capture)) {
     for (const Thing& thing : things_in(capture, *first, points, points.dim(0))) {
-      if (thing.has_points || !thing.depth_beside) continue;
+      if (!thing.is_bare || !thing.depth_beside) continue;
       const Tensor<float> surface = inflated(thing.pixels, first->camera, *thing.depth_beside, most_points);
       made.insert(made.end(), surface.values().begin(), surface.values().end());
     }
@@ -291,7 +290,8 @@ std::optional<Motion> find_bodies(const Capture& capture, int64_t points, Surfel
   if (first == nullptr) return std::nullopt;
   std::vector<std::vector<int64_t>> rows;
   for (Thing& thing : things_in(capture, *first, surfels.position, points)) {
-    if (static_cast<int64_t>(thing.rows.size()) >= least_surfels) rows.push_back(std::move(thing.rows));
+    std::vector<int64_t>& chosen = thing.made_up.empty() ? thing.rows : thing.made_up;
+    if (static_cast<int64_t>(chosen.size()) >= least_surfels) rows.push_back(std::move(chosen));
   }
   std::stable_sort(rows.begin(), rows.end(),
                    [](const auto& a, const auto& b) { return a.size() > b.size(); });

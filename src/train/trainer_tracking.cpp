@@ -21,7 +21,7 @@ namespace {
 constexpr int few_steps = 3;
 constexpr double little_blur = 0.35;
 
-// Silhouettes that are off by more, as a share of the masks' area, are not of what the masks show.
+// Silhouettes that are off by more, as a share of the area of masks that were found, are of no bodies.
 constexpr double most_misfit = 1.0 / 3;
 
 double mean_of(const std::vector<double>& values) {
@@ -66,7 +66,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
 
 void Trainer::settle() {
   const std::vector<double> misfits = silhouette_misfits();
-  if (mean_of(misfits) > most_misfit) {
+  if (capture_.masks_are_found && mean_of(misfits) > most_misfit) {
     warn(
         fmt::format("the bodies' silhouettes are off by {:.0f}% of the masks' area: a field moves what moves",
                     100 * mean_of(misfits)));
