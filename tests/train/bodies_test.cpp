@@ -180,14 +180,15 @@ void expect_to_be_followed(const Capture& capture) {
 
 TEST(Tracker, FollowsBodiesFromTimeToTime) { expect_to_be_followed(load_capture(tumbling(), {})); }
 
-// The capture without the points that its first view sees in its mask or beside it.
-Capture without_points_of_things() {
+// The capture without the points that its first view sees in its mask or beside it, or with these so many
+// times as far away.
+Capture without_points_of_things(float farther = 0) {
   Capture capture = load_capture(tumbling(), {});
   const View& first = capture.train.front();
   const Tensor<uint8_t> mask = load_images(capture, first)->mask;
   std::vector<float> left;
   for (int64_t i = 0; i < capture.points.dim(0); ++i) {
-    const Vec3<float> x = load3<float>(capture.points.row(i));
+    Vec3<float> x = load3<float>(capture.points.row(i));
     if (first.camera.sees(x)) {
       const Vec2<float> at = first.camera.project(first.camera.point_in_camera(x));
       bool is_beside = false;
@@ -196,20 +197,19 @@ Capture without_points_of_things() {
           is_beside |= mask(std::clamp<int64_t>(static_cast<int64_t>(y), 0, mask.dim(0) - 1),
                             std::clamp<int64_t>(static_cast<int64_t>(column), 0, mask.dim(1) - 1)) != 0;
       }
-      if (is_beside) continue;
+      if (is_beside && farther == 0) continue;
+      if (is_beside) x = first.camera.position + farther * (x - first.camera.position);
     }
-    left.insert(left.end(), capture.points.row(i), capture.points.row(i) + 3);
+    left.insert(left.end(), {x.x, x.y, x.z});
   }
   capture.points.reset({static_cast<int64_t>(left.size()) / 3, 3});
   std::copy(left.begin(), left.end(), capture.points.data());
   return capture;
 }
 
-TEST(Bodies, ThingsWithoutPointsGetAnInflatedSurfaceWhereTheyAre) {
+void expect_inflated_surface(const Capture& bare) {
   Tumbling at;
   const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
-  const Capture bare = without_points_of_things();
-  ASSERT_LT(bare.points.dim(0), at.capture.points.dim(0) - 500);
   Random random(1);
   at.scene = initial_scene(bare, preset("cpu"), random).scene;
   ASSERT_TRUE(at.scene.main_motion);
@@ -232,6 +232,14 @@ TEST(Bodies, ThingsWithoutPointsGetAnInflatedSurfaceWhereTheyAre) {
     EXPECT_NEAR(length(carried_middle - eye) / length(middle - eye), 1, 0.15);
   }
 }
+
+TEST(Bodies, ThingsWithoutPointsGetAnInflatedSurfaceWhereTheyAre) {
+  const Capture bare = without_points_of_things();
+  ASSERT_LT(bare.points.dim(0), load_capture(tumbling(), {}).points.dim(0) - 500);
+  expect_inflated_surface(bare);
+}
+
+TEST(Bodies, PointsBehindAThingAreNotItsOwn) { expect_inflated_surface(without_points_of_things(1.6F)); }
 
 TEST(Tracker, FollowsThingsWithoutPoints) { expect_to_be_followed(without_points_of_things()); }
 
