@@ -282,8 +282,8 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   scene.extent = capture.extent;
   Tensor<float> made_up({0, 3});
   if (made.points_in_view > 0 && follows_bodies(capture, options))
-    made_up = points_on_bare_things(capture, seen);
-  const Tensor<float> kept = thinned(seen, std::max<int64_t>(0, limit - made_up.dim(0)), random);
+    made_up = thinned(points_on_bare_things(capture, seen), limit / 2, random);
+  const Tensor<float> kept = thinned(seen, limit - made_up.dim(0), random);
   made.at_points = kept.dim(0);
   scene.main = surfels_at_points(joined(kept, made_up), options.initial, random);
   // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as

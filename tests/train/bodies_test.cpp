@@ -18,70 +18,10 @@
 #include "train/mask_parts.h"
 #include "train/small_run.h"
 #include "train/tracker.h"
+#include "train/tumbling.h"
 
 namespace traceflow {
 namespace {
-
-// Two things that turn and come closer (docs/synth.md), every 24th of their way a picture.
-const fs::path& tumbling() {
-  static const fs::path folder = [] {
-    fs::path path = fs::path(::testing::TempDir()) / ("tumbling_" + std::to_string(::getpid()));
-    SynthOptions options;
-    options.scene = SynthScene::tumble;
-    options.frames = 25;
-    options.width = 120;
-    options.height = 68;
-    options.samples = 1;
-    options.points = 4000;
-    write_synthetic_capture(options, path);
-    return path;
-  }();
-  return folder;
-}
-
-struct Tumbling {
-  Capture capture = load_capture(tumbling(), {});
-  Scene scene;
-
-  explicit Tumbling(const std::string& kind = "nodes") {
-    TrainOptions options = preset("cpu");
-    options.deform.kind = kind;
-    Random random(1);
-    scene = initial_scene(capture, options, random).scene;
-  }
-};
-
-// The true points of a thing (scene units), at a time's index.
-std::vector<Vec3<double>> true_points(const Capture& capture, const MotionTruth& truth, int32_t object,
-                                      int64_t at) {
-  std::vector<Vec3<double>> points;
-  for (int64_t i = 0; i < truth.object.size(); ++i) {
-    if (truth.object[i] == object)
-      points.push_back(capture.normalisation.in_scene(load3<double>(&truth.points(at, i, 0))));
-  }
-  return points;
-}
-
-double least_distance(const Vec3<double>& x, const std::vector<Vec3<double>>& points) {
-  double least = 1e9;
-  for (const Vec3<double>& p : points) least = std::min(least, length(x - p));
-  return least;
-}
-
-// The thing that a body is: whose points its surfels are nearest to.
-int32_t thing_of(const Tumbling& at, const MotionTruth& truth, int32_t body) {
-  double best = 1e9;
-  int32_t thing = -1;
-  for (const int32_t object : {0, 1}) {
-    const double d = least_distance(load3<double>(at.scene.main_motion->centre.row(body)),
-                                    true_points(at.capture, truth, object, 0));
-    if (d < best) {
-      best = d;
-      thing = object;
-    }
-  }
-  return thing;
-}
 
 TEST(Bodies, AreTheThingsOfTheMask) {
   const Tumbling at;
@@ -136,112 +76,7 @@ TEST(Bodies, ThereAreNoneWithoutMasksOrWhereTheNetworkMovesSurfels) {
   EXPECT_TRUE(scene.main_field);
 }
 
-// How well bodies are followed a third of the way by masks and normals, and a shape that was trained on the
-// first picture for a moment.
-void expect_to_be_followed(const Capture& capture) {
-  Tumbling at;
-  const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
-  TrainOptions options = preset("cpu");
-  options.deform.kind = "nodes";
-  options.iterations = 400;
-  options.specular = Specular::none;
-  options.initial.max_points = options.density.max_surfels = 4000;
-  constexpr int64_t last = 12;
-  const int until = options.iterations / 8 + static_cast<int>(last) * options.deform.track.map_each;
-  Trainer trainer(options, capture, fs::path(::testing::TempDir()) / "followed");
-  while (trainer.iteration() < until) trainer.step();
-  at.scene.main_motion = trainer.scene().main_motion;
-  const Motion& motion = *at.scene.main_motion;
-  ASSERT_EQ(motion.bodies(), 2);
-  std::set<int32_t> things;
-  for (const int32_t body : {0, 1}) {
-    const int32_t thing = thing_of(at, *truth, body);
-    things.insert(thing);
-    const auto from = true_points(at.capture, *truth, thing, 0),
-               to = true_points(at.capture, *truth, thing, last);
-    const Similarity expected = fit_similarity(from, to);
-    const Vec3<double> centre = load3<double>(motion.centre.row(body)),
-                       shift = load3<double>(&motion.shift(body, last, 0));
-    const Mat3<double> turn = rotation_from_quaternion(load4<double>(&motion.rotation(body, last, 0)));
-    std::vector<double> moved, missed;
-    for (size_t i = 0; i < from.size(); ++i) {
-      moved.push_back(length(to[i] - from[i]));
-      missed.push_back(length(turn * (from[i] - centre) + centre + shift - to[i]));
-    }
-    std::sort(moved.begin(), moved.end());
-    std::sort(missed.begin(), missed.end());
-    EXPECT_LT(missed[missed.size() / 2], 0.6 * moved[moved.size() / 2]) << body;
-    EXPECT_LT(rotation_angle_deg(turn * transpose(expected.rotation)),
-              0.6 * rotation_angle_deg(expected.rotation))
-        << body;
-  }
-  EXPECT_EQ(things.size(), 2U);
-}
-
 TEST(Tracker, FollowsBodiesFromTimeToTime) { expect_to_be_followed(load_capture(tumbling(), {})); }
-
-// The capture without the points that its first view sees in its mask or beside it, or with these so many
-// times as far away.
-Capture without_points_of_things(float farther = 0) {
-  Capture capture = load_capture(tumbling(), {});
-  const View& first = capture.train.front();
-  const Tensor<uint8_t> mask = load_images(capture, first)->mask;
-  std::vector<float> left;
-  for (int64_t i = 0; i < capture.points.dim(0); ++i) {
-    Vec3<float> x = load3<float>(capture.points.row(i));
-    if (first.camera.sees(x)) {
-      const Vec2<float> at = first.camera.project(first.camera.point_in_camera(x));
-      bool is_beside = false;
-      for (const float y : {at.y - 2, at.y, at.y + 2}) {
-        for (const float column : {at.x - 2, at.x, at.x + 2})
-          is_beside |= mask(std::clamp<int64_t>(static_cast<int64_t>(y), 0, mask.dim(0) - 1),
-                            std::clamp<int64_t>(static_cast<int64_t>(column), 0, mask.dim(1) - 1)) != 0;
-      }
-      if (is_beside && farther == 0) continue;
-      if (is_beside) x = first.camera.position + farther * (x - first.camera.position);
-    }
-    left.insert(left.end(), {x.x, x.y, x.z});
-  }
-  capture.points.reset({static_cast<int64_t>(left.size()) / 3, 3});
-  std::copy(left.begin(), left.end(), capture.points.data());
-  return capture;
-}
-
-void expect_inflated_surface(const Capture& bare) {
-  Tumbling at;
-  const std::optional<MotionTruth> truth = load_motion_truth(at.capture);
-  Random random(1);
-  at.scene = initial_scene(bare, preset("cpu"), random).scene;
-  ASSERT_TRUE(at.scene.main_motion);
-  ASSERT_EQ(at.scene.main_motion->bodies(), 2);
-  const Vec3<double> eye(bare.train.front().camera.position);
-  for (const int32_t body : {0, 1}) {
-    const auto points = true_points(at.capture, *truth, thing_of(at, *truth, body), 0);
-    Vec3<double> middle(0), carried_middle(0);
-    for (const Vec3<double>& p : points) middle += p / static_cast<double>(points.size());
-    int64_t carried = 0;
-    for (int64_t i = 0; i < at.scene.main.count(); ++i) {
-      if (at.scene.main.body[i] != body) continue;
-      ++carried;
-      carried_middle += load3<double>(at.scene.main.position.row(i));
-    }
-    ASSERT_GT(carried, 100);
-    carried_middle /= static_cast<double>(carried);
-    // Where it is seen, and as far away as what it stands on.
-    EXPECT_GT(dot(normalize(carried_middle - eye), normalize(middle - eye)), std::cos(0.02));
-    EXPECT_NEAR(length(carried_middle - eye) / length(middle - eye), 1, 0.15);
-  }
-}
-
-TEST(Bodies, ThingsWithoutPointsGetAnInflatedSurfaceWhereTheyAre) {
-  const Capture bare = without_points_of_things();
-  ASSERT_LT(bare.points.dim(0), load_capture(tumbling(), {}).points.dim(0) - 500);
-  expect_inflated_surface(bare);
-}
-
-TEST(Bodies, PointsBehindAThingAreNotItsOwn) { expect_inflated_surface(without_points_of_things(1.6F)); }
-
-TEST(Tracker, FollowsThingsWithoutPoints) { expect_to_be_followed(without_points_of_things()); }
 
 // The capture with masks of training views changed: by f(its place in time, mask).
 template <class F>
