@@ -228,15 +228,19 @@ TrackWeights Tracker::weights(const Motion& motion, const TextureTrust& trust,
   return weights;
 }
 
+LooseTurns Tracker::loosen(PoseSolver& solver, const Motion& motion, const TextureTrust& trust) const {
+  LooseTurns loose;
+  if (options_.colour > 0) loose = trust.loose_turns(solver.turn_stiffness(weights(motion, {}, {})));
+  solver.loosen(loose, trust.without_mirrors(loose));
+  return loose;
+}
+
 void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
                     const PoseSteps& steps, const TextureTrust& trust) const {
   PoseSteps held = steps;
   held.hold_depth = steps.hold_depth || key == 0;
   PoseSolver solver = this->solver(main, nodes, motion, key, extent);
-  LooseTurns loose;
-  if (options_.colour > 0) loose = trust.loose_turns(solver.turn_stiffness(weights(motion, {}, {})));
-  const LooseTurns by_texture = trust.without_mirrors(loose);
-  solver.loosen(loose, by_texture);
+  const LooseTurns loose = loosen(solver, motion, trust), by_texture = trust.without_mirrors(loose);
   // Where bodies bend, what a photograph showed at rest is not known.
   if (nodes == nullptr && (any_turns(by_texture) || has_tracks())) {
     const std::vector<EarlierView> earlier = earlier_views(main, motion, key, extent);
@@ -244,6 +248,23 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
     compare_tracks(solver, earlier, motion, key);
   }
   solver.solve(weights(motion, trust, loose), held);
+}
+
+std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& motion, float extent,
+                                             const PoseSteps& steps, const TextureTrust& trust) const {
+  constexpr double most = 1.1;  // beyond it the first picture misleads
+  Motion moved = motion;
+  PoseSolver solver = this->solver(main, nullptr, moved, 0, extent);
+  const LooseTurns loose = loosen(solver, motion, trust);
+  solver.solve(weights(motion, trust, loose), steps);
+  const Vec3<double> eye(capture_.train[views_at(motion, 0).front()].camera.position);
+  const auto distance = [&](const Motion& of, int64_t b) {
+    return length(load3<double>(of.centre.row(b)) + load3<double>(&of.shift(b, 0, 0)) - eye);
+  };
+  std::vector<double> ratios;
+  for (int64_t b = 0; b < motion.bodies(); ++b)
+    ratios.push_back(std::clamp(distance(moved, b) / distance(motion, b), 1 / most, most));
+  return ratios;
 }
 
 void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,

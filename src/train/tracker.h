@@ -31,6 +31,10 @@ class Tracker {
   // far from that camera as the points are. nodes: null where bodies are rigid.
   void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
              const PoseSteps& steps, const TextureTrust& trust) const;
+  // How many times as far from the camera each rigid body would be at the first key if its distance were
+  // solved there as at other keys: how much larger than the first picture shows it all others have made it.
+  std::vector<double> distance_ratios(const Surfels& main, const Motion& motion, float extent,
+                                      const PoseSteps& steps, const TextureTrust& trust) const;
 
   // Makes bodies of parts of bodies (train/body_parts.h) that move by themselves: with poses of their own the
   // keys from 1 to `key` cost clearly less. Those poses are found anew. Returns how many bodies have been
@@ -51,6 +55,8 @@ class Tracker {
   Refollowed follow_again(const Surfels& main, Motion motion, int64_t key, int64_t body, float extent) const;
   TrackTarget target_of(const View& view) const;
   PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent) const;
+  // Tells the solver which turns are loose, where photographs decide turns; returns them.
+  LooseTurns loosen(PoseSolver& solver, const Motion& motion, const TextureTrust& trust) const;
   TrackWeights weights(const Motion& motion, const TextureTrust& trust, const LooseTurns& loose) const;
   bool has_tracks() const { return !capture_.tracks.empty() && options_.tracks > 0; }
   // An earlier key, and what a view of it shows of the bodies.

@@ -374,7 +374,7 @@ std::string Trainer::tell_iteration() {
     before_step_.motion = scene_.main_motion;
     before_step_.nodes = scene_.main_nodes;
     before_step_.lighting = scene_.lighting;
-    before_step_.body = scene_.main.body;
+    before_step_.main = scene_.main;
     before_step_.texture_trust = texture_trust_;
   }
   const Clock::time_point start = Clock::now();
@@ -489,7 +489,7 @@ void Trainer::step_back() {
       scene_.main_motion = before_step_.motion;
       scene_.main_nodes = before_step_.nodes;
       scene_.lighting = before_step_.lighting;
-      scene_.main.body = before_step_.body;
+      scene_.main = *before_step_.main;
       texture_trust_ = before_step_.texture_trust;
     }
   }

@@ -105,6 +105,9 @@ class Trainer {
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
+  // Makes rigid bodies as large as the first picture shows them, and the motion what fits. Everything on the
+  // CPU; the scene takes it over, all but the motion.
+  void keep_sizes(const Tracker& tracker, Surfels& main, Motion& motion);
   // What lies behind a body may have been taken for a part of it: the times up to this one tell.
   void let_strays_go(int64_t key);
   // What bodies become when the film has been followed.
@@ -167,7 +170,7 @@ class Trainer {
     std::optional<Motion> motion;
     std::optional<Nodes> nodes;
     std::optional<Lighting> lighting;
-    Tensor<int32_t> body;
+    std::optional<Surfels> main;
     TextureTrust texture_trust;
   };
   // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same

@@ -10,6 +10,7 @@
 #include "ops/motion/nodes.h"
 #include "train/bodies.h"
 #include "train/initialise.h"
+#include "train/rescale.h"
 #include "train/trainer.h"
 
 // The part of the loop that follows bodies from time to time before everything trains.
@@ -78,15 +79,29 @@ void Trainer::settle() {
   if (options_.deform.lighting.cells > 0) let_light_change();
 }
 
+void Trainer::keep_sizes(const Tracker& tracker, Surfels& main, Motion& motion) {
+  const std::optional<std::vector<Vec3<double>>> eyes = only_eyes(capture_, motion);
+  if (!eyes) return;
+  const TrackOptions& track = options_.deform.track;
+  const std::vector<double> ratios = tracker.distance_ratios(
+      main, motion, scene_.extent, {track.steps, little_blur * track.blur}, texture_trust_);
+  rescale_bodies(ratios, *eyes, main, motion);
+  scene_.main.position = main.position.on(device_);
+  scene_.main.log_scale = main.log_scale.on(device_);
+}
+
 void Trainer::follow_again() {
   if (options_.deform.track.true_poses) return;
-  const Surfels main = scene_.main.on(Device::cpu);
+  Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
   const Tracker tracker(track, options_.render, capture_);
   std::optional<Nodes> nodes;
   if (scene_.main_nodes) nodes = scene_.main_nodes->on(Device::cpu);
-  const PoseSteps steps{few_steps, little_blur * track.blur, tracking(iteration_).refines};
+  const bool refines = tracking(iteration_).refines;
+  // What bends may be larger at the first time than at others.
+  if (refines && !nodes) keep_sizes(tracker, main, motion);
+  const PoseSteps steps{few_steps, little_blur * track.blur, refines};
   for (int64_t key = 0; key < motion.keys(); ++key)
     tracker.solve(main, nodes ? &*nodes : nullptr, motion, key, scene_.extent, steps, texture_trust_);
   scene_.main_motion = motion.on(device_);

@@ -1,0 +1,173 @@
+#include "train/rescale.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "math/rotation_group.h"
+#include "ops/deform/deform.h"
+#include "ops/motion/motion.h"
+#include "train/ball_body.h"
+#include "train/tumbling.h"
+
+namespace traceflow {
+namespace {
+
+// A ball that turns and shifts, and a camera that moves beside it.
+struct MovingBall {
+  Surfels surfels = ball_body::ball();
+  Motion motion;
+  std::vector<Vec3<double>> eyes;
+
+  MovingBall() {
+    Tensor<float> pivot({1, 3});
+    store3(pivot.row(0), ball_body::centre + Vec3<double>(0.1, 0, -0.1));
+    motion = still_motion(pivot, tensor_of(std::vector<float>{0, 0.5, 1}));
+    for (int64_t key = 0; key < 3; ++key) {
+      const auto k = static_cast<double>(key);
+      const Vec4<double> turn = quaternion_exp(Vec3<double>(0.2, -0.3, 0.1) * k);
+      for (int c = 0; c < 4; ++c) motion.rotation(0, key, c) = static_cast<float>(turn[c]);
+      store3(&motion.shift(0, key, 0), Vec3<double>(0.1, -0.05, 0.3) * k);
+      eyes.push_back(Vec3<double>(0.05, 0.1, -0.1) * k);
+    }
+  }
+
+  raster::Output picture(int64_t key) const {
+    Camera<float> camera;
+    camera.width = camera.height = 64;
+    camera.focal_x = camera.focal_y = 90;
+    camera.centre_x = camera.centre_y = 32;
+    camera.position = Vec3<float>(eyes[static_cast<size_t>(key)]);
+    PosedSurfels posed;
+    deform::forward(surfels, nullptr, 0, {}, 0, field::Precision::fp32, posed, nullptr);
+    const motion::SavedPtr moved = motion::make_saved();
+    motion::forward(motion, surfels.body, motion.time[key], {}, posed, *moved);
+    raster::Output out;
+    raster::forward(posed, camera, {}, out, nullptr);
+    return out;
+  }
+};
+
+double area(const raster::Output& picture) {
+  return std::accumulate(picture.alpha.values().begin(), picture.alpha.values().end(), 0.0);
+}
+
+TEST(Rescale, ChangesTheFirstPictureAlone) {
+  constexpr double ratio = 1.08;
+  MovingBall at;
+  std::vector<raster::Output> before;
+  for (int64_t key = 0; key < 3; ++key) before.push_back(at.picture(key));
+  rescale_bodies({ratio}, at.eyes, at.surfels, at.motion);
+  for (int64_t key = 0; key < 3; ++key) {
+    const raster::Output& was = before[static_cast<size_t>(key)];
+    const raster::Output is = at.picture(key);
+    if (key == 0) {
+      EXPECT_NEAR(area(was) / area(is), ratio * ratio, 0.02);
+      continue;
+    }
+    for (int64_t i = 0; i < was.alpha.size(); ++i) {
+      ASSERT_NEAR(is.alpha[i], was.alpha[i], 2e-3) << key << " " << i;
+      ASSERT_NEAR(is.colour[3 * i], was.colour[3 * i], 2e-3) << key << " " << i;
+      if (was.alpha[i] < 0.9F) continue;
+      ASSERT_NEAR(was.depth[i] / is.depth[i], ratio, 2e-3) << key << " " << i;
+    }
+  }
+}
+
+TEST(Rescale, LeavesOthersAlone) {
+  MovingBall at;
+  at.surfels.body[0] = stands_still;
+  const Surfels before = at.surfels;
+  rescale_bodies({1.08}, at.eyes, at.surfels, at.motion);
+  EXPECT_EQ(load3<float>(at.surfels.position.row(0)), load3<float>(before.position.row(0)));
+  EXPECT_EQ(at.surfels.log_scale(0, 1), before.log_scale(0, 1));
+  EXPECT_NE(at.surfels.log_scale(1, 1), before.log_scale(1, 1));
+}
+
+TEST(Rescale, OnlyOneCameraAtEachTimeLeavesTheSizeOpen) {
+  Tumbling at;
+  const Motion& motion = *at.scene.main_motion;
+  const auto eyes = only_eyes(at.capture, motion);
+  ASSERT_TRUE(eyes);
+  ASSERT_EQ(eyes->size(), static_cast<size_t>(motion.keys()));
+  const auto view = std::ranges::find(at.capture.train, motion.time[3], &View::time);
+  EXPECT_EQ((*eyes)[3], Vec3<double>(view->camera.position));
+  at.capture.train.push_back(at.capture.train[2]);
+  EXPECT_FALSE(only_eyes(at.capture, motion));
+}
+
+// Bodies that are made larger are so much larger than the first picture shows them.
+TEST(Tracker, TheFirstPictureTellsHowLargeBodiesAre) {
+  constexpr double larger = 1.04;
+  Tumbling at;
+  at.scene.main.opacity_logit.fill(4);
+  TrackOptions options;
+  options.colour = 0;
+  const Tracker tracker(options, preset("cpu").render, at.capture);
+  const auto ratios = [&] {
+    return tracker.distance_ratios(at.scene.main, *at.scene.main_motion, at.scene.extent, {options.steps, 1},
+                                   {});
+  };
+  const std::vector<double> before = ratios();
+  const std::vector<double> smaller(before.size(), 1 / larger);
+  Motion motion = *at.scene.main_motion;
+  rescale_bodies(smaller, *only_eyes(at.capture, motion), at.scene.main, motion);
+  const std::vector<double> after = ratios();
+  ASSERT_EQ(before.size(), 2U);
+  for (const size_t b : {0, 1}) EXPECT_NEAR(after[b] / before[b], larger, 0.015) << b;
+}
+
+// The mean distance of each body's surfels from its centre.
+std::vector<double> sizes(const Scene& scene) {
+  const Motion& motion = *scene.main_motion;
+  std::vector<double> sum(static_cast<size_t>(motion.bodies())), count(sum.size());
+  for (int64_t i = 0; i < scene.main.count(); ++i) {
+    if (scene.main.body[i] < 0) continue;
+    const auto body = static_cast<size_t>(scene.main.body[i]);
+    sum[body] += length(load3<double>(scene.main.position.row(i)) -
+                        load3<double>(motion.centre.row(scene.main.body[i])));
+    ++count[body];
+  }
+  for (size_t b = 0; b < sum.size(); ++b) sum[b] /= count[b];
+  return sum;
+}
+
+// Where poses are solved again, rigid bodies become as large as the first picture shows them. Of bodies that
+// bend it tells nothing.
+TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
+  const Tumbling at;
+  for (const bool bends : {false, true}) {
+    TrainOptions options = preset("cpu");
+    options.iterations = 200;
+    options.specular = Specular::none;
+    options.initial.max_points = options.density.max_surfels = 2000;
+    options.density.from = options.iterations;
+    TrackOptions& track = options.deform.track;
+    track.map_each = 1;
+    track.again = 0;
+    track.colour = 0;
+    options.deform.bend.nodes = bends ? 4 : 0;
+    options.deform.bend.misfit = 0;
+    Trainer trainer(options, at.capture, fs::path(::testing::TempDir()) / "sizes");
+    while (trainer.iteration() < 2 * options.iterations / track.rounds) trainer.step();
+    const Scene& scene = trainer.scene();
+    ASSERT_EQ(scene.main_nodes.has_value(), bends);
+    const std::vector<double> ratios = Tracker(track, options.render, at.capture)
+                                           .distance_ratios(scene.main, *scene.main_motion, scene.extent,
+                                                            {track.steps, 0.35 * track.blur}, {});
+    const std::vector<double> before = sizes(scene);
+    trainer.step();
+    const std::vector<double> after = sizes(trainer.scene());
+    double most = 0;
+    for (size_t b = 0; b < before.size(); ++b) {
+      EXPECT_NEAR(before[b] / after[b], bends ? 1 : ratios[b], 5e-4) << b;
+      most = std::max(most, std::abs(ratios[b] - 1));
+    }
+    EXPECT_GT(most, 0.02);
+  }
+}
+
+}  // namespace
+}  // namespace traceflow
