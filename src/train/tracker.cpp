@@ -15,7 +15,8 @@ namespace traceflow {
 
 namespace {
 
-constexpr int widest = 160;
+// Small bodies' sizes are told on pictures as they are trained.
+constexpr int widest_for_sizes = 320;
 constexpr int keys_for_speed = 3;
 // How far back the turn lies that colour may take back.
 constexpr int64_t keys_for_trust = 5;
@@ -46,7 +47,7 @@ bool any_turns(const LooseTurns& loose) {
                      [](const Mat3<double>& turns) { return turns != Mat3<double>(0); });
 }
 
-int shrink_factor(const Camera<float>& camera) { return (camera.width + widest - 1) / widest; }
+int shrink_factor(const Camera<float>& camera, int widest) { return (camera.width + widest - 1) / widest; }
 
 // The turn of a body from one key to another, radians about world axes.
 Vec3<double> turn_between(const Motion& motion, int64_t body, int64_t first, int64_t last) {
@@ -90,9 +91,9 @@ void Tracker::predict(Motion& motion, int64_t key) {
   }
 }
 
-Camera<float> Tracker::drawn_camera(const View& view) const {
+Camera<float> Tracker::drawn_camera(const View& view, int widest) {
   Camera<float> camera = view.camera;
-  const int factor = shrink_factor(camera);
+  const int factor = shrink_factor(camera, widest);
   camera.width /= factor;
   camera.height /= factor;
   for (float* length : {&camera.focal_x, &camera.focal_y, &camera.centre_x, &camera.centre_y})
@@ -100,14 +101,14 @@ Camera<float> Tracker::drawn_camera(const View& view) const {
   return camera;
 }
 
-TrackTarget Tracker::target_of(const View& view) const {
+TrackTarget Tracker::target_of(const View& view, int widest) const {
   const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
-  const int64_t factor = shrink_factor(view.camera);
+  const int64_t factor = shrink_factor(view.camera, widest);
   TrackTarget target;
   target.camera = view.camera;
   if (images->coverage.empty()) return target;
   target.is_shrunk = factor > 1;
-  target.camera = drawn_camera(view);
+  target.camera = drawn_camera(view, widest);
   target.coverage = smaller(images->coverage, 1, factor);
   target.colour = smaller(images->colour, 3, factor);
   target.mask.resize(target.coverage.shape());
@@ -122,12 +123,12 @@ TrackTarget Tracker::target_of(const View& view) const {
   return target;
 }
 
-PoseSolver Tracker::solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key,
-                           float extent) const {
+PoseSolver Tracker::solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
+                           int widest) const {
   std::vector<TrackTarget> targets;
   for (const View& view : capture_.train) {
     if (view.time != motion.time[key]) continue;
-    TrackTarget target = target_of(view);
+    TrackTarget target = target_of(view, widest);
     if (!target.coverage.empty()) targets.push_back(std::move(target));
   }
   PoseSolver solver(main, nodes, motion, key, render_.raster_options(extent), std::move(targets));
@@ -254,7 +255,7 @@ std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& 
                                              const PoseSteps& steps, const TextureTrust& trust) const {
   constexpr double most = 1.1;  // beyond it the first picture misleads
   Motion moved = motion;
-  PoseSolver solver = this->solver(main, nullptr, moved, 0, extent);
+  PoseSolver solver = this->solver(main, nullptr, moved, 0, extent, widest_for_sizes);
   const LooseTurns loose = loosen(solver, motion, trust);
   solver.solve(weights(motion, trust, loose), steps);
   const Vec3<double> eye(capture_.train[views_at(motion, 0).front()].camera.position);

@@ -16,7 +16,7 @@ namespace traceflow {
 // depend on how their surface reflects: that they cover what the masks cover, and that their normals are
 // those of the capture's priors; and from colour and tracked points where they are trusted. The priors'
 // error, which estimators share over a picture, is turned away by one rotation a view, from what stands
-// still. Works on the CPU on pictures of at most 160 pixels' width.
+// still. Works on the CPU on small pictures.
 class Tracker {
  public:
   Tracker(const TrackOptions& options, const RenderOptions& render, const Capture& capture);
@@ -53,8 +53,11 @@ class Tracker {
     double pixels = 0;  // that a body shows, in all of them
   };
   Refollowed follow_again(const Surfels& main, Motion motion, int64_t key, int64_t body, float extent) const;
-  TrackTarget target_of(const View& view) const;
-  PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent) const;
+  // Pictures that are wider are shrunk.
+  static constexpr int usual_width = 160;
+  TrackTarget target_of(const View& view, int widest) const;
+  PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
+                    int widest = usual_width) const;
   // Tells the solver which turns are loose, where photographs decide turns; returns them.
   LooseTurns loosen(PoseSolver& solver, const Motion& motion, const TextureTrust& trust) const;
   TrackWeights weights(const Motion& motion, const TextureTrust& trust, const LooseTurns& loose) const;
@@ -78,7 +81,7 @@ class Tracker {
                       int64_t key) const;
   std::vector<size_t> views_at(const Motion& motion, int64_t key) const;
   // Of the pictures that are drawn of a view.
-  Camera<float> drawn_camera(const View& view) const;
+  static Camera<float> drawn_camera(const View& view, int widest = usual_width);
 
   TrackOptions options_;
   RenderOptions render_;

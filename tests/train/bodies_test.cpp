@@ -315,8 +315,6 @@ TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
   EXPECT_EQ(found.size(), 1U);
 }
 
-// Nodes lie among the surfels of their bodies, apart from each other, and change nothing before they are
-// trained.
 // Masks that were found and that no body can show: after the first time, a bar at one side of the picture or
 // the other.
 TEST(Tracker, LetsBodiesGoThatDoNotShowWhatTheMasksShow) {
@@ -356,6 +354,8 @@ TEST(Tracker, LetsBodiesGoThatDoNotShowWhatTheMasksShow) {
   }
 }
 
+// Nodes lie among the surfels of their bodies, apart from each other, and change nothing before they are
+// trained.
 TEST(Bodies, GetNodesThatAreSpreadOverThem) {
   Tumbling at;
   Surfels& main = at.scene.main;
