@@ -253,7 +253,8 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
 
 std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                              const PoseSteps& steps, const TextureTrust& trust) const {
-  constexpr double most = 1.1;  // beyond it the first picture misleads
+  constexpr double most = 1.1;       // beyond it the first picture misleads
+  constexpr double unknown = 0.004;  // true poses have ratios of up to 1.003
   Motion moved = motion;
   PoseSolver solver = this->solver(main, nullptr, moved, 0, extent, widest_for_sizes);
   const LooseTurns loose = loosen(solver, motion, trust);
@@ -263,8 +264,10 @@ std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& 
     return length(load3<double>(of.centre.row(b)) + load3<double>(&of.shift(b, 0, 0)) - eye);
   };
   std::vector<double> ratios;
-  for (int64_t b = 0; b < motion.bodies(); ++b)
-    ratios.push_back(std::clamp(distance(moved, b) / distance(motion, b), 1 / most, most));
+  for (int64_t b = 0; b < motion.bodies(); ++b) {
+    const double ratio = std::clamp(distance(moved, b) / distance(motion, b), 1 / most, most);
+    ratios.push_back(ratio - std::clamp(ratio - 1, -unknown, unknown));
+  }
   return ratios;
 }
 

@@ -33,6 +33,7 @@ class Tracker {
              const PoseSteps& steps, const TextureTrust& trust) const;
   // How many times as far from the camera each rigid body would be at the first key if its distance were
   // solved there as at other keys: how much larger than the first picture shows it all others have made it.
+  // What lies within 0.4 % is not known, and not counted.
   std::vector<double> distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                       const PoseSteps& steps, const TextureTrust& trust) const;
 

@@ -140,7 +140,7 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
   const Tumbling at;
   for (const bool bends : {false, true}) {
     TrainOptions options = preset("cpu");
-    options.iterations = 200;
+    options.iterations = 120;
     options.specular = Specular::none;
     options.initial.max_points = options.density.max_surfels = 2000;
     options.density.from = options.iterations;
