@@ -5,7 +5,8 @@
 
 namespace traceflow {
 
-std::optional<std::vector<Vec3<double>>> only_eyes(const Capture& capture, const Motion& motion) {
+std::optional<std::vector<Vec3<double>>> positions_of_single_cameras(const Capture& capture,
+                                                                     const Motion& motion) {
   std::vector<Vec3<double>> eyes;
   for (const float time : motion.time.values()) {
     const auto is_meant = [&](const View& view) { return view.time == time; };

@@ -13,7 +13,8 @@ namespace traceflow {
 
 // The position of the camera at each key of a motion; nothing where a key has no view or several, which tell
 // the distance themselves.
-std::optional<std::vector<Vec3<double>>> only_eyes(const Capture& capture, const Motion& motion);
+std::optional<std::vector<Vec3<double>>> positions_of_single_cameras(const Capture& capture,
+                                                                     const Motion& motion);
 
 // Divides by ratio[b] the size of rigid body b, about its centre, and at all keys but the first its distance
 // from the camera: there the camera sees the same as before. eyes: of each key, scene units. On the CPU.

@@ -16,7 +16,7 @@ namespace traceflow {
 // depend on how their surface reflects: that they cover what the masks cover, and that their normals are
 // those of the capture's priors; and from colour and tracked points where they are trusted. The priors'
 // error, which estimators share over a picture, is turned away by one rotation a view, from what stands
-// still. Works on the CPU on small pictures.
+// still. Works on the CPU, on pictures of at most 160 pixels' width (320 for distance_ratios).
 class Tracker {
  public:
   Tracker(const TrackOptions& options, const RenderOptions& render, const Capture& capture);

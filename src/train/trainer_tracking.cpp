@@ -80,7 +80,7 @@ void Trainer::settle() {
 }
 
 void Trainer::keep_sizes(const Tracker& tracker, Surfels& main, Motion& motion) {
-  const std::optional<std::vector<Vec3<double>>> eyes = only_eyes(capture_, motion);
+  const std::optional<std::vector<Vec3<double>>> eyes = positions_of_single_cameras(capture_, motion);
   if (!eyes) return;
   const TrackOptions& track = options_.deform.track;
   const std::vector<double> ratios = tracker.distance_ratios(

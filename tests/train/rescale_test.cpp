@@ -89,13 +89,13 @@ TEST(Rescale, LeavesOthersAlone) {
 TEST(Rescale, OnlyOneCameraAtEachTimeLeavesTheSizeOpen) {
   Tumbling at;
   const Motion& motion = *at.scene.main_motion;
-  const auto eyes = only_eyes(at.capture, motion);
+  const auto eyes = positions_of_single_cameras(at.capture, motion);
   ASSERT_TRUE(eyes);
   ASSERT_EQ(eyes->size(), static_cast<size_t>(motion.keys()));
   const auto view = std::ranges::find(at.capture.train, motion.time[3], &View::time);
   EXPECT_EQ((*eyes)[3], Vec3<double>(view->camera.position));
   at.capture.train.push_back(at.capture.train[2]);
-  EXPECT_FALSE(only_eyes(at.capture, motion));
+  EXPECT_FALSE(positions_of_single_cameras(at.capture, motion));
 }
 
 // Bodies that are made larger are so much larger than the first picture shows them.
@@ -113,7 +113,7 @@ TEST(Tracker, TheFirstPictureTellsHowLargeBodiesAre) {
   const std::vector<double> before = ratios();
   const std::vector<double> smaller(before.size(), 1 / larger);
   Motion motion = *at.scene.main_motion;
-  rescale_bodies(smaller, *only_eyes(at.capture, motion), at.scene.main, motion);
+  rescale_bodies(smaller, *positions_of_single_cameras(at.capture, motion), at.scene.main, motion);
   const std::vector<double> after = ratios();
   ASSERT_EQ(before.size(), 2U);
   for (const size_t b : {0, 1}) EXPECT_NEAR(after[b] / before[b], larger, 0.015) << b;
