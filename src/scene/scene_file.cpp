@@ -157,9 +157,13 @@ void put_lighting(const Lighting& lighting, Safetensors& file) {
   file.add("scene/lighting/box", lighting.box);
   file.add("scene/lighting/time", lighting.time);
   file.add("scene/lighting/brightness", lighting.brightness);
+  if (lighting.bodies() == 0) return;
+  file.add("scene/lighting/middle", lighting.middle);
+  file.add("scene/lighting/radius", lighting.radius);
+  file.add("scene/lighting/body_brightness", lighting.body_brightness);
 }
 
-Lighting get_lighting(const Safetensors& file) {
+Lighting get_lighting(const Safetensors& file, int64_t bodies) {
   constexpr int64_t most_points = 1 << 24;  // cells are counted in 32 bits
   Lighting lighting;
   lighting.box = take(file, "scene/lighting/box", {2, 3});
@@ -180,6 +184,14 @@ Lighting get_lighting(const Safetensors& file) {
       throw InputError(file.origin(), "scene/lighting/box", number_text(lighting.box(0, axis)),
                        "below " + number_text(lighting.box(1, axis)));
   }
+  if (!file.has("scene/lighting/radius")) return lighting;
+  lighting.radius = take(file, "scene/lighting/radius", {bodies});
+  for (const float radius : lighting.radius.values()) {
+    if (!(radius > 0))
+      throw InputError(file.origin(), "scene/lighting/radius", number_text(radius), "above 0");
+  }
+  lighting.middle = take(file, "scene/lighting/middle", {bodies, lighting.times(), 3});
+  lighting.body_brightness = take(file, "scene/lighting/body_brightness", {bodies, lighting.times(), 4});
   return lighting;
 }
 
@@ -217,7 +229,9 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
   if (json.has("motion") && json["motion"].yes()) get_motion(file, scene);
   if (scene.main_motion && json.has("nodes") && json["nodes"].yes())
     scene.main_nodes = get_nodes(file, scene.main_motion->bodies());
-  if (json.has("lighting") && json["lighting"].yes()) scene.lighting = get_lighting(file);
+  if (json.has("lighting") && json["lighting"].yes()) {
+    scene.lighting = get_lighting(file, scene.main_motion ? scene.main_motion->bodies() : 0);
+  }
   if (json.has("environment_field")) {
     scene.environment_field =
         get_field(json["environment_field"], residual::environment_outputs, "scene/environment_field/", file);

@@ -389,12 +389,46 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
   return nodes;
 }
 
-Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every) {
+namespace {
+
+struct Sphere {
+  Vec3<float> middle;
+  float radius;  // above 0
+};
+// Of a body's opaque surfels, which stand at `position`; of what carries none, the world's origin and 1.
+Sphere sphere_around(const Tensor<float>& position, const Surfels& surfels, int32_t body) {
+  Vec3<double> sum(0);
+  double squares = 0, count = 0;
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    if (surfels.body[i] != body || surfels.opacity_logit[i] < 0) continue;
+    const Vec3<double> point = load3<double>(position.row(i));
+    sum += point;
+    squares += dot(point, point);
+    ++count;
+  }
+  if (count == 0) return {Vec3<float>(0), 1};
+  const Vec3<double> middle = sum / count;
+  const double radius = std::sqrt(std::max(0.0, squares / count - dot(middle, middle)));
+  return {Vec3<float>(middle), radius > 0 ? static_cast<float>(radius) : 1.0F};
+}
+
+}  // namespace
+
+Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every,
+                         bool on_bodies) {
   constexpr float margin = 0.4F;
   std::vector<float> times;
   for (int64_t k = 0; k < motion.keys(); k += every) times.push_back(motion.time[k]);
+  const auto keys = static_cast<int64_t>(times.size());
+  Lighting lighting;
+  if (on_bodies) {
+    lighting.middle.reset({motion.bodies(), keys, 3});
+    lighting.radius.reset({motion.bodies()});
+    lighting.body_brightness.reset({motion.bodies(), keys, 4});
+  }
   Vec3<float> low(std::numeric_limits<float>::infinity()), high(-low);
-  for (const float time : times) {
+  for (int64_t key = 0; key < keys; ++key) {
+    const float time = times[static_cast<size_t>(key)];
     Surfels moved;
     moved.position = surfels.position;
     moved.rotation = surfels.rotation;
@@ -405,6 +439,11 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
       const Vec3<float> point = load3<float>(moved.position.row(i));
       low = min(low, point);
       high = max(high, point);
+    }
+    for (int64_t b = 0; b < lighting.bodies(); ++b) {
+      const Sphere sphere = sphere_around(moved.position, surfels, static_cast<int32_t>(b));
+      store3(&lighting.middle(b, key, 0), sphere.middle);
+      if (key == 0) lighting.radius[b] = sphere.radius;
     }
   }
   Vec3<float> size = high - low;
@@ -420,7 +459,6 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
   const auto points = [&](float length) {
     return std::max<int64_t>(3, 1 + static_cast<int64_t>(std::lround(length / cell)));
   };
-  Lighting lighting;
   lighting.box.reset({2, 3});
   store3(lighting.box.row(0), low);
   store3(lighting.box.row(1), high);

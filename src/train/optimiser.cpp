@@ -13,6 +13,9 @@ optimize::AdamState zero_state(const Tensor<float>& parameter) {
 
 // Of the rate of poses: those have been found when nodes begin.
 constexpr double node_rates = 4;
+// Of the rate of the grid's brightness. A picture tells four numbers of a body at two times only; at the full
+// rate each of its steps changes them by 4 %.
+constexpr double body_brightness_rates = 0.1;
 
 // Of a field, a motion, nodes or lighting.
 template <class Parameters>
@@ -152,6 +155,10 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
   if (trainable.lighting && scene.lighting) {
     step("lighting.brightness", scene.lighting->brightness, gradient.lighting.brightness, lighting_[0],
          rates.lighting);
+    if (scene.lighting->bodies() > 0) {
+      step("lighting.body_brightness", scene.lighting->body_brightness, gradient.lighting.body_brightness,
+           lighting_[1], body_brightness_rates * rates.lighting);
+    }
   }
   if (trainable.environment && scene.environment.count() > 0) {
     step_surfels(step, "environment", scene.environment, gradient.environment, environment_, position_rate,

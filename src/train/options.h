@@ -232,10 +232,11 @@ struct BendOptions {
   void validate() const;
 };
 
-// How the light on what stands still changes, as where shadows of bodies move (scene/lighting.h).
+// How light changes: on what stands still, as where shadows of bodies move, and on bodies (scene/lighting.h).
 struct LightingOptions {
   int cells = 32;
   int every = 3;
+  bool bodies = true;
   float size = 1e-7F;
   float haste = 1e-6F;
   float roughness = 1e-6F;
@@ -244,7 +245,8 @@ struct LightingOptions {
   void visit(Visitor& v) {
     v.field("cells", cells, "cells",
             "Cells of the grid along the longest side of the box around bodies; 0: the light stays.");
-    v.field("every", every, "times", "The grid has a brightness at one of so many times.");
+    v.field("every", every, "times", "Brightness changes from one of so many times to the next.");
+    v.field("bodies", bodies, "", "Light on bodies changes too.");
     v.field("size", size, "", "Weight of the loss on brightness other than 1.");
     v.field("haste", haste, "", "Weight of the loss that keeps brightness slow.");
     v.field("roughness", roughness, "", "Weight of the loss that keeps brightness smooth in space.");

@@ -253,7 +253,7 @@ void Trainer::let_bend(const std::vector<double>& misfits) {
 void Trainer::let_light_change() {
   const LightingOptions& light = options_.deform.lighting;
   scene_.lighting = lighting_around(scene_.main_motion->on(Device::cpu), scene_.main.on(Device::cpu),
-                                    light.cells, light.every)
+                                    light.cells, light.every, light.bodies)
                         .on(device_);
   optimiser_.begin(*scene_.lighting);
 }

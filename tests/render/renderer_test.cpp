@@ -190,8 +190,10 @@ TEST(Renderer, LightThatChangesIsSeenAndLearned) {
   Fixture f;
   f.request.specular = false;
   Random random(9);
-  Lighting lighting{Tensor<float>({2, 3}), tensor_of(std::vector<float>{0, 0.6F, 1}),
-                    Tensor<float>({3, 4, 4, 4})};
+  Lighting lighting;
+  lighting.box.reset({2, 3});
+  lighting.time = tensor_of(std::vector<float>{0, 0.6F, 1});
+  lighting.brightness.reset({3, 4, 4, 4});
   for (int64_t axis = 0; axis < 3; ++axis) {
     lighting.box(0, axis) = -2;
     lighting.box(1, axis) = 2;

@@ -57,7 +57,11 @@ Scene full_scene() {
                            noise({3, 2, 3}, random),
                            noise({3, 2, 3}, random)};
   scene.lighting = Lighting{tensor_of(std::vector<float>{0, 0, 0, 1, 2, 3}),
-                            tensor_of(std::vector<float>{0, 1}), noise({2, 3, 4, 5}, random)};
+                            tensor_of(std::vector<float>{0, 1}),
+                            noise({2, 3, 4, 5}, random),
+                            noise({2, 2, 3}, random),
+                            tensor_of(std::vector<float>{0.5F, 2}),
+                            noise({2, 2, 4}, random)};
   scene.lighting->box.resize({2, 3});
   return scene;
 }
@@ -86,6 +90,8 @@ std::vector<float> all_numbers(const Scene& scene) {
     scene.lighting->for_each(take);
     take("", scene.lighting->box);
     take("", scene.lighting->time);
+    take("", scene.lighting->middle);
+    take("", scene.lighting->radius);
   }
   for (const int32_t body : scene.main.body.values()) all.push_back(static_cast<float>(body));
   if (scene.environment_field) scene.environment_field->for_each(take);
@@ -171,6 +177,27 @@ TEST(SceneFile, LightingWithoutASizeOrWithoutItsTimesIsRefused) {
               lighting.brightness.resize({2, 2, 4, 5});
             }).find("of 3 or more"),
             std::string::npos);
+  EXPECT_EQ(says([](Lighting& lighting) { lighting.radius[1] = 0; }),
+            "safetensors: scene/lighting/radius: found 0, expected above 0");
+  EXPECT_NE(says([](Lighting& lighting) {
+              lighting.middle.resize({2, 1, 3});
+            }).find("scene/lighting/middle"),
+            std::string::npos);
+  EXPECT_NE(says([](Lighting& lighting) {
+              lighting.body_brightness.resize({1, 2, 4});
+            }).find("scene/lighting/body_brightness"),
+            std::string::npos);
+}
+
+// Checkpoints of programs before light on bodies changed.
+TEST(SceneFile, LightingMayHaveNoBodies) {
+  Scene scene = full_scene();
+  for (Tensor<float>* const part :
+       {&scene.lighting->middle, &scene.lighting->radius, &scene.lighting->body_brightness})
+    *part = {};
+  Safetensors file;
+  put_scene(scene, file);
+  EXPECT_EQ(all_numbers(get_scene(file)), all_numbers(scene));
 }
 
 // What get_scene says where one field of the scene's metadata is another.

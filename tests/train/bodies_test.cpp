@@ -380,6 +380,43 @@ TEST(Bodies, GetNodesThatAreSpreadOverThem) {
   for (int64_t i = 0; i < main.position.size(); ++i) EXPECT_NEAR(bent.position[i], main.position[i], 1e-5);
 }
 
+// The middle of a body's light goes where the body goes, and nothing is brighter yet.
+TEST(Bodies, TakeTheMiddleOfTheirLightAlong) {
+  Tumbling at;
+  Surfels& main = at.scene.main;
+  Motion& motion = *at.scene.main_motion;
+  main.opacity_logit.fill(1);
+  Random random(3);
+  for (float& v : motion.rotation.values()) v += 0.3F * static_cast<float>(random.normal());
+  for (float& v : motion.shift.values()) v = 0.3F * static_cast<float>(random.normal());
+  const Lighting lighting = lighting_around(motion, main, 8, 3, true);
+  ASSERT_EQ(lighting.bodies(), motion.bodies());
+  ASSERT_EQ(lighting.times(), (motion.keys() + 2) / 3);
+  for (int64_t b = 0; b < motion.bodies(); ++b) {
+    double rest_radius = 0, count = 0;
+    Vec3<double> rest(0);
+    for (int64_t i = 0; i < main.count(); ++i) {
+      if (main.body[i] != b) continue;
+      rest += load3<double>(main.position.row(i));
+      ++count;
+    }
+    rest /= count;
+    for (int64_t i = 0; i < main.count(); ++i) {
+      if (main.body[i] == b) rest_radius += std::pow(length(load3<double>(main.position.row(i)) - rest), 2);
+    }
+    EXPECT_NEAR(lighting.radius[b], std::sqrt(rest_radius / count), 1e-4);
+    const Vec3<double> centre = load3<double>(motion.centre.row(b));
+    for (int64_t k = 0; k < lighting.times(); ++k) {
+      const Vec4<double> turn = unit_quaternion(load4<double>(&motion.rotation(b, 3 * k, 0)));
+      const Vec3<double> now = rotation_from_quaternion(turn) * (rest - centre) + centre +
+                               load3<double>(&motion.shift(b, 3 * k, 0));
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(lighting.middle(b, k, axis), now[axis], 1e-4);
+    }
+  }
+  for (const float v : lighting.body_brightness.values()) EXPECT_EQ(v, 0);
+  EXPECT_EQ(lighting_around(motion, main, 8, 3, false).bodies(), 0);
+}
+
 // A thing that stretches and bends gets nodes; boxes that stand still and are rigid get none.
 TEST(Bodies, BendWhereSilhouettesGetWorse) {
   const auto bends = [](SynthScene scene) {

@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "ops/lighting/lighting_kernels.h"
 #include "primitives/lists.h"
+#include "primitives/sums.h"
 
 namespace traceflow::lighting {
 
@@ -26,6 +27,10 @@ GridSize size_of(const Shape& brightness) { return {brightness[3], brightness[2]
 Grid grid_of(const Lighting& lighting, float time) {
   return {size_of(lighting.brightness.shape()), lighting.box.data(), lighting.time.data(),
           lighting.brightness.data(),           lighting.times(),    double{time}};
+}
+
+Bodies bodies_of(const Lighting& lighting) {
+  return {lighting.middle.data(), lighting.radius.data(), lighting.body_brightness.data(), lighting.bodies()};
 }
 
 // Lists 0 to n − 1 by their keys, as cuda::list_by_key does.
@@ -52,6 +57,7 @@ void forward(const Lighting& lighting, const Tensor<int32_t>& body, float time, 
   if (count == 0) return;
   parallel_for(lighting.device(), "lighting: light", count,
                LightSurfel{grid_of(lighting, time),
+                           bodies_of(lighting),
                            {body.empty() ? nullptr : body.data(), subset.empty() ? nullptr : subset.data()},
                            posed.position.data(),
                            posed.sh.data(),
@@ -69,9 +75,10 @@ void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Sav
   const Grid grid = grid_of(lighting, time);
   saved.pulls.place(device).resize({count});
   saved.cells.place(device).resize({count});
-  parallel_for(device, "lighting: gradients back", count,
-               LightBack{grid, saved.places.data(), lit.sh.data(), lit.sh.row_size(), grad_posed.sh.data(),
-                         grad_posed.position.data(), saved.pulls.data(), saved.cells.data()});
+  parallel_for(
+      device, "lighting: gradients back", count,
+      LightBack{grid, bodies_of(lighting), saved.places.data(), lit.sh.data(), lit.sh.row_size(),
+                grad_posed.sh.data(), grad_posed.position.data(), saved.pulls.data(), saved.cells.data()});
   if (grad_lighting == nullptr) return;
   if (device == Device::cpu)
     list_by_key_on_host(saved.cells, grid.size.points(), saved.lists);
@@ -80,6 +87,11 @@ void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Sav
   parallel_for(device, "lighting: collect", grid.size.points(),
                CollectAtPoint{grid, saved.lists.begin.data(), saved.lists.entry.data(), saved.places.data(),
                               saved.pulls.data(), grad_lighting->brightness.data()});
+  for (int64_t b = 0; b < lighting.bodies(); ++b) {
+    ordered_sum<BodyPull>(device, "lighting: collect on a body", count,
+                          BodyPullOfSurfel{static_cast<int32_t>(b), saved.places.data(), saved.pulls.data()},
+                          AddBodyPull{grid, grad_lighting->body_brightness.row(b)}, 1024);
+  }
 }
 
 void light(const Lighting& lighting, const Tensor<int32_t>& body, float time, Surfels& surfels) {
@@ -89,6 +101,7 @@ void light(const Lighting& lighting, const Tensor<int32_t>& body, float time, Su
   places.place(lighting.device()).resize({count});
   parallel_for(lighting.device(), "lighting: light", count,
                LightSurfel{grid_of(lighting, time),
+                           bodies_of(lighting),
                            {body.empty() ? nullptr : body.data(), nullptr},
                            surfels.position.data(),
                            surfels.sh.data(),
@@ -100,6 +113,9 @@ void resist(const Lighting& lighting, const Stiffness& weights, Lighting& gradie
   parallel_for(lighting.device(), "lighting: resist", lighting.brightness.size(),
                ResistAtPoint{size_of(lighting.brightness.shape()), lighting.times(), weights,
                              lighting.brightness.data(), gradient.brightness.data()});
+  parallel_for(lighting.device(), "lighting: resist on bodies", lighting.body_brightness.size(),
+               ResistOnBody{lighting.times(), weights, lighting.body_brightness.data(),
+                            gradient.body_brightness.data()});
 }
 
 }  // namespace traceflow::lighting

@@ -6,9 +6,9 @@
 #include "scene/surfels.h"
 
 // The colours of posed surfels in light that changes (scene/lighting.h): a surfel at p of colour c, which is
-// what its harmonics give before it is limited to 0, gets exp(g(p, t)) c, with g the grid's logarithm there.
-// Surfels that bodies carry keep their colours. Differentiable: position, harmonics and the grid; the
-// gradient by p is that of the grid's cell. Runs where the surfels are; the grid is there too.
+// what its harmonics give before it is limited to 0, gets exp(g(p, t)) c, with g the logarithm of its body
+// there, or the grid's where no body carries it. Differentiable: position, harmonics and all logarithms; the
+// gradient by p is that of the grid's cell. Runs where the surfels are; the lighting is there too.
 namespace traceflow::lighting {
 
 // What forward keeps for backward. Reuse one object across iterations: its memory is kept.
@@ -32,7 +32,8 @@ void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Sav
 // Lights stored surfels in place, which stand where they are at that time. Not differentiable.
 void light(const Lighting& lighting, const Tensor<int32_t>& body, float time, Surfels& surfels);
 
-// Weights of a term of the loss, a sum over points and times of the grid.
+// Weights of a term of the loss, a sum over points and times of the grid. A body's four numbers count as four
+// points without neighbours.
 struct Stiffness {
   double size = 0;       // g²/2
   double haste = 0;      // (g' − g)²/2 with the next time's g'

@@ -1,5 +1,6 @@
 #include "base/kernel.h"
 #include "ops/lighting/lighting_kernels.h"
+#include "primitives/sum_kernels.h"
 
 namespace traceflow {
 
@@ -7,5 +8,9 @@ template void cuda::for_each_index(const char*, int64_t, const lighting::LightSu
 template void cuda::for_each_index(const char*, int64_t, const lighting::LightBack&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::CollectAtPoint&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::ResistAtPoint&);
+template void cuda::for_each_index(const char*, int64_t, const lighting::ResistOnBody&);
+template void cuda::sum_each_index<lighting::BodyPull>(const char*, int64_t,
+                                                       const lighting::BodyPullOfSurfel&,
+                                                       const lighting::AddBodyPull&);
 
 }  // namespace traceflow

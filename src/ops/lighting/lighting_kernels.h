@@ -24,12 +24,15 @@ struct GridSize {
   TRACEFLOW_HD int64_t corner(int k) const { return at(k & 1, (k >> 1) & 1, k >> 2); }
 };
 
-// Where a surfel lies in the grid.
+// Where a surfel lies in the grid, or on a body.
 struct Place {
-  int32_t cell =
-      -1;  // its corner with the lowest coordinates; −1 outside the box, or where a body carries it
-  Vec3<float> share{0};  // from that corner to the opposite one
+  int32_t cell = -1;  // its corner with the lowest coordinates; −2 − b on body b; −1 where neither is
+  Vec3<float> share{0};  // from that corner to the opposite one; of the body's radius, from its middle
   float gain = 1;
+
+  TRACEFLOW_HD static int32_t cell_of_body(int32_t body) { return -2 - body; }
+  // Negative: of none.
+  TRACEFLOW_HD int32_t body() const { return -2 - cell; }
 
   TRACEFLOW_HD float weight(int corner) const {
     return ((corner & 1) != 0 ? share.x : 1 - share.x) * ((corner & 2) != 0 ? share.y : 1 - share.y) *
@@ -82,8 +85,37 @@ struct Grid {
   }
 };
 
+// The bodies at one time.
+struct Bodies {
+  const float *middle, *radius, *brightness;
+  int64_t count;  // 0: light on them does not change
+
+  // Of body b at key k.
+  TRACEFLOW_HD static int64_t at(int64_t b, int64_t keys, int64_t k) { return b * keys + k; }
+  TRACEFLOW_HD Vec3<float> slope(const Grid& grid, const motion::KeySpan<float>& span, int32_t b) const {
+    const auto share = static_cast<float>(span.share);
+    return (1 - share) * load3<float>(brightness + 4 * at(b, grid.keys, span.from) + 1) +
+           share * load3<float>(brightness + 4 * at(b, grid.keys, span.to) + 1);
+  }
+  TRACEFLOW_HD Place place_of(const Grid& grid, int32_t b, const Vec3<float>& point) const {
+    Place place;
+    if (b >= count) return place;
+    const motion::KeySpan<float> span = grid.span();
+    const auto share = static_cast<float>(span.share);
+    const int64_t from = at(b, grid.keys, span.from), to = at(b, grid.keys, span.to);
+    const Vec3<float> now =
+        (1 - share) * load3<float>(middle + 3 * from) + share * load3<float>(middle + 3 * to);
+    place.cell = Place::cell_of_body(b);
+    place.share = (point - now) / radius[b];
+    place.gain = std::exp((1 - share) * brightness[4 * from] + share * brightness[4 * to] +
+                          dot(slope(grid, span, b), place.share));
+    return place;
+  }
+};
+
 struct LightSurfel {
   Grid grid;
+  Bodies bodies;
   motion::CarrierOf carrier;  // body null: none is carried
   const float* position;
   float* sh;
@@ -91,8 +123,9 @@ struct LightSurfel {
   Place* places;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    const bool is_carried = carrier.body != nullptr && carrier(i) >= 0;
-    const Place place = is_carried ? Place{} : grid.place_of(load3<float>(position + 3 * i));
+    const int32_t body = carrier.body == nullptr ? -1 : carrier(i);
+    const Vec3<float> point = load3<float>(position + 3 * i);
+    const Place place = body >= 0 ? bodies.place_of(grid, body, point) : grid.place_of(point);
     places[i] = place;
     if (place.gain == 1) return;  // as it is, to the bit
     float* const harmonics = sh + i * numbers;
@@ -106,6 +139,7 @@ struct LightSurfel {
 // Takes surfel i's gradient back; what goes to the logarithm at its place goes to pulls.
 struct LightBack {
   Grid grid;
+  Bodies bodies;
   const Place* places;
   const float* lit;  // harmonics
   int64_t numbers;
@@ -117,7 +151,7 @@ struct LightBack {
     const Place place = places[i];
     pulls[i] = 0;
     cells[i] = -1;
-    if (place.cell < 0) return;
+    if (place.cell == -1) return;
     double pull = 0;
     for (int64_t k = i * numbers; k < (i + 1) * numbers; ++k) {
       const float half = k < i * numbers + 3 ? half_in_harmonics : 0;
@@ -126,9 +160,13 @@ struct LightBack {
     }
     if (!(pull * 0 == 0) || pull == 0) return;
     pulls[i] = static_cast<float>(pull);
+    const motion::KeySpan<float> span = grid.span();
+    if (const int32_t b = place.body(); b >= 0) {
+      add3(grad_position + 3 * i, Vec3<double>(pulls[i] / bodies.radius[b] * bodies.slope(grid, span, b)));
+      return;
+    }
     cells[i] = place.cell;
     Vec3<float> slope(0);
-    const motion::KeySpan<float> span = grid.span();
     for (int k = 0; k < 8; ++k) slope += grid.at(span, place.cell + grid.size.corner(k)) * place.slope(k);
     add3(grad_position + 3 * i, Vec3<double>(pulls[i] * (slope * grid.density())));
   }
@@ -159,6 +197,43 @@ struct CollectAtPoint {
   }
 };
 
+// What goes to a body's four numbers.
+struct BodyPull {
+  double at_middle = 0;
+  Vec3<double> slope{0};
+
+  TRACEFLOW_HD BodyPull& operator+=(const BodyPull& other) {
+    at_middle += other.at_middle;
+    slope += other.slope;
+    return *this;
+  }
+};
+struct BodyPullOfSurfel {
+  int32_t which;
+  const Place* places;
+  const float* pulls;
+
+  TRACEFLOW_HD BodyPull operator()(int64_t i) const {
+    const double pull = pulls[i];
+    if (places[i].body() != which || pull == 0) return {};
+    return {pull, pull * Vec3<double>(places[i].share)};
+  }
+};
+struct AddBodyPull {
+  Grid grid;
+  float* gradient;  // of the body's keys
+
+  TRACEFLOW_HD void operator()(const BodyPull& sum) const {
+    const motion::KeySpan<float> span = grid.span();
+    add(span.from, 1 - span.share, sum);
+    add(span.to, span.share, sum);
+  }
+  TRACEFLOW_HD void add(int64_t key, double share, const BodyPull& sum) const {
+    gradient[4 * key] += static_cast<float>(share * sum.at_middle);
+    add3(gradient + 4 * key + 1, share * sum.slope);
+  }
+};
+
 struct ResistAtPoint {
   GridSize size;
   int64_t keys;
@@ -181,6 +256,23 @@ struct ResistAtPoint {
     if (key + 1 < keys) sum += weights.haste * (here - brightness[i + size.points()]);
     for (const int64_t step : {size.at(1, 0, 0), size.at(0, 1, 0), size.at(0, 0, 1)})
       sum += weights.roughness * (2 * here - brightness[i - step] - brightness[i + step]);
+    gradient[i] += static_cast<float>(sum);
+  }
+};
+
+// i: a number of a body at a time.
+struct ResistOnBody {
+  int64_t keys;
+  Stiffness weights;
+  const float* brightness;
+  float* gradient;
+
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const int64_t key = i / 4 % keys;
+    const double here = brightness[i];
+    double sum = weights.size * here;
+    if (key > 0) sum += weights.haste * (here - brightness[i - 4]);
+    if (key + 1 < keys) sum += weights.haste * (here - brightness[i + 4]);
     gradient[i] += static_cast<float>(sum);
   }
 };

@@ -5,8 +5,9 @@
 
 namespace traceflow::testing {
 
-// A grid in a box that holds most of random_posed. Like a trained one it is 0 on the box's faces.
-inline Lighting random_lighting(int64_t keys, uint64_t seed = 7) {
+// A grid in a box that holds most of random_posed. Like a trained one it is 0 on the box's faces. bodies: on
+// which light changes too.
+inline Lighting random_lighting(int64_t keys, int64_t bodies, uint64_t seed = 7) {
   Random random(seed);
   Lighting lighting;
   lighting.box = random_tensor<float>({2, 3}, random, 1.0, 1.3);
@@ -18,6 +19,11 @@ inline Lighting random_lighting(int64_t keys, uint64_t seed = 7) {
   for (int64_t i = 0; i < lighting.brightness.size(); ++i) {
     const int64_t x = i % 6, y = i / 6 % 5, z = i / 30 % 4;
     if (x == 0 || y == 0 || z == 0 || x == 5 || y == 4 || z == 3) lighting.brightness[i] = 0;
+  }
+  if (bodies > 0) {
+    lighting.middle = random_tensor<float>({bodies, keys, 3}, random, -0.5, 0.5);
+    lighting.radius = random_tensor<float>({bodies}, random, 0.5, 2.0);
+    lighting.body_brightness = random_tensor<float>({bodies, keys, 4}, random, -0.5, 0.5);
   }
   return lighting;
 }
