@@ -49,6 +49,13 @@ int64_t field_bytes(const SetShape& set, int64_t count, const KeptMemory& kept) 
   return std::min(each * count, kept.field_bytes);
 }
 
+// Of a grid whose box is a cube, which holds the most points.
+int64_t lighting_bytes(const LightingOptions& light, int64_t times) {
+  if (light.cells == 0) return 0;
+  const int64_t side = light.cells + 1;
+  return 4 * copies_of_parameters * (times / light.every + 1) * side * side * side;
+}
+
 KeptMemory kept_memory(Device device, int64_t budget) {
   if (device == Device::cpu) return {};
   // What does not fit is computed again, so that a small device is slower instead of refused.
@@ -73,6 +80,10 @@ int64_t largest_view(const Capture& capture) {
   return pixels;
 }
 
+MemorySetting memory_setting(const TrainOptions& options, Device device, const Capture& capture) {
+  return {options, device, largest_view(capture), static_cast<int64_t>(times_of(capture).size())};
+}
+
 int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t main, int64_t environment) {
   const TrainOptions& o = run.options;
   const int64_t pixels = run.pixels;
@@ -86,6 +97,7 @@ int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t
                   field_bytes(environment_set, mapped ? pixels : environment, kept) +
                   4 * planes_of_a_frame * pixels + o.capture.cache_mebibytes * mebibyte + 64 * mebibyte;
   if (mapped) bytes += 4 * copies_of_parameters * 6 * 3 * int64_t{o.initial.map_size} * o.initial.map_size;
+  if (o.deform.kind == "nodes") bytes += lighting_bytes(o.deform.lighting, run.times);
   if (o.loss.lpips > 0) bytes += lpips::network_bytes + pixels * lpips::gradient_bytes_per_pixel;
   if (run.device == Device::cpu) return bytes + (traced ? pixels * bytes_per_ray : 0);
   bytes += device_bytes_of_ops + main * entries_per_surfel * device_bytes_per_entry;
@@ -142,7 +154,7 @@ MemoryPlan with_caps(MemoryPlan plan, const MemorySetting& run, const SurfelCaps
 int64_t unlimited_forecast(const MemorySetting& run) {
   TrainOptions options = run.options;
   options.memory_budget = mebibyte * 1024;  // a pebibyte
-  return plan_memory({options, run.device, run.pixels}).forecast_bytes;
+  return plan_memory({options, run.device, run.pixels, run.times}).forecast_bytes;
 }
 
 }  // namespace traceflow

@@ -11,7 +11,9 @@ struct MemorySetting {
   const TrainOptions& options;
   Device device;
   int64_t pixels;  // of its largest photograph
+  int64_t times;   // at which it has views
 };
+MemorySetting memory_setting(const TrainOptions& options, Device device, const Capture& capture);
 
 // Pixels of the largest view of both splits: a run renders them all.
 int64_t largest_view(const Capture& capture);

@@ -119,7 +119,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       schedule_(options),
       perceptual_(network_on(device, perceptual_network(options.loss, capture_))),
       random_(seeded(options.seed)),
-      memory_(plan_memory({options_, device, largest_view(capture_)})),
+      memory_(plan_memory(memory_setting(options_, device, capture_))),
       targets_(device, memory_.image_bytes),
       scene_(scene_on(device, begin(initial_scene(capture_, within(options, memory_.caps), random_)))),
       optimiser_(scene_),

@@ -160,7 +160,7 @@ void Trainer::resume() {
 void Trainer::keep_caps(const Safetensors& file) {
   const std::optional<SurfelCaps> caps = caps_to_keep(file, options_);
   if (!caps) return;
-  memory_ = with_caps(memory_, {options_, device_, largest_view(capture_)}, *caps);
+  memory_ = with_caps(memory_, memory_setting(options_, device_, capture_), *caps);
   const int64_t available = available_bytes(device_);
   if (memory_.forecast_bytes <= available) return;
   const auto mebibytes = [](int64_t bytes) { return std::to_string(bytes >> 20) + " MiB"; };

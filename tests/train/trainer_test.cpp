@@ -482,11 +482,11 @@ TEST(Trainer, NoSetStartsLargerThanItMayGrow) {
 TEST(Memory, AnEnvironmentMapCounts) {
   TrainOptions options = preset("paper");
   options.specular = Specular::none;
-  const int64_t none = unlimited_forecast({options, Device::cpu, 3000});
+  const int64_t none = unlimited_forecast({options, Device::cpu, 3000, 1});
   options.specular = Specular::environment_map;
-  const int64_t map = unlimited_forecast({options, Device::cpu, 3000});
+  const int64_t map = unlimited_forecast({options, Device::cpu, 3000, 1});
   options.initial.map_size = 1024;
-  const int64_t large = unlimited_forecast({options, Device::cpu, 3000});
+  const int64_t large = unlimited_forecast({options, Device::cpu, 3000, 1});
   const NetworkOptions& network = options.deform.environment_network;
   EXPECT_GT(map - none, int64_t{3000} * 4 * network.width * network.depth) << "the field at every pixel";
   EXPECT_GT(large - map, int64_t{6} * 1024 * 1024 * 3 * 4 * 4) << "parameter, gradient and moments";
@@ -506,8 +506,21 @@ TEST(Memory, TheLargestViewOfEitherSplitCounts) {
   EXPECT_EQ(largest_view(capture), 3000);
 
   const TrainOptions options = preset("paper");
-  EXPECT_GT(unlimited_forecast({options, Device::cpu, 3000}),
-            unlimited_forecast({options, Device::cpu, 1200}));
+  EXPECT_GT(unlimited_forecast({options, Device::cpu, 3000, 1}),
+            unlimited_forecast({options, Device::cpu, 1200, 1}));
+}
+
+// Light that changes has a grid at every so many-th time, with bodies alone.
+TEST(Memory, LongFilmsNeedMoreWhereLightChanges) {
+  TrainOptions options = preset("cpu");
+  const auto needs = [&](int64_t times) { return unlimited_forecast({options, Device::cpu, 1200, times}); };
+  options.deform.lighting.cells = 10;
+  options.deform.lighting.every = 2;
+  EXPECT_EQ(needs(100) - needs(20), int64_t{7} * 40 * 11 * 11 * 11 * 4);
+  options.deform.lighting.cells = 0;
+  EXPECT_EQ(needs(100), needs(20));
+  options = preset("paper");
+  EXPECT_EQ(needs(100), needs(20));
 }
 
 // What the page cache holds is given back when it is wanted.
@@ -519,7 +532,7 @@ TEST(Memory, TheAutomaticBudgetIsOfWhatTheMachineCanGive) {
 
 TEST(Memory, TheBudgetLowersTheCapsAndOneThatHoldsNothingIsRefused) {
   TrainOptions options = preset("paper");
-  const MemorySetting run{options, Device::cpu, int64_t{480} * 270};
+  const MemorySetting run{options, Device::cpu, int64_t{480} * 270, 80};
   options.memory_budget = 1 << 20;
   EXPECT_FALSE(plan_memory(run).caps.lowered);
   EXPECT_EQ(plan_memory(run).caps.main, options.density.max_surfels);

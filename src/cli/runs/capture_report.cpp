@@ -167,7 +167,7 @@ nlohmann::json decoded_json(const Inspection::Pixels& pixels) {
 }  // namespace
 
 MemoryNeeds memory_needs(const Capture& capture, const TrainOptions& options, Inspection& inspection) {
-  MemorySetting run{options, Device::cpu, largest_view(capture)};
+  MemorySetting run = memory_setting(options, Device::cpu, capture);
   MemoryNeeds needs;
   needs.kept_images = std::min(inspection.decoded_bytes, capture.images->limit_bytes());
   needs.on_cpu = unlimited_forecast(run);
