@@ -391,6 +391,16 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
 
 namespace {
 
+// Where surfels are at a time.
+Tensor<float> positions_at(float time, const Motion& motion, const Surfels& surfels) {
+  Surfels moved;
+  moved.position = surfels.position;
+  moved.rotation = surfels.rotation;
+  moved.sh.reset({surfels.count(), 1, 3});
+  motion::move(motion, surfels.body, time, moved);
+  return std::move(moved.position);
+}
+
 struct Sphere {
   Vec3<float> middle;
   float radius;  // above 0
@@ -414,36 +424,30 @@ Sphere sphere_around(const Tensor<float>& position, const Surfels& surfels, int3
 
 }  // namespace
 
+void take_light_along(const Motion& motion, const Surfels& surfels, Lighting& lighting) {
+  for (int64_t key = 0; key < lighting.times(); ++key) {
+    const Tensor<float> position = positions_at(lighting.time[key], motion, surfels);
+    for (int64_t b = 0; b < lighting.bodies(); ++b) {
+      const Sphere sphere = sphere_around(position, surfels, static_cast<int32_t>(b));
+      store3(&lighting.middle(b, key, 0), sphere.middle);
+      if (key == 0) lighting.radius[b] = sphere.radius;
+    }
+  }
+}
+
 Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every,
                          bool on_bodies) {
   constexpr float margin = 0.4F;
   std::vector<float> times;
   for (int64_t k = 0; k < motion.keys(); k += every) times.push_back(motion.time[k]);
-  const auto keys = static_cast<int64_t>(times.size());
-  Lighting lighting;
-  if (on_bodies) {
-    lighting.middle.reset({motion.bodies(), keys, 3});
-    lighting.radius.reset({motion.bodies()});
-    lighting.body_brightness.reset({motion.bodies(), keys, 4});
-  }
   Vec3<float> low(std::numeric_limits<float>::infinity()), high(-low);
-  for (int64_t key = 0; key < keys; ++key) {
-    const float time = times[static_cast<size_t>(key)];
-    Surfels moved;
-    moved.position = surfels.position;
-    moved.rotation = surfels.rotation;
-    moved.sh.reset({surfels.count(), 1, 3});
-    motion::move(motion, surfels.body, time, moved);
+  for (const float time : times) {
+    const Tensor<float> position = positions_at(time, motion, surfels);
     for (int64_t i = 0; i < surfels.count(); ++i) {
       if (surfels.body[i] < 0 || surfels.opacity_logit[i] < 0) continue;
-      const Vec3<float> point = load3<float>(moved.position.row(i));
+      const Vec3<float> point = load3<float>(position.row(i));
       low = min(low, point);
       high = max(high, point);
-    }
-    for (int64_t b = 0; b < lighting.bodies(); ++b) {
-      const Sphere sphere = sphere_around(moved.position, surfels, static_cast<int32_t>(b));
-      store3(&lighting.middle(b, key, 0), sphere.middle);
-      if (key == 0) lighting.radius[b] = sphere.radius;
     }
   }
   Vec3<float> size = high - low;
@@ -459,12 +463,18 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
   const auto points = [&](float length) {
     return std::max<int64_t>(3, 1 + static_cast<int64_t>(std::lround(length / cell)));
   };
+  Lighting lighting;
   lighting.box.reset({2, 3});
   store3(lighting.box.row(0), low);
   store3(lighting.box.row(1), high);
   lighting.time = tensor_of(times);
   lighting.brightness.reset(
       {lighting.times(), points(high.z - low.z), points(high.y - low.y), points(high.x - low.x)});
+  if (!on_bodies) return lighting;
+  lighting.middle.reset({motion.bodies(), lighting.times(), 3});
+  lighting.radius.reset({motion.bodies()});
+  lighting.body_brightness.reset({motion.bodies(), lighting.times(), 4});
+  take_light_along(motion, surfels, lighting);
   return lighting;
 }
 

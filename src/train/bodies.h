@@ -40,10 +40,12 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
 
 // Light that has not changed yet, in the box around all places of the bodies' opaque surfels, wider by 0.4 of
 // its longest side in each direction, at every `every`th time of the motion. cells: along the longest side.
-// on_bodies: on bodies too, each with the middle of its opaque surfels and their distance from it, as the
-// root of the mean square at the first time. On the CPU.
+// on_bodies: on bodies too. On the CPU.
 Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every,
                          bool on_bodies);
+// Sets the middle of light on each body to that of its opaque surfels at each time, and the radius to the
+// root of their mean squared distance from it at the first time. On the CPU.
+void take_light_along(const Motion& motion, const Surfels& surfels, Lighting& lighting);
 
 // How far pictures are from the photographs where surfels show that no body carries.
 struct Unrest {

@@ -105,6 +105,10 @@ void Trainer::follow_again() {
   for (int64_t key = 0; key < motion.keys(); ++key)
     tracker.solve(main, nodes ? &*nodes : nullptr, motion, key, scene_.extent, steps, texture_trust_);
   scene_.main_motion = motion.on(device_);
+  if (!scene_.lighting) return;
+  Lighting lighting = scene_.lighting->on(Device::cpu);
+  take_light_along(motion, main, lighting);
+  scene_.lighting = lighting.on(device_);
 }
 
 void Trainer::follow(int64_t key) {
