@@ -152,6 +152,13 @@ events::DensityChanged DensityControl::add(Surfels& surfels, SurfelMoments& mome
   return change;
 }
 
+void DensityControl::shorten_needles(Surfels& surfels, float cloud) const {
+  constexpr float aspect = 10;
+  parallel_for(
+      surfels.device(), "density: shorten needles", surfels.count(),
+      ShortenNeedle{std::log(aspect), std::log(options_.longest_needle * cloud), surfels.log_scale.data()});
+}
+
 void DensityControl::reset_opacity(Surfels& surfels, SurfelMoments& moments) const {
   const float ceiling = std::log(options_.opacity_reset / (1 - options_.opacity_reset));
   parallel_for(surfels.device(), "density: lower opacity", surfels.count(),

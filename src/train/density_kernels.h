@@ -43,6 +43,20 @@ struct ScatterChild {
   }
 };
 
+// Shortens a surfel that is longer than `longest`, a needle, to so many times its width, or to `longest`
+// where that is more. Logarithms.
+struct ShortenNeedle {
+  float aspect, longest;
+  float* log_scale;
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    float* const scale = log_scale + 2 * i;
+    const float least = (scale[1] < scale[0] ? scale[1] : scale[0]) + aspect;
+    const float most = least < longest ? longest : least;
+    if (most < scale[0]) scale[0] = most;
+    if (most < scale[1]) scale[1] = most;
+  }
+};
+
 struct LowerTo {
   float ceiling;
   float* value;

@@ -244,8 +244,12 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   torn_ = true;
   const double share_of_positions = follows ? share_while_tracking : 1;
   optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_, share_of_positions);
-  if (trainable.main) main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
+  if (trainable.main) {
+    main_density_.shorten_needles(scene_.main, cloud_radius_);
+    main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
+  }
   if (trainable.environment && scene_.environment.count() > 0) {
+    environment_density_.shorten_needles(scene_.environment, environment_radius_);
     environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
   }
   parallel_for(device_, "train: follow the reach", 1,

@@ -81,6 +81,33 @@ TEST(Density, PrunesWhatIsWideForTheCamerasOrForTheCloud) {
   }
 }
 
+TEST(Density, ShortensOnlyNeedlesAndKeepsTheirWidth) {
+  constexpr int64_t count = 500;
+  constexpr float cloud = 2;
+  Set set(count, 1, 0.5F);
+  DensityOptions o = options();
+  o.longest_needle = 0.1F;
+  Random random(3);
+  for (float& scale : set.surfels.log_scale.values()) scale = static_cast<float>(-3 + 1.5 * random.normal());
+  const Tensor<float> before = set.surfels.log_scale;
+  DensityControl("main", o, count).shorten_needles(set.surfels, cloud);
+  int64_t shortened = 0;
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t wide = before(i, 0) < before(i, 1) ? 0 : 1;
+    EXPECT_EQ(set.surfels.log_scale(i, wide), before(i, wide));
+    const double width = std::exp(before(i, wide)), length = std::exp(before(i, 1 - wide));
+    const double expected = std::min(length, std::max(10 * width, 0.1 * cloud));
+    EXPECT_NEAR(std::exp(set.surfels.log_scale(i, 1 - wide)), expected, 1e-5 * expected);
+    if (expected < length) {
+      ++shortened;
+    } else {
+      EXPECT_EQ(set.surfels.log_scale(i, 1 - wide), before(i, 1 - wide));
+    }
+  }
+  EXPECT_GT(shortened, 20);
+  EXPECT_LT(shortened, count / 2);
+}
+
 TEST(Density, PrunesTheWideOnlyWhenItIsTold) {
   Set set(5, 0.5F, 0.5F);
   DensityControl control("main", options(), 5);

@@ -53,13 +53,16 @@ Edited edited(Device device) {
     state.second = random_tensor<float>(state.second.shape(), random, 0, 1).on(device);
     state.step = 5;
   });
-  DensityControl density("main", {}, count, device);
+  DensityOptions options;
+  options.longest_needle = 0.05F;
+  DensityControl density("main", options, count, device);
   const Tensor<float> signal = random_tensor<float>({count}, random, 0, 4e-4);
   Tensor<uint8_t> touched({count});
   touched.fill(1);
   density.accumulate(signal.on(device), touched.on(device));
   e.change = density.update(e.surfels, e.moments, {{.extent = 10, .cloud = 1}, 400}, random);
   density.reset_opacity(e.surfels, e.moments);
+  density.shorten_needles(e.surfels, 1);
   return e;
 }
 
