@@ -153,6 +153,7 @@ events::DensityChanged DensityControl::add(Surfels& surfels, SurfelMoments& mome
 }
 
 void DensityControl::shorten_needles(Surfels& surfels, float cloud) const {
+  if (options_.longest_needle == 0) return;
   constexpr float aspect = 10;
   parallel_for(
       surfels.device(), "density: shorten needles", surfels.count(),

@@ -45,7 +45,8 @@ class DensityControl {
   events::DensityChanged add(Surfels& surfels, SurfelMoments& moments, const Surfels& more);
 
   // Shortens needles: surfels more than ten times as long as wide and longer than options.longest_needle. A
-  // needle that a few views see end on looks right to them and reaches through the air. Asks for no memory.
+  // needle that a few views see end on looks right to them and reaches through the air. 0: none are. Asks for
+  // no memory.
   void shorten_needles(Surfels& surfels, float cloud) const;
 
   // Lowers every opacity to at most options.opacity_reset and clears that group's moments.

@@ -159,7 +159,7 @@ void DensityOptions::validate(const std::string& group) const {
                "0 to under 1");
   check_option(prune_above > 0, group + ".prune_above", prune_above, "a positive number");
   check_option(prune_above_cloud > 0, group + ".prune_above_cloud", prune_above_cloud, "a positive number");
-  check_option(longest_needle > 0, group + ".longest_needle", longest_needle, "a positive number");
+  check_not_negative(longest_needle, (group + ".longest_needle").c_str());
   check_option(growth > 0 && growth <= 1, group + ".growth", growth, "above 0, up to 1");
   check_option(gradient_threshold > 0, group + ".gradient_threshold", gradient_threshold,
                "a positive number");

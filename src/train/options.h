@@ -140,7 +140,7 @@ struct DensityOptions {
   float prune_opacity = 0.05F;
   float prune_above = 0.1F;
   float prune_above_cloud = 1000;
-  float longest_needle = 1000;
+  float longest_needle = 0;
   int prune_above_from = 3000;
   int opacity_reset_every = 3000;
   float opacity_reset = 0.01F;
@@ -164,7 +164,7 @@ struct DensityOptions {
         "Likewise, in radii of the cloud of points; of the environment, in halves of its box's diagonal.");
     v.field("longest_needle", longest_needle, "clouds",
             "Standard deviation that a surfel more than ten times as long as wide has at most; in the same "
-            "radii.");
+            "radii. 0: any.");
     v.field("prune_above_from", prune_above_from, "iteration", "From where on the wide ones go.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
             "Interval of opacity resets; 0 for none. None either where half of it, in the run's own "

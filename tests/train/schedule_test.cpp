@@ -167,7 +167,7 @@ TEST(Options, NonsenseIsRefusedByName) {
   expect_refused("schedule.length", [](TrainOptions& o) { o.schedule.length = 0; });
   expect_refused("density.prune_opacity", [](TrainOptions& o) { o.density.prune_opacity = 1; });
   expect_refused("density.prune_above", [](TrainOptions& o) { o.density.prune_above = 0; });
-  expect_refused("density.longest_needle", [](TrainOptions& o) { o.density.longest_needle = 0; });
+  expect_refused("density.longest_needle", [](TrainOptions& o) { o.density.longest_needle = -1; });
   expect_refused("environment_density.prune_above_cloud",
                  [](TrainOptions& o) { o.environment_density.prune_above_cloud = -1; });
   expect_refused("loss.rigidity_strain", [](TrainOptions& o) { o.loss.rigidity_strain = 1e-12F; });
