@@ -43,15 +43,15 @@ struct ScatterChild {
   }
 };
 
-// Shortens a surfel that is longer than `longest`, a needle, to so many times its width, or to `longest`
-// where that is more. Logarithms.
+// Shortens a surfel that is longer than `longest` and than `aspect` times its width to the larger of the two.
+// All are logarithms.
 struct ShortenNeedle {
   float aspect, longest;
   float* log_scale;
   TRACEFLOW_HD void operator()(int64_t i) const {
     float* const scale = log_scale + 2 * i;
-    const float least = (scale[1] < scale[0] ? scale[1] : scale[0]) + aspect;
-    const float most = least < longest ? longest : least;
+    const float by_width = (scale[1] < scale[0] ? scale[1] : scale[0]) + aspect;
+    const float most = by_width < longest ? longest : by_width;
     if (most < scale[0]) scale[0] = most;
     if (most < scale[1]) scale[1] = most;
   }
