@@ -36,8 +36,8 @@ void put_figures(const Metrics& metrics, nlohmann::ordered_json& json) {
 
 nlohmann::ordered_json motion_json(const std::optional<MotionReport>& motion) {
   if (!motion) return nullptr;
-  Figures json;
-  put_motion(motion->mean, json["mean"]);
+  Figures json = Figures::object();
+  put_motion(motion->mean, json["mean"] = Figures::object());
   Figures& objects = json["objects"] = Figures::array();
   for (const ObjectMotion& o : motion->objects) {
     Figures entry = {{"object", o.object}, {"points", o.points}, {"followed_points", o.followed_points}};

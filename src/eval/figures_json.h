@@ -10,7 +10,8 @@ namespace traceflow::eval {
 // The value, or null.
 nlohmann::ordered_json figure_json(const std::optional<double>& value);
 
-// Adds every figure to an object by its name.
+// Adds every figure to an object by its name. nlohmann-json that makes an object of null is no object where
+// it finds no memory for it, and ends the program: it is one already.
 void put_figures(const Metrics& metrics, nlohmann::ordered_json& json);
 
 // {"mean", "objects"}; null where the capture has no truth of the motion.

@@ -57,7 +57,7 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
 }
 
 std::string report_json(const Report& report) {
-  nlohmann::ordered_json json;
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
   json["capture"] = report.capture;
   json["split"] = report.split;
   json["views_as_trained"] = report.views_as_trained;
@@ -67,7 +67,7 @@ std::string report_json(const Report& report) {
   json["train_seconds"] = report.train_seconds;
   json["render_fps"] = figure_json(report.render_fps);
   json["surfels"] = {{"main", report.main_surfels}, {"environment", report.environment_surfels}};
-  put_figures(mean_of(report), json["mean"]);
+  put_figures(mean_of(report), json["mean"] = nlohmann::ordered_json::object());
   json["motion"] = motion_json(report.motion);
   json["views"] = nlohmann::ordered_json::array();
   for (const ViewReport& view : report.views) {

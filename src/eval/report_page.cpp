@@ -74,7 +74,7 @@ Json page_json(const ReportPage& page) {
                {"train_seconds", report.train_seconds},
                {"render_fps", figure_json(report.render_fps)},
                {"surfels", {{"main", report.main_surfels}, {"environment", report.environment_surfels}}}};
-  put_figures(mean_of(report), json["mean"]);
+  put_figures(mean_of(report), json["mean"] = Json::object());
   json["motion"] = motion_json(report.motion);
   Json& views = json["views"] = Json::array();
   for (const ViewReport& view : report.views) {

@@ -25,6 +25,7 @@ OrderedJson& member(OrderedJson& root, const std::string& path) {
   size_t begin = 0;
   for (size_t dot = path.find('.'); dot != std::string::npos; dot = path.find('.', begin)) {
     node = &(*node)[path.substr(begin, dot - begin)];
+    if (node->is_null()) *node = OrderedJson::object();
     begin = dot + 1;
   }
   return (*node)[path.substr(begin)];

@@ -28,13 +28,16 @@ struct FromJson {
   }
 };
 
-void put_field(const Field& field, const std::string& prefix, Safetensors& file, Json& json) {
+// Returns the network's shape.
+Json put_field(const Field& field, const std::string& prefix, Safetensors& file) {
+  Json json = Json::object();
   NetworkOptions shape = field.shape;
   ToJson visitor{json};
   shape.visit(visitor);
   json["outputs"] = field.outputs();
   field.for_each(
       [&](const std::string& name, const Tensor<float>& tensor) { file.add(prefix + name, tensor); });
+  return json;
 }
 
 // A tensor that must have this shape: no memory is taken for more than the file has.
@@ -243,7 +246,7 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
 }  // namespace
 
 void put_scene(const Scene& scene, Safetensors& file) {
-  Json json;
+  Json json = Json::object();
   json["specular"] = specular_names[static_cast<int>(scene.specular)];
   const Vec3<double>& centre = scene.normalisation.centre;
   json["centre"] = std::array<double, 3>{centre.x, centre.y, centre.z};
@@ -260,14 +263,13 @@ void put_scene(const Scene& scene, Safetensors& file) {
   if (scene.main_nodes) put_nodes(*scene.main_nodes, file);
   json["lighting"] = scene.lighting.has_value();
   if (scene.lighting) put_lighting(*scene.lighting, file);
-  if (scene.main_field) put_field(*scene.main_field, "scene/main_field/", file, json["main_field"]);
-  if (scene.environment_field) {
-    put_field(*scene.environment_field, "scene/environment_field/", file, json["environment_field"]);
-  }
+  if (scene.main_field) json["main_field"] = put_field(*scene.main_field, "scene/main_field/", file);
+  if (scene.environment_field)
+    json["environment_field"] = put_field(*scene.environment_field, "scene/environment_field/", file);
   if (scene.environment_map) {
     file.add("scene/map/logit", scene.environment_map->logit);
     if (scene.environment_map->field)
-      put_field(*scene.environment_map->field, "scene/map/field/", file, json["map_field"]);
+      json["map_field"] = put_field(*scene.environment_map->field, "scene/map/field/", file);
   }
   file.metadata["scene"] = json.dump();
 }

@@ -1,6 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <functional>
 #include <iostream>
 #include <set>
@@ -8,9 +11,13 @@
 
 #include "base/random.h"
 #include "cli/faults/small_training.h"
+#include "cli/terminal/error_boundary.h"
+#include "files/options_json.h"
 #include "files/png.h"
 #include "ops/trace/trace_hits.h"
+#include "scene/scene_file.h"
 #include "support/temp_folder.h"
+#include "train/options.h"
 
 // The n-th request for memory is refused, for many n; or that one and all that follow.
 namespace traceflow::faults {
@@ -90,6 +97,39 @@ TEST_F(Allocation, ATrainingEndsInOneLineAndAStateThatGoesOn) {
   std::cout << ended << " of " << 2 * trials_wanted() << " trainings ended, " << saved
             << " in a saved state, of which " << whole << " came to the same bytes; " << all
             << " allocations in all\n";
+}
+
+// Where a request is refused in a destructor of nlohmann-json's, the end is that of guard_termination().
+TEST_F(Allocation, EveryRequestOfACheckpointThatIsRefusedEndsTheProgramInOneLine) {
+  std::string note;
+  const Safetensors read = read_checkpoint(run_in("whole"), note);
+  const Scene scene = get_scene(read);
+  ASSERT_TRUE(scene.environment_field.has_value());
+  const auto state = [&] {
+    Safetensors file;
+    put_scene(scene, file);
+    file.metadata["options"] = options_to_json(TrainOptions());
+    file.write(path("state"));
+    return 0;
+  };
+  const auto code_where_refused = [&](int64_t n) {
+    const pid_t process = ::fork();
+    if (process == 0) {
+      std::cerr.rdbuf(nullptr);
+      cli::guard_termination();
+      const RefusedOnce once(n);
+      ::_exit(cli::guarded(state, std::cerr));
+    }
+    int status = 0;
+    ::waitpid(process, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  };
+  int64_t n = 0;
+  for (int code = 4; code != 0; code = code_where_refused(n)) {
+    ASSERT_EQ(code, 4) << "allocation " << n;
+    ++n;
+  }
+  EXPECT_GT(n, 500);
 }
 
 TEST_F(Allocation, VerbsThatReadARunEndInOneLine) {
