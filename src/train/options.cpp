@@ -194,6 +194,7 @@ void BendOptions::validate() const {
   check_not_negative(misfit, "deform.bend.misfit");
   check_not_negative(strain, "deform.bend.strain");
   check_not_negative(haste, "deform.bend.haste");
+  check_not_negative(travel, "deform.bend.travel");
 }
 
 void DeformOptions::validate() const {

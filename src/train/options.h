@@ -223,6 +223,7 @@ struct BendOptions {
   float misfit = 1.4F;
   float strain = 0.01F;
   float haste = 1e-5F;
+  float travel = 0.1F;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -232,6 +233,7 @@ struct BendOptions {
             "Bodies bend where their silhouettes are off by so many times as much as at the first time.");
     v.field("strain", strain, "", "Weight of the loss that keeps neighbouring nodes together.");
     v.field("haste", haste, "", "Weight of the loss that keeps nodes slow.");
+    v.field("travel", travel, "", "Weight of the loss that keeps nodes where they were at first.");
   }
   void validate() const;
 };

@@ -226,7 +226,8 @@ void Trainer::share_among_keys() {
 
 void Trainer::hold_nodes() {
   const BendOptions& bend = options_.deform.bend;
-  nodes::resist(*scene_.main_nodes, {bend.strain, bend.haste}, gradient_.main_nodes);
+  nodes::resist(*scene_.main_nodes, *scene_.main_motion, {bend.strain, bend.haste, bend.travel},
+                gradient_.main_nodes);
   nodes::hold_first(gradient_.main_nodes);
 }
 

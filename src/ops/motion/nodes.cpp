@@ -83,10 +83,19 @@ void bend(const Nodes& nodes, const Tensor<int32_t>& body, float time, Surfels& 
       saved);
 }
 
-void resist(const Nodes& nodes, const Stiffness& weights, Nodes& gradient) {
-  const Resistance of{nodes.body.data(), nodes.time.data(),  nodes.centre.data(), nodes.radius.data(),
-                      nodes.turn.data(), nodes.shift.data(), nodes.count(),       nodes.times(),
-                      weights.strain,    weights.haste};
+void resist(const Nodes& nodes, const Motion& motion, const Stiffness& weights, Nodes& gradient) {
+  const BodyPoses poses{motion.time.data(), motion.centre.data(), motion.rotation.data(), motion.shift.data(),
+                        motion.keys()};
+  const Resistance of{poses,
+                      nodes.body.data(),
+                      nodes.time.data(),
+                      nodes.centre.data(),
+                      nodes.radius.data(),
+                      nodes.turn.data(),
+                      nodes.shift.data(),
+                      nodes.count(),
+                      nodes.times(),
+                      weights};
   parallel_for(nodes.device(), "nodes: resist", nodes.count() * nodes.times(),
                ResistanceGradient{of, gradient.turn.data(), gradient.shift.data()}, 16);
 }

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "scene/motion.h"
 #include "scene/nodes.h"
 #include "scene/surfels.h"
 
@@ -37,11 +38,16 @@ struct Stiffness {
   double strain = 0;  // Σ_m a_nm |R_n (c_m − c_n) + c_n + s_n − c_m − s_m|²/r_n² over others of the body,
                       // a_nm ∝ exp(−|c_m − c_n|²/8r_n²) with Σ a_nm = 1 (Sumner et al. 2007, E_reg)
   double haste = 0;  // |dω_n/dt|² + |ds_n/dt|²/r_n², t in lengths of the film
+  // ε/2 log(1 + d²/ε²) with ε = 0.1, d r_n how far the body's pose has taken c_n + s_n from c_n. To one
+  // camera what grows and what comes closer look alike. Of the two this is the less, the more of the body
+  // stays where it was; what is far from there anyway hardly feels it (Cauchy's robust loss).
+  double travel = 0;
 };
-// Adds the gradient of the term.
-void resist(const Nodes& nodes, const Stiffness& weights, Nodes& gradient);
+// Adds the gradient of the term. motion: of the bodies, held.
+void resist(const Nodes& nodes, const Motion& motion, const Stiffness& weights, Nodes& gradient);
 // The term itself, in double precision.
-double resist_reference(const BasicNodes<double>& nodes, const Stiffness& weights);
+double resist_reference(const BasicNodes<double>& nodes, const BasicMotion<double>& motion,
+                        const Stiffness& weights);
 
 // Zeroes the gradient by the first time: there bodies are at rest.
 void hold_first(Nodes& gradient);

@@ -12,6 +12,8 @@ namespace traceflow::nodes {
 
 using motion::CarrierOf;
 
+inline constexpr double still_within = 0.1;  // ε of Stiffness::travel
+
 // A node at one time.
 struct PosedNode {
   Mat3<float> rotation;
@@ -202,12 +204,32 @@ struct BendGradientBack {
   }
 };
 
+// Where bodies take a point at a time.
+struct BodyPoses {
+  const float *times, *centre, *rotation, *shift;
+  int64_t keys;
+
+  struct Pose {
+    Mat3<double> rotation;
+    Vec3<double> rest, now;  // the body's centre
+
+    TRACEFLOW_HD Vec3<double> operator()(const Vec3<double>& p) const { return rotation * (p - rest) + now; }
+  };
+  TRACEFLOW_HD Pose at(int64_t b, double time) const {
+    const motion::KeySpan<float> span(times, keys, time);
+    const motion::BodyPose pose = motion::body_pose(rotation + 4 * keys * b, shift + 3 * keys * b, span);
+    const Vec3<double> rest = load3<double>(centre + 3 * b);
+    return {rotation_from_quaternion(pose.rotation), rest, rest + pose.shift};
+  }
+};
+
 // How nodes resist.
 struct Resistance {
+  BodyPoses poses;
   const int32_t* body;
   const float *times, *centre, *radius, *turn, *shift;
   int64_t count, keys;
-  double strain, haste;
+  Stiffness weights;
 
   TRACEFLOW_HD Vec3<double> at(const float* values, int64_t n, int64_t k) const {
     return load3<double>(values + 3 * (keys * n + k));
@@ -238,6 +260,14 @@ struct Resistance {
     return arm(n, m, k) + load3<double>(centre + 3 * n) + at(shift, n, k) - load3<double>(centre + 3 * m) -
            at(shift, m, k);
   }
+  // The pull of n's travel on its shift.
+  TRACEFLOW_HD Vec3<double> back(int64_t n, int64_t k) const {
+    const Vec3<double> rest = load3<double>(centre + 3 * n);
+    const BodyPoses::Pose pose = poses.at(body[n], times[k]);
+    const Vec3<double> off = (pose(rest + at(shift, n, k)) - rest) / static_cast<double>(radius[n]);
+    const double pull = weights.travel * still_within / (still_within * still_within + dot(off, off));
+    return (pull / static_cast<double>(radius[n]) * off) * pose.rotation;
+  }
 };
 
 struct ResistanceGradient {
@@ -252,21 +282,22 @@ struct ResistanceGradient {
     for (int64_t m = 0; m < of.count; ++m) {
       const double mine = of.touch(n, m);
       if (mine == 0) continue;
-      const Vec3<double> pull = 2 * of.strain * mine / all * of.per_radius2(n) * of.apart(n, m, k);
+      const Vec3<double> pull = 2 * of.weights.strain * mine / all * of.per_radius2(n) * of.apart(n, m, k);
       torque += cross(of.arm(n, m, k), pull);
       by_shift += pull;
       const double theirs = of.touch(m, n) / of.touches(m);
-      by_shift -= 2 * of.strain * theirs * of.per_radius2(m) * of.apart(m, n, k);
+      by_shift -= 2 * of.weights.strain * theirs * of.per_radius2(m) * of.apart(m, n, k);
     }
     by_turn = left_jacobian(-of.at(of.turn, n, k), torque);
     const auto hurry = [&](int64_t from) {
       const double span = static_cast<double>(of.times[from + 1]) - of.times[from];
-      const double by = 2 * of.haste / (span * span) * (from == k ? -1 : 1);
+      const double by = 2 * of.weights.haste / (span * span) * (from == k ? -1 : 1);
       by_turn += by * (of.at(of.turn, n, from + 1) - of.at(of.turn, n, from));
       by_shift += by * of.per_radius2(n) * (of.at(of.shift, n, from + 1) - of.at(of.shift, n, from));
     };
     if (k + 1 < of.keys) hurry(k);
     if (k > 0) hurry(k - 1);
+    by_shift += of.back(n, k);
     add3(grad_turn + 3 * i, of.share() * by_turn);
     add3(grad_shift + 3 * i, of.share() * by_shift);
   }

@@ -2,6 +2,7 @@
 #include <vector>
 
 #include "math/rotation_group.h"
+#include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 
 // Bending in double precision, one surfel after another. Gradients are those of central differences.
@@ -32,6 +33,26 @@ Vec3<double> carried(const BasicNodes<double>& nodes, int64_t n, const Vec3<doub
   return rotation_from_quaternion(quaternion_exp(turn)) * (p - centre) + centre + shift;
 }
 
+// Squared distance of a node from where it is at rest, once its body's pose has moved it.
+double travelled2(const BasicNodes<double>& nodes, const BasicMotion<double>& motion, int64_t n, int64_t k) {
+  const Vec3<double> rest = load3<double>(nodes.centre.row(n));
+  BasicPosedSurfels<double> point;
+  point.position.resize({1, 3});
+  point.rotation.reset({1, 4});
+  point.sh.reset({1, 1, 3});
+  store3(point.position.row(0), rest + load3<double>(&nodes.shift(n, k, 0)));
+  Tensor<int32_t> body({1});
+  body[0] = nodes.body[n];
+  motion::forward_reference(motion, body, nodes.time[k], point);
+  const Vec3<double> off = load3<double>(point.position.row(0)) - rest;
+  return dot(off, off);
+}
+
+double travel_loss(double distance2) {
+  constexpr double within = 0.1;  // ε
+  return within / 2 * std::log1p(distance2 / (within * within));
+}
+
 }  // namespace
 
 void forward_reference(const BasicNodes<double>& nodes, const Tensor<int32_t>& body, double time,
@@ -56,7 +77,8 @@ void forward_reference(const BasicNodes<double>& nodes, const Tensor<int32_t>& b
   }
 }
 
-double resist_reference(const BasicNodes<double>& nodes, const Stiffness& weights) {
+double resist_reference(const BasicNodes<double>& nodes, const BasicMotion<double>& motion,
+                        const Stiffness& weights) {
   double total = 0;
   for (int64_t n = 0; n < nodes.count(); ++n) {
     const double radius2 = nodes.radius[n] * nodes.radius[n];
@@ -74,6 +96,7 @@ double resist_reference(const BasicNodes<double>& nodes, const Stiffness& weight
         all += touch;
       }
       if (all > 0) total += weights.strain * apart / all / radius2;
+      total += weights.travel * travel_loss(travelled2(nodes, motion, n, k) / radius2);
       if (k + 1 == nodes.times()) continue;
       const double span = nodes.time[k + 1] - nodes.time[k];
       const Vec3<double> turned = (load3<double>(&nodes.turn(n, k + 1, 0)) - turn) / span;

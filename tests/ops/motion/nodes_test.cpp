@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "motion_scene.h"
+#include "ops/motion/key_span.h"
 
 namespace traceflow {
 namespace {
@@ -47,11 +48,13 @@ TEST(Nodes, BackwardMatchesCentralDifferencesOfTheReference) {
 
 TEST(Nodes, ResistanceMatchesCentralDifferencesOfTheReference) {
   const Nodes nodes = random_nodes(6, 2, 4);
-  for (const nodes::Stiffness& weights : {nodes::Stiffness{1, 0}, {0, 1}, {0.3, 0.01}}) {
+  const Motion motion = random_motion(2, 3);
+  for (const nodes::Stiffness& weights :
+       {nodes::Stiffness{1, 0, 0}, {0, 1, 0}, {0, 0.1, 1}, {0.3, 0.01, 0.2}}) {
     BasicNodes<double> exact = convert<double>(nodes);
     Nodes gradient = zeros_like<float>(nodes);
-    nodes::resist(nodes, weights, gradient);
-    const auto loss = [&] { return nodes::resist_reference(exact, weights); };
+    nodes::resist(nodes, motion, weights, gradient);
+    const auto loss = [&] { return nodes::resist_reference(exact, convert<double>(motion), weights); };
     expect_close(gradient.turn, central_differences(exact.turn, loss), 1e-5, "turn");
     expect_close(gradient.shift, central_differences(exact.shift, loss), 1e-5, "shift");
   }
@@ -70,7 +73,7 @@ TEST(Nodes, ThatMoveAsOneKeepShapes) {
     }
   }
   Nodes gradient = zeros_like<float>(nodes);
-  nodes::resist(nodes, {1, 1}, gradient);
+  nodes::resist(nodes, random_motion(1, 2), {1, 1, 0}, gradient);
   for (const float by : gradient.turn.values()) EXPECT_NEAR(by, 0, 1e-6);
   for (const float by : gradient.shift.values()) EXPECT_NEAR(by, 0, 1e-6);
   const PosedSurfels posed = random_posed(50, 0);
@@ -79,6 +82,26 @@ TEST(Nodes, ThatMoveAsOneKeepShapes) {
     const Vec3<double> expected = rotation * load3<double>(posed.position.row(i)) + shift;
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(bent.position(i, c), expected[c], 2e-6);
   }
+}
+
+// Nodes that stay where they are, whatever their body's pose, have not travelled.
+TEST(Nodes, ThatStandStillAreNotPulled) {
+  Nodes nodes = random_nodes(6, 2, 4);
+  const Motion motion = random_motion(2, 3);
+  for (int64_t n = 0; n < 6; ++n) {
+    const int64_t b = nodes.body[n];
+    const Vec3<double> rest = load3<double>(nodes.centre.row(n)),
+                       centre = load3<double>(motion.centre.row(b));
+    for (int64_t k = 0; k < nodes.times(); ++k) {
+      const motion::KeySpan<float> span(motion.time.data(), motion.keys(), nodes.time[k]);
+      const motion::BodyPose pose = motion::body_pose(motion.rotation.row(b), motion.shift.row(b), span);
+      const Mat3<double> rotation = rotation_from_quaternion(pose.rotation);
+      store3(&nodes.shift(n, k, 0), (rest - centre - pose.shift) * rotation + centre - rest);
+    }
+  }
+  Nodes gradient = zeros_like<float>(nodes);
+  nodes::resist(nodes, motion, {0, 0, 1}, gradient);
+  for (const float by : gradient.shift.values()) EXPECT_NEAR(by, 0, 1e-4);
 }
 
 TEST(Nodes, ABrokenSurfelGivesNothingAndTheFirstTimeIsHeld) {
@@ -106,7 +129,7 @@ TEST(Nodes, AreTheSameBytesAtAnyThreadCount) {
   const Tensor<int32_t> body = bodies_in_turn(9000, 3);
   expect_same_bytes_at_any_thread_count([&] {
     NodesPass pass = run_nodes(Device::cpu, nodes, body, 0.42F, posed);
-    nodes::resist(nodes, {1, 0.1}, pass.grad_nodes);
+    nodes::resist(nodes, random_motion(3, 4), {1, 0.1, 0.1}, pass.grad_nodes);
     return std::vector<Tensor<float>>{pass.bent.position,       pass.bent.rotation,
                                       pass.grad_posed.position, pass.grad_posed.rotation,
                                       pass.grad_nodes.turn,     pass.grad_nodes.shift};

@@ -58,8 +58,10 @@ TEST_F(MotionOnDevice, BendsAsTheCpu) {
   expect_close(found.grad_nodes.turn, expected.grad_nodes.turn, 1e-5, "by turn");
   expect_close(found.grad_nodes.shift, expected.grad_nodes.shift, 1e-5, "by shift");
   Nodes grad_here = zeros_like<float>(nodes), grad_there = grad_here.on(Device::cuda);
-  nodes::resist(nodes, {0.3, 0.01}, grad_here);
-  nodes::resist(nodes.on(Device::cuda), {0.3, 0.01}, grad_there);
+  const Motion motion = random_motion(3, 4);
+  const nodes::Stiffness weights{0.3, 0.01, 0.2};
+  nodes::resist(nodes, motion, weights, grad_here);
+  nodes::resist(nodes.on(Device::cuda), motion.on(Device::cuda), weights, grad_there);
   expect_close(grad_there.turn.on(Device::cpu), grad_here.turn, 1e-5, "resistance by turn");
   expect_close(grad_there.shift.on(Device::cpu), grad_here.shift, 1e-5, "resistance by shift");
 }
