@@ -12,8 +12,6 @@ namespace traceflow::nodes {
 
 using motion::CarrierOf;
 
-inline constexpr double still_within = 0.1;  // ε of Stiffness::travel
-
 // A node at one time.
 struct PosedNode {
   Mat3<float> rotation;
@@ -265,7 +263,7 @@ struct Resistance {
     const Vec3<double> rest = load3<double>(centre + 3 * n);
     const BodyPoses::Pose pose = poses.at(body[n], times[k]);
     const Vec3<double> off = (pose(rest + at(shift, n, k)) - rest) / static_cast<double>(radius[n]);
-    const double pull = weights.travel * still_within / (still_within * still_within + dot(off, off));
+    const double pull = weights.travel / (1 + dot(off, off));
     return (pull / static_cast<double>(radius[n]) * off) * pose.rotation;
   }
 };

@@ -48,11 +48,6 @@ double travelled2(const BasicNodes<double>& nodes, const BasicMotion<double>& mo
   return dot(off, off);
 }
 
-double travel_loss(double distance2) {
-  constexpr double within = 0.1;  // ε
-  return within / 2 * std::log1p(distance2 / (within * within));
-}
-
 }  // namespace
 
 void forward_reference(const BasicNodes<double>& nodes, const Tensor<int32_t>& body, double time,
@@ -96,7 +91,7 @@ double resist_reference(const BasicNodes<double>& nodes, const BasicMotion<doubl
         all += touch;
       }
       if (all > 0) total += weights.strain * apart / all / radius2;
-      total += weights.travel * travel_loss(travelled2(nodes, motion, n, k) / radius2);
+      total += weights.travel * std::log1p(travelled2(nodes, motion, n, k) / radius2) / 2;
       if (k + 1 == nodes.times()) continue;
       const double span = nodes.time[k + 1] - nodes.time[k];
       const Vec3<double> turned = (load3<double>(&nodes.turn(n, k + 1, 0)) - turn) / span;
