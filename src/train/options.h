@@ -223,7 +223,7 @@ struct BendOptions {
   float misfit = 1.4F;
   float strain = 0.01F;
   float haste = 1e-5F;
-  float travel = 0.02F;
+  float travel = 0.05F;
 
   template <class Visitor>
   void visit(Visitor& v) {

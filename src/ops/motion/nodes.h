@@ -38,7 +38,7 @@ struct Stiffness {
   double strain = 0;  // Σ_m a_nm |R_n (c_m − c_n) + c_n + s_n − c_m − s_m|²/r_n² over others of the body,
                       // a_nm ∝ exp(−|c_m − c_n|²/8r_n²) with Σ a_nm = 1 (Sumner et al. 2007, E_reg)
   double haste = 0;  // |dω_n/dt|² + |ds_n/dt|²/r_n², t in lengths of the film
-  // log(1 + d²)/2 (Cauchy's robust loss), d r_n being how far the body's pose has taken c_n + s_n from c_n.
+  // d²/(1 + d²)/2 (Geman-McClure), d r_n being how far the body's pose has taken c_n + s_n from c_n.
   // To one camera what grows and what comes closer look alike. Where its foot stands, it grows.
   double travel = 0;
 };

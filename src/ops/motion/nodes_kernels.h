@@ -263,7 +263,7 @@ struct Resistance {
     const Vec3<double> rest = load3<double>(centre + 3 * n);
     const BodyPoses::Pose pose = poses.at(body[n], times[k]);
     const Vec3<double> off = (pose(rest + at(shift, n, k)) - rest) / static_cast<double>(radius[n]);
-    const double pull = weights.travel / (1 + dot(off, off));
+    const double pull = weights.travel / std::pow(1 + dot(off, off), 2);
     return (pull / static_cast<double>(radius[n]) * off) * pose.rotation;
   }
 };

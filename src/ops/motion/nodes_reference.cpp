@@ -48,6 +48,8 @@ double travelled2(const BasicNodes<double>& nodes, const BasicMotion<double>& mo
   return dot(off, off);
 }
 
+double geman_mcclure(double distance2) { return distance2 / (1 + distance2) / 2; }
+
 }  // namespace
 
 void forward_reference(const BasicNodes<double>& nodes, const Tensor<int32_t>& body, double time,
@@ -91,7 +93,7 @@ double resist_reference(const BasicNodes<double>& nodes, const BasicMotion<doubl
         all += touch;
       }
       if (all > 0) total += weights.strain * apart / all / radius2;
-      total += weights.travel * std::log1p(travelled2(nodes, motion, n, k) / radius2) / 2;
+      total += weights.travel * geman_mcclure(travelled2(nodes, motion, n, k) / radius2);
       if (k + 1 == nodes.times()) continue;
       const double span = nodes.time[k + 1] - nodes.time[k];
       const Vec3<double> turned = (load3<double>(&nodes.turn(n, k + 1, 0)) - turn) / span;
