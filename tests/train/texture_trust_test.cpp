@@ -115,19 +115,5 @@ TEST(TextureTrust, FindsMirrorsByTheirPhotographs) {
   EXPECT_EQ(loose[0], Mat3<double>(0));
 }
 
-TEST(TextureTrust, FindsTheDemosMirrorBall) {
-  const fs::path folder = fs::path(::testing::TempDir()) / ("balls_" + std::to_string(::getpid()));
-  SynthOptions made;
-  made.frames = 32;
-  made.width = 160;
-  made.height = 90;
-  made.points = 2500;
-  followed(made, 240, folder)->save();
-  TextureTrust trust;
-  trust.mirror_image =
-      Safetensors::read(RunFolder{folder / "run"}.checkpoint()).tensor<double>("texture_trust/mirror_image");
-  EXPECT_TRUE(trust.mirrors(0));
-}
-
 }  // namespace
 }  // namespace traceflow
