@@ -10,8 +10,8 @@ namespace traceflow::eval {
 // The value, or null.
 nlohmann::ordered_json figure_json(const std::optional<double>& value);
 
-// Adds every figure to an object by its name. nlohmann-json that makes an object of null is no object where
-// it finds no memory for it, and ends the program: it is one already.
+// Adds every figure by its name. json: an object, not null. A null that [] turns into an object is left
+// broken by nlohmann-json where there is no memory.
 void put_figures(const Metrics& metrics, nlohmann::ordered_json& json);
 
 // {"mean", "objects"}; null where the capture has no truth of the motion.

@@ -8,7 +8,6 @@
 #include "math/similarity_fit.h"
 #include "train/ball_body.h"
 #include "train/mirror_image.h"
-#include "train/small_run.h"
 
 namespace traceflow {
 namespace {

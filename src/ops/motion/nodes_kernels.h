@@ -258,8 +258,8 @@ struct Resistance {
     return arm(n, m, k) + load3<double>(centre + 3 * n) + at(shift, n, k) - load3<double>(centre + 3 * m) -
            at(shift, m, k);
   }
-  // The pull of n's travel on its shift.
-  TRACEFLOW_HD Vec3<double> back(int64_t n, int64_t k) const {
+  // The gradient of n's travel by its shift.
+  TRACEFLOW_HD Vec3<double> travel_pull(int64_t n, int64_t k) const {
     const Vec3<double> rest = load3<double>(centre + 3 * n);
     const BodyPoses::Pose pose = poses.at(body[n], times[k]);
     const Vec3<double> off = (pose(rest + at(shift, n, k)) - rest) / static_cast<double>(radius[n]);
@@ -295,7 +295,7 @@ struct ResistanceGradient {
     };
     if (k + 1 < of.keys) hurry(k);
     if (k > 0) hurry(k - 1);
-    by_shift += of.back(n, k);
+    by_shift += of.travel_pull(n, k);
     add3(grad_turn + 3 * i, of.share() * by_turn);
     add3(grad_shift + 3 * i, of.share() * by_shift);
   }
