@@ -12,6 +12,7 @@
 #include "math/activation.h"
 #include "ops/motion/motion.h"
 #include "scene/neighbours.h"
+#include "scene/rows.h"
 #include "train/inflation.h"
 #include "train/mask_parts.h"
 
@@ -387,6 +388,21 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
               tensor_of(radius), Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3})};
   std::copy(centre.begin(), centre.end(), nodes.centre.data());
   return nodes;
+}
+
+Nodes nodes_of(const Nodes& nodes, const std::vector<bool>& bodies) {
+  RowEdit edit;
+  std::vector<int32_t> body;
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    if (!bodies[static_cast<size_t>(nodes.body[n])]) continue;
+    edit.keep(n);
+    body.push_back(nodes.body[n]);
+  }
+  if (edit.count() == 0) return {};
+  const PlacedEdit kept(edit, Device::cpu);
+  const auto rows = [&](const Tensor<float>& values) { return edited_rows(values, kept, false); };
+  return {tensor_of(body),    nodes.time,       rows(nodes.centre),
+          rows(nodes.radius), rows(nodes.turn), rows(nodes.shift)};
 }
 
 namespace {

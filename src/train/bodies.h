@@ -38,6 +38,9 @@ int64_t release_strays(const Capture& capture, const Motion& motion, float lates
 // one half, at rest at every `every`th time of the motion. surfels and motion on the CPU.
 Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, int64_t every);
 
+// Those of the bodies that are meant (one value a body). On the CPU.
+Nodes nodes_of(const Nodes& nodes, const std::vector<bool>& bodies);
+
 // Light that has not changed yet, in the box around all places of the bodies' opaque surfels, wider by 0.4 of
 // its longest side in each direction, at every `every`th time of the motion. cells: along the longest side.
 // on_bodies: on bodies too. On the CPU.

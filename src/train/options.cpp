@@ -172,6 +172,7 @@ void TrackOptions::validate() const {
   check_not_negative(again, "deform.track.again");
   check_option(window > 0, "deform.track.window", window, "a positive number");
   check_not_negative(rounds, "deform.track.rounds");
+  check_not_negative(adjust, "deform.track.adjust");
   check_not_negative(blur, "deform.track.blur");
   check_not_negative(silhouette, "deform.track.silhouette");
   check_not_negative(normal, "deform.track.normal");
@@ -192,6 +193,7 @@ void BendOptions::validate() const {
   check_option(nodes <= 64, "deform.bend.nodes", nodes, "64 or fewer");
   check_option(every > 0, "deform.bend.every", every, "a positive number");
   check_not_negative(misfit, "deform.bend.misfit");
+  check_not_negative(misfit_textured, "deform.bend.misfit_textured");
   check_not_negative(strain, "deform.bend.strain");
   check_not_negative(haste, "deform.bend.haste");
   check_not_negative(travel, "deform.bend.travel");

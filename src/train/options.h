@@ -183,6 +183,7 @@ struct TrackOptions {
   int again = 3;
   int window = 10;
   int rounds = 4;
+  int adjust = 4;
   float blur = 2;
   float silhouette = 0.5F;
   float normal = 0.3F;
@@ -201,6 +202,9 @@ struct TrackOptions {
     v.field("window", window, "times", "How far back these lie at most.");
     v.field("rounds", rounds, "",
             "Equal parts of the run, at whose ends all poses are solved again, depths held; 0: never.");
+    v.field("adjust", adjust, "",
+            "Photometric bundle adjustment of bodies that bend and whose texture is seen to move with them: "
+            "steps on photographs of each size; 0: none.");
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");
@@ -216,11 +220,12 @@ struct TrackOptions {
   void validate() const;
 };
 
-// How bodies bend that one rigid pose does not explain, by the silhouettes (deform.kind = nodes).
+// How bodies bend that one rigid pose does not explain (deform.kind = nodes).
 struct BendOptions {
   int nodes = 16;
   int every = 3;
   float misfit = 1.4F;
+  float misfit_textured = 1.15F;
   float strain = 0.01F;
   float haste = 1e-5F;
   float travel = 0.05F;
@@ -230,7 +235,9 @@ struct BendOptions {
     v.field("nodes", nodes, "nodes", "Nodes of a body that bends; 0: bodies are rigid.");
     v.field("every", every, "times", "Nodes have a turn and a shift at one of so many times.");
     v.field("misfit", misfit, "",
-            "Bodies bend where their silhouettes are off by so many times as much as at the first time.");
+            "Bodies bend where silhouettes are off by so many times as much as at the first time.");
+    v.field("misfit_textured", misfit_textured, "",
+            "The same for bodies whose texture is seen to move with them, which are followed better.");
     v.field("strain", strain, "", "Weight of the loss that keeps neighbouring nodes together.");
     v.field("haste", haste, "", "Weight of the loss that keeps nodes slow.");
     v.field("travel", travel, "", "Weight of the loss that keeps nodes where they were at first.");

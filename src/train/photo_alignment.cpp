@@ -14,6 +14,7 @@ namespace {
 // Detail is what is finer than so many pixels. Coarser patterns are shading, which stays where it is when a
 // body turns: at four pixels a quarter of each turn was lost on a small ball.
 constexpr double detail_sigma = 2;
+constexpr double widest_detail = 3;  // times the blur, where photographs are blurred
 // The weight of a difference of colours, and where the cost of one becomes linear.
 constexpr double weight = 1.5, huber_width = 0.05;
 constexpr float least_cosine = 0.3F;  // between a surface and the ray to it
@@ -23,12 +24,21 @@ bool faces(const Vec3<double>& normal, const Vec3<double>& ray) {
   return -dot(normal, ray) > least_cosine * length(ray);
 }
 
-// A photograph at a place between pixels, and its derivatives along both sides.
-struct Looked {
-  Vec3<double> value, by_x, by_y;
-};
+// Turns an image (H×W×channels) into its mean within a few pixels, over what the mask covers: what is beside
+// a body does not move with it.
+void take_mean(const Tensor<float>& coverage, int64_t channels, double sigma, Tensor<float>& image) {
+  constexpr float least = 1e-3F;
+  const int64_t height = coverage.dim(0), width = coverage.dim(1);
+  Tensor<float> share = coverage, scratch;
+  for (int64_t i = 0; i < image.size(); ++i) image[i] *= coverage[i / channels];
+  gaussian_blur(image, scratch, height, width, channels, sigma);
+  gaussian_blur(share, scratch, height, width, 1, sigma);
+  for (int64_t i = 0; i < image.size(); ++i)
+    image[i] = share[i / channels] > least ? image[i] / share[i / channels] : 0.0F;
+}
 
-// Bilinear; none outside of the mask or the picture.
+}  // namespace
+
 std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
   const auto column = static_cast<int64_t>(std::floor(x - 0.5)),
              row = static_cast<int64_t>(std::floor(y - 0.5));
@@ -47,16 +57,42 @@ std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
                 (1 - down) * (at(0, 1) - at(0, 0)) + down * (at(1, 1) - at(1, 0)), bottom - top};
 }
 
-}  // namespace
-
-DetailPhoto detail_of(FinePhotograph photograph) {
+DetailPhoto detail_of(FinePhotograph photograph, double blur) {
   DetailPhoto photo{photograph.camera, std::move(photograph.colour),
                     Tensor<uint8_t>(photograph.coverage.shape())};
-  Tensor<float> mean = photo.detail, scratch;
-  gaussian_blur(mean, scratch, photo.camera.height, photo.camera.width, 3, detail_sigma);
+  const Tensor<float>& coverage = photograph.coverage;
+  Tensor<float> mean = photo.detail;
+  take_mean(coverage, 3, blur > 0 ? widest_detail * blur : detail_sigma, mean);
+  if (blur > 0) take_mean(coverage, 3, blur, photo.detail);
   for (int64_t i = 0; i < mean.size(); ++i) photo.detail[i] -= mean[i];
-  for (int64_t i = 0; i < photo.mask.size(); ++i) photo.mask[i] = photograph.coverage[i] >= 0.5F ? 1 : 0;
+  for (int64_t i = 0; i < photo.mask.size(); ++i) photo.mask[i] = coverage[i] >= 0.5F ? 1 : 0;
   return photo;
+}
+
+DetailPhoto cropped(const DetailPhoto& photo) {
+  const int64_t height = photo.mask.dim(0), width = photo.mask.dim(1);
+  int64_t top = height, left = width, bottom = 0, right = 0;
+  for (int64_t y = 0; y < height; ++y) {
+    for (int64_t x = 0; x < width; ++x) {
+      if (photo.mask(y, x) == 0) continue;
+      top = std::min(top, y);
+      left = std::min(left, x);
+      bottom = std::max(bottom, y + 1);
+      right = std::max(right, x + 1);
+    }
+  }
+  if (bottom <= top) return photo;
+  DetailPhoto part{photo.camera, Tensor<float>({bottom - top, right - left, 3}),
+                   Tensor<uint8_t>({bottom - top, right - left})};
+  part.camera.height = static_cast<int>(bottom - top);
+  part.camera.width = static_cast<int>(right - left);
+  part.camera.centre_x -= static_cast<float>(left);
+  part.camera.centre_y -= static_cast<float>(top);
+  for (int64_t y = top; y < bottom; ++y) {
+    std::copy_n(&photo.detail(y, left, 0), 3 * (right - left), &part.detail(y - top, 0, 0));
+    std::copy_n(&photo.mask(y, left), right - left, &part.mask(y - top, 0));
+  }
+  return part;
 }
 
 std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySurface& surface,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "capture/capture.h"
@@ -14,10 +15,22 @@ namespace traceflow {
 // A photograph as alignment compares it.
 struct DetailPhoto {
   Camera<float> camera;
-  Tensor<float> detail;  // H×W×3, the colour less its mean within a few pixels: what shading leaves
+  Tensor<float>
+      detail;  // H×W×3, the colour less its mean within a few pixels of the mask: what shading leaves
   Tensor<uint8_t> mask;  // H×W
 };
-DetailPhoto detail_of(FinePhotograph photograph);
+// blur: pixels; detail is then what is coarser than that and finer than three times it.
+DetailPhoto detail_of(FinePhotograph photograph, double blur = 0);
+
+// The part that the mask covers; as it is where it covers nothing.
+DetailPhoto cropped(const DetailPhoto& photo);
+
+// A photograph at a place between pixels, and its derivatives along both sides.
+struct Looked {
+  Vec3<double> value, by_x, by_y;
+};
+// Bilinear; none outside of the mask or the picture.
+std::optional<Looked> look(const DetailPhoto& photo, double x, double y);
 
 // Points of bodies at rest, with the detail that the photograph of one time shows there.
 struct DetailSample {

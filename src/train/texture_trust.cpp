@@ -32,6 +32,11 @@ bool TextureTrust::holds(const Tensor<double>& taken_back, int64_t body) const {
   return !turned.empty() && turned[body] > enough_turned && taken_back[body] < most_taken_back * turned[body];
 }
 
+bool TextureTrust::holds_texture(int64_t body) const {
+  const bool is_ball = !stiffness.empty() && stiffness(body, 1) < least_stiffness * stiffness(body, 2);
+  return holds_colour(body) && !is_ball;
+}
+
 bool TextureTrust::mirrors(int64_t body) const {
   return !mirror_image.empty() && mirror_image(body, 0) > enough_of_mirror_image &&
          mirror_image(body, 1) < most_unlike * mirror_image(body, 0);

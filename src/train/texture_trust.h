@@ -27,6 +27,9 @@ struct TextureTrust {
   static TextureTrust of(int64_t bodies);
   // Whether the model's colours, and the capture's tracks, belong to the surface.
   bool holds_colour(int64_t body) const { return holds(taken_back_by_colour, body); }
+  // The same, of a body whose shape tells how it turns: photographs of all its times can then be adjusted to
+  // each other.
+  bool holds_texture(int64_t body) const;
   bool holds_tracks(int64_t body) const { return holds(taken_back_by_tracks, body); }
   // Whether photographs show a mirror image on the body.
   bool mirrors(int64_t body) const;

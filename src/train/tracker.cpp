@@ -251,6 +251,54 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
   solver.solve(weights(motion, trust, loose), held);
 }
 
+std::vector<DetailPhoto> Tracker::film_normals(const Surfels& main, const Motion& motion,
+                                               float extent) const {
+  std::vector<DetailPhoto> normals(capture_.train.size());
+  Motion stands = motion;
+  for (int64_t key = 0; key < motion.keys(); ++key) {
+    const PoseSolver at_key = solver(main, nullptr, stands, key, extent);
+    size_t next = 0;
+    for (const size_t view : views_at(motion, key)) {
+      if (load_images(capture_, capture_.train[view])->coverage.empty()) continue;
+      const TrackTarget& target = at_key.targets()[next++];
+      if (target.normal_prior.empty()) continue;
+      DetailPhoto prior{target.camera, target.normal_prior, target.mask};
+      for (int64_t i = 0; i < prior.mask.size(); ++i) {
+        const Vec3<float> n = load3<float>(&prior.detail[3 * i]);
+        if (!(dot(n, n) > 0)) prior.mask[i] = 0;
+      }
+      normals[view] = cropped(prior);
+    }
+  }
+  return normals;
+}
+
+std::vector<FilmView> Tracker::film_views(const Motion& motion, int64_t widest, double blur,
+                                          const std::vector<DetailPhoto>& normals) const {
+  std::vector<FilmView> views;
+  for (int64_t key = 0; key < motion.keys(); ++key) {
+    for (const size_t view : views_at(motion, key)) {
+      FinePhotograph photograph = load_fine_photograph(capture_, capture_.train[view], widest);
+      if (photograph.coverage.empty()) continue;
+      views.push_back({key, drawn_camera(capture_.train[view]),
+                       cropped(detail_of(std::move(photograph), blur)), normals[view]});
+    }
+  }
+  return views;
+}
+
+void Tracker::adjust(const Surfels& main, int32_t body, Motion& motion, Nodes& nodes, float extent) const {
+  constexpr double blurs_across = 60;  // the coarsest blur, in a picture's width
+  const std::vector<DetailPhoto> normals = film_normals(main, motion, extent);
+  PhotometricAdjustment adjustment(main, body, render_.raster_options(extent), motion, &nodes);
+  for (double blur = capture_.train.front().camera.width / blurs_across; blur >= 1; blur /= 2) {
+    adjustment.look_at(film_views(motion, 1, blur, normals));
+    adjustment.solve(options_.adjust);
+  }
+  adjustment.look_at(film_views(motion, widest_photograph, 0, normals));
+  adjustment.solve(options_.adjust);
+}
+
 std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                              const PoseSteps& steps, const TextureTrust& trust) const {
   constexpr double most = 1.1;       // beyond it the first picture misleads

@@ -7,6 +7,7 @@
 #include "scene/scene.h"
 #include "train/new_surface.h"
 #include "train/options.h"
+#include "train/photometric_adjustment.h"
 #include "train/pose_solver.h"
 #include "train/texture_trust.h"
 
@@ -36,6 +37,10 @@ class Tracker {
   // What lies within 0.4 % is not known, and not counted.
   std::vector<double> distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                       const PoseSteps& steps, const TextureTrust& trust) const;
+
+  // Photometric bundle adjustment (train/photometric_adjustment.h) of one body over all keys, on photographs
+  // from coarse to fine.
+  void adjust(const Surfels& main, int32_t body, Motion& motion, Nodes& nodes, float extent) const;
 
   // Makes bodies of parts of bodies (train/body_parts.h) that move by themselves: with poses of their own the
   // keys from 1 to `key` cost clearly less. Those poses are found anew. Returns how many bodies have been
@@ -80,6 +85,12 @@ class Tracker {
                               const LooseTurns& loose, TextureTrust& trust) const;
   void compare_tracks(PoseSolver& solver, const std::vector<EarlierView>& earlier, const Motion& motion,
                       int64_t key) const;
+  // The views as adjustment compares them, photographs at most `widest` wide, less what is finer than `blur`
+  // pixels. normals: priors of each training view, empty where there is none.
+  std::vector<FilmView> film_views(const Motion& motion, int64_t widest, double blur,
+                                   const std::vector<DetailPhoto>& normals) const;
+  // The priors as they agree with what stands still, at the size for tracking.
+  std::vector<DetailPhoto> film_normals(const Surfels& main, const Motion& motion, float extent) const;
   std::vector<size_t> views_at(const Motion& motion, int64_t key) const;
   // Of the pictures that are drawn of a view.
   static Camera<float> drawn_camera(const View& view, int widest = usual_width);

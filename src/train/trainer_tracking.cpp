@@ -75,7 +75,7 @@ void Trainer::settle() {
   }
   let_stand();
   if (!carries_) return;
-  if (options_.deform.bend.nodes > 0) let_bend(misfits);
+  let_bend(misfits);
   if (options_.deform.lighting.cells > 0) let_light_change();
 }
 
@@ -247,10 +247,22 @@ std::vector<double> Trainer::silhouette_misfits() {
 
 void Trainer::let_bend(const std::vector<double>& misfits) {
   const BendOptions& bend = options_.deform.bend;
-  if (misfits.empty() || mean_of(misfits) <= bend.misfit * misfits.front()) return;
-  const Nodes nodes =
-      place_nodes(scene_.main_motion->on(Device::cpu), scene_.main.on(Device::cpu), bend.nodes, bend.every);
+  const TrackOptions& track = options_.deform.track;
+  if (misfits.empty() || bend.nodes == 0) return;
+  const Surfels main = scene_.main.on(Device::cpu);
+  Motion motion = scene_.main_motion->on(Device::cpu);
+  std::vector<bool> bends;
+  for (int64_t body = 0; body < motion.bodies(); ++body) {
+    const float most = texture_trust_.holds_texture(body) ? bend.misfit_textured : bend.misfit;
+    bends.push_back(mean_of(misfits) > most * misfits.front());
+  }
+  Nodes nodes = nodes_of(place_nodes(motion, main, bend.nodes, bend.every), bends);
   if (nodes.count() == 0) return;
+  for (int32_t body = 0; body < motion.bodies() && track.adjust > 0; ++body) {
+    if (!bends[static_cast<size_t>(body)] || !texture_trust_.holds_texture(body)) continue;
+    Tracker(track, options_.render, capture_).adjust(main, body, motion, nodes, scene_.extent);
+    scene_.main_motion = motion.on(device_);
+  }
   scene_.main_nodes = nodes.on(device_);
   optimiser_.begin(*scene_.main_nodes);
 }

@@ -380,6 +380,31 @@ TEST(Bodies, GetNodesThatAreSpreadOverThem) {
   for (int64_t i = 0; i < main.position.size(); ++i) EXPECT_NEAR(bent.position[i], main.position[i], 1e-5);
 }
 
+TEST(Bodies, NodesOfSomeBodiesAreTheirs) {
+  Tumbling at;
+  at.scene.main.opacity_logit.fill(1);
+  Nodes nodes = place_nodes(*at.scene.main_motion, at.scene.main, 12, 3);
+  for (int64_t i = 0; i < nodes.shift.size(); ++i) nodes.shift[i] = static_cast<float>(i);
+  EXPECT_EQ(nodes_of(nodes, {false, false}).count(), 0);
+  const Nodes second = nodes_of(nodes, {false, true});
+  ASSERT_EQ(second.count(), 12);
+  EXPECT_EQ(second.times(), nodes.times());
+  int64_t next = 0;
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    if (nodes.body[n] != 1) continue;
+    EXPECT_EQ(second.body[next], 1);
+    EXPECT_EQ(second.radius[next], nodes.radius[n]);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(second.centre(next, c), nodes.centre(n, c));
+      for (int64_t k = 0; k < nodes.times(); ++k) {
+        EXPECT_EQ(second.turn(next, k, c), nodes.turn(n, k, c));
+        EXPECT_EQ(second.shift(next, k, c), nodes.shift(n, k, c));
+      }
+    }
+    ++next;
+  }
+}
+
 // The middle of a body's light goes where the body goes, and nothing is brighter yet.
 TEST(Bodies, TakeTheMiddleOfTheirLightAlong) {
   Tumbling at;

@@ -40,6 +40,49 @@ Alignment alignment_of(const Surfels& surfels, const LooseTurns& loose) {
           1};
 }
 
+// What is beside the mask does not show in the detail inside.
+TEST(PhotoAlignment, DetailIsOfTheMaskAlone) {
+  const TrackTarget picture = picture_of(patterned_ball(), Vec3<double>(0), false);
+  for (const double blur : {0.0, 2.0}) {
+    std::vector<DetailPhoto> photos;
+    for (const float beside : {0.0F, 0.8F}) {
+      Tensor<float> colour = picture.colour, coverage(picture.coverage.shape());
+      for (int64_t i = 0; i < coverage.size(); ++i) {
+        coverage[i] = picture.mask[i];
+        for (int64_t c = 0; c < 3 && picture.mask[i] == 0; ++c) colour[3 * i + c] = beside;
+      }
+      photos.push_back(detail_of({picture.camera, colour, coverage}, blur));
+    }
+    for (int64_t i = 0; i < photos[0].detail.size(); ++i) {
+      if (photos[0].mask[i / 3] == 0) continue;
+      ASSERT_FLOAT_EQ(photos[0].detail[i], photos[1].detail[i]);
+    }
+  }
+}
+
+// A cropped photograph shows the same where a ray meets it.
+TEST(PhotoAlignment, CroppedPhotosShowTheSame) {
+  TrackTarget picture = picture_of(patterned_ball(), Vec3<double>(0), false);
+  for (int64_t i = 0; i < 20 * picture.camera.width; ++i) picture.coverage[i] = 0;
+  const DetailPhoto whole = photo_of(picture), part = cropped(whole);
+  EXPECT_LT(part.detail.size(), whole.detail.size());
+  const Camera<double> of_whole = convert<double>(whole.camera), of_part = convert<double>(part.camera);
+  int seen = 0;
+  for (double x = -0.6; x < 0.6; x += 0.05) {
+    for (double y = -0.6; y < 0.6; y += 0.05) {
+      const Vec3<double> in_camera = of_whole.point_in_camera(centre + Vec3<double>(x, y, -0.3));
+      const Vec2<double> at = of_whole.project(in_camera), cut = of_part.project(in_camera);
+      const auto a = look(whole, at.x, at.y), b = look(part, cut.x, cut.y);
+      ASSERT_EQ(a.has_value(), b.has_value());
+      if (!a) continue;
+      ++seen;
+      ASSERT_LT(glm::length(a->value - b->value), 1e-5);
+      ASSERT_LT(glm::length(a->by_x - b->by_x) + glm::length(a->by_y - b->by_y), 1e-5);
+    }
+  }
+  EXPECT_GT(seen, 100);
+}
+
 TEST(PhotoAlignment, SamplesLieOnTheBallAndFaceOutwards) {
   const Surfels surfels = patterned_ball();
   const Alignment alignment = alignment_of(surfels, {Mat3<double>(1)});

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <Eigen/Core>
+#include <vector>
+
+namespace traceflow {
+
+// A symmetric positive definite matrix of blocks, of which those farther than `reach` blocks from the
+// diagonal are zero. Only blocks on the diagonal and below it are kept.
+class BandMatrix {
+ public:
+  using Matrix = Eigen::MatrixXd;
+
+  // sizes: rows of each block.
+  BandMatrix(std::vector<int64_t> sizes, int64_t reach);
+
+  int64_t blocks() const { return static_cast<int64_t>(sizes_.size()); }
+  int64_t size() const { return first_.back(); }
+  // The number of a block's first row.
+  int64_t first(int64_t block) const { return first_[static_cast<size_t>(block)]; }
+  // The block at row `row` and column `column`, row − reach ≤ column ≤ row.
+  Matrix& at(int64_t row, int64_t column);
+  // Multiplies the diagonal.
+  void damp(double factor);
+  // Solves for x by Cholesky's factors, which replace the matrix; b becomes x.
+  void solve(Eigen::VectorXd& b);
+
+ private:
+  std::vector<int64_t> sizes_, first_;
+  int64_t reach_;
+  std::vector<Matrix> blocks_;
+};
+
+}  // namespace traceflow
