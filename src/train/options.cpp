@@ -193,7 +193,7 @@ void BendOptions::validate() const {
   check_option(nodes <= 64, "deform.bend.nodes", nodes, "64 or fewer");
   check_option(every > 0, "deform.bend.every", every, "a positive number");
   check_not_negative(misfit, "deform.bend.misfit");
-  check_not_negative(misfit_textured, "deform.bend.misfit_textured");
+  check_not_negative(better, "deform.bend.better");
   check_not_negative(strain, "deform.bend.strain");
   check_not_negative(haste, "deform.bend.haste");
   check_not_negative(travel, "deform.bend.travel");

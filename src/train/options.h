@@ -203,8 +203,8 @@ struct TrackOptions {
     v.field("rounds", rounds, "",
             "Equal parts of the run, at whose ends all poses are solved again, depths held; 0: never.");
     v.field("adjust", adjust, "",
-            "Photometric bundle adjustment of bodies that bend and whose texture is seen to move with them: "
-            "steps on photographs of each size; 0: none.");
+            "Photometric bundle adjustment of bodies that may bend and whose texture is seen to move with "
+            "them: steps on photographs of each size; 0: none.");
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");
@@ -225,7 +225,7 @@ struct BendOptions {
   int nodes = 16;
   int every = 3;
   float misfit = 1.4F;
-  float misfit_textured = 1.15F;
+  float better = 0.65F;
   float strain = 0.01F;
   float haste = 1e-5F;
   float travel = 0.05F;
@@ -236,8 +236,8 @@ struct BendOptions {
     v.field("every", every, "times", "Nodes have a turn and a shift at one of so many times.");
     v.field("misfit", misfit, "",
             "Bodies bend where silhouettes are off by so many times as much as at the first time.");
-    v.field("misfit_textured", misfit_textured, "",
-            "The same for bodies whose texture is seen to move with them, which are followed better.");
+    v.field("better", better, "",
+            "So do bodies whose photographs differ by so many times as much with nodes as without.");
     v.field("strain", strain, "", "Weight of the loss that keeps neighbouring nodes together.");
     v.field("haste", haste, "", "Weight of the loss that keeps nodes slow.");
     v.field("travel", travel, "", "Weight of the loss that keeps nodes where they were at first.");

@@ -287,16 +287,17 @@ std::vector<FilmView> Tracker::film_views(const Motion& motion, int64_t widest, 
   return views;
 }
 
-void Tracker::adjust(const Surfels& main, int32_t body, Motion& motion, Nodes& nodes, float extent) const {
+double Tracker::adjust(const Surfels& main, int32_t body, Motion& motion, Nodes* nodes, float extent) const {
   constexpr double blurs_across = 60;  // the coarsest blur, in a picture's width
   const std::vector<DetailPhoto> normals = film_normals(main, motion, extent);
-  PhotometricAdjustment adjustment(main, body, render_.raster_options(extent), motion, &nodes);
+  PhotometricAdjustment adjustment(main, body, render_.raster_options(extent), motion, nodes);
   for (double blur = capture_.train.front().camera.width / blurs_across; blur >= 1; blur /= 2) {
     adjustment.look_at(film_views(motion, 1, blur, normals));
     adjustment.solve(options_.adjust);
   }
   adjustment.look_at(film_views(motion, widest_photograph, 0, normals));
   adjustment.solve(options_.adjust);
+  return adjustment.mean_texture_cost();
 }
 
 std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& motion, float extent,

@@ -39,8 +39,8 @@ class Tracker {
                                       const PoseSteps& steps, const TextureTrust& trust) const;
 
   // Photometric bundle adjustment (train/photometric_adjustment.h) of one body over all keys, on photographs
-  // from coarse to fine.
-  void adjust(const Surfels& main, int32_t body, Motion& motion, Nodes& nodes, float extent) const;
+  // from coarse to fine. nodes: null where it is rigid. Returns what remains: the mean cost of a point.
+  double adjust(const Surfels& main, int32_t body, Motion& motion, Nodes* nodes, float extent) const;
 
   // Makes bodies of parts of bodies (train/body_parts.h) that move by themselves: with poses of their own the
   // keys from 1 to `key` cost clearly less. Those poses are found anew. Returns how many bodies have been

@@ -118,8 +118,8 @@ class Trainer {
   void begin_anew(const Tensor<int32_t>& carried, Surfels main);
   // What no body carries stands still, unless the pictures are far from the photographs there.
   void let_stand();
-  // Gives bodies nodes, so that they may bend, where silhouettes get worse after the first time; adjusts
-  // those whose texture is trusted to the photographs.
+  // Gives bodies nodes, so that they may bend, where silhouettes get worse after the first time, or where
+  // photographs of a body whose texture is trusted match much better with nodes than without.
   void let_bend(const std::vector<double>& misfits);
   // From then on the light on what stands still may change.
   void let_light_change();

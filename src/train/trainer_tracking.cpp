@@ -251,18 +251,24 @@ void Trainer::let_bend(const std::vector<double>& misfits) {
   if (misfits.empty() || bend.nodes == 0) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
-  std::vector<bool> bends;
-  for (int64_t body = 0; body < motion.bodies(); ++body) {
-    const float most = texture_trust_.holds_texture(body) ? bend.misfit_textured : bend.misfit;
-    bends.push_back(mean_of(misfits) > most * misfits.front());
+  Nodes nodes = place_nodes(motion, main, bend.nodes, bend.every);
+  const Tracker tracker(track, options_.render, capture_);
+  const bool by_silhouettes = mean_of(misfits) > bend.misfit * misfits.front();
+  std::vector<bool> bends(static_cast<size_t>(motion.bodies()), by_silhouettes);
+  for (int32_t body = 0; body < motion.bodies() && nodes.count() > 0 && track.adjust > 0; ++body) {
+    if (!texture_trust_.holds_texture(body)) continue;
+    Motion rigid = motion, bent = motion;
+    Nodes bending = nodes;
+    const double as_rigid = tracker.adjust(main, body, rigid, nullptr, scene_.extent);
+    const double as_bent = tracker.adjust(main, body, bent, &bending, scene_.extent);
+    bends[static_cast<size_t>(body)] = by_silhouettes || as_bent < bend.better * as_rigid;
+    if (!bends[static_cast<size_t>(body)]) continue;
+    motion = bent;
+    nodes = bending;
   }
-  Nodes nodes = nodes_of(place_nodes(motion, main, bend.nodes, bend.every), bends);
+  nodes = nodes_of(nodes, bends);
   if (nodes.count() == 0) return;
-  for (int32_t body = 0; body < motion.bodies() && track.adjust > 0; ++body) {
-    if (!bends[static_cast<size_t>(body)] || !texture_trust_.holds_texture(body)) continue;
-    Tracker(track, options_.render, capture_).adjust(main, body, motion, nodes, scene_.extent);
-    scene_.main_motion = motion.on(device_);
-  }
+  scene_.main_motion = motion.on(device_);
   scene_.main_nodes = nodes.on(device_);
   optimiser_.begin(*scene_.main_nodes);
 }
