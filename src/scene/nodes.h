@@ -17,6 +17,8 @@ struct BasicNodes {
   Tensor<T> radius;      // N, above 0, scene units. Not trained
   Tensor<T> turn;        // N×L×3, rotation vectors, radians
   Tensor<T> shift;       // N×L×3, scene units
+  Tensor<T> anchor;  // N×L×3, where training would keep nodes (ops/motion/nodes.h), in world, scene units.
+                     // Not trained
 
   int64_t count() const { return body.size(); }
   int64_t times() const { return time.size(); }
@@ -24,8 +26,8 @@ struct BasicNodes {
   Device device() const { return centre.device(); }
   // The same nodes on a device.
   BasicNodes on(Device device) const {
-    return {body.on(device),   time.on(device), centre.on(device),
-            radius.on(device), turn.on(device), shift.on(device)};
+    return {body.on(device), time.on(device),  centre.on(device), radius.on(device),
+            turn.on(device), shift.on(device), anchor.on(device)};
   }
 
   // The shapes of others, on their device, in the memory that is there.
@@ -36,7 +38,8 @@ struct BasicNodes {
                                    {&centre, &other.centre},
                                    {&radius, &other.radius},
                                    {&turn, &other.turn},
-                                   {&shift, &other.shift}}) {
+                                   {&shift, &other.shift},
+                                   {&anchor, &other.anchor}}) {
       to->place(device).resize(from->shape());
     }
   }
@@ -61,7 +64,8 @@ BasicNodes<To> zeros_like(const BasicNodes<From>& nodes) {
   const Device device = nodes.device();
   return {Tensor<int32_t>(nodes.body.shape(), device), Tensor<To>(nodes.time.shape(), device),
           Tensor<To>(nodes.centre.shape(), device),    Tensor<To>(nodes.radius.shape(), device),
-          Tensor<To>(nodes.turn.shape(), device),      Tensor<To>(nodes.shift.shape(), device)};
+          Tensor<To>(nodes.turn.shape(), device),      Tensor<To>(nodes.shift.shape(), device),
+          Tensor<To>(nodes.anchor.shape(), device)};
 }
 template <class To, class From>
 BasicNodes<To> convert(const BasicNodes<From>& nodes) {
@@ -70,7 +74,8 @@ BasicNodes<To> convert(const BasicNodes<From>& nodes) {
           convert<To>(nodes.centre),
           convert<To>(nodes.radius),
           convert<To>(nodes.turn),
-          convert<To>(nodes.shift)};
+          convert<To>(nodes.shift),
+          convert<To>(nodes.anchor)};
 }
 
 }  // namespace traceflow

@@ -130,6 +130,7 @@ void put_nodes(const Nodes& nodes, Safetensors& file) {
   file.add("scene/nodes/radius", nodes.radius);
   file.add("scene/nodes/turn", nodes.turn);
   file.add("scene/nodes/shift", nodes.shift);
+  file.add("scene/nodes/anchor", nodes.anchor);
 }
 
 Nodes get_nodes(const Safetensors& file, int64_t bodies) {
@@ -153,6 +154,7 @@ Nodes get_nodes(const Safetensors& file, int64_t bodies) {
   }
   nodes.turn = take(file, "scene/nodes/turn", {count, times, 3});
   nodes.shift = take(file, "scene/nodes/shift", {count, times, 3});
+  nodes.anchor = take(file, "scene/nodes/anchor", {count, times, 3});
   return nodes;
 }
 

@@ -11,6 +11,7 @@
 #include "base/parallel.h"
 #include "math/activation.h"
 #include "ops/motion/motion.h"
+#include "ops/motion/nodes.h"
 #include "scene/neighbours.h"
 #include "scene/rows.h"
 #include "train/inflation.h"
@@ -384,9 +385,10 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
   std::vector<float> times;
   for (int64_t k = 0; k < motion.keys(); k += every) times.push_back(motion.time[k]);
   const auto n = static_cast<int64_t>(body.size()), l = static_cast<int64_t>(times.size());
-  Nodes nodes{tensor_of(body),   tensor_of(times),         Tensor<float>({n, 3}),
-              tensor_of(radius), Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3})};
+  Nodes nodes{tensor_of(body),          tensor_of(times),         Tensor<float>({n, 3}),   tensor_of(radius),
+              Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3})};
   std::copy(centre.begin(), centre.end(), nodes.centre.data());
+  for (int64_t i = 0; i < n * l; ++i) std::copy_n(nodes.centre.row(i / l), 3, &nodes.anchor[3 * i]);
   return nodes;
 }
 
@@ -401,8 +403,26 @@ Nodes nodes_of(const Nodes& nodes, const std::vector<bool>& bodies) {
   if (edit.count() == 0) return {};
   const PlacedEdit kept(edit, Device::cpu);
   const auto rows = [&](const Tensor<float>& values) { return edited_rows(values, kept, false); };
-  return {tensor_of(body),    nodes.time,       rows(nodes.centre),
-          rows(nodes.radius), rows(nodes.turn), rows(nodes.shift)};
+  return {tensor_of(body),  nodes.time,        rows(nodes.centre), rows(nodes.radius),
+          rows(nodes.turn), rows(nodes.shift), rows(nodes.anchor)};
+}
+
+void take_body(int32_t body, const Motion& from, const Nodes& nodes_from, Motion& motion, Nodes& nodes) {
+  std::copy_n(from.rotation.row(body), 4 * motion.keys(), motion.rotation.row(body));
+  std::copy_n(from.shift.row(body), 3 * motion.keys(), motion.shift.row(body));
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    if (nodes.body[n] != body) continue;
+    std::copy_n(nodes_from.turn.row(n), 3 * nodes.times(), nodes.turn.row(n));
+    std::copy_n(nodes_from.shift.row(n), 3 * nodes.times(), nodes.shift.row(n));
+  }
+}
+
+void anchor_nodes(const Motion& motion, int32_t body, Nodes& nodes) {
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    if (nodes.body[n] != body) continue;
+    for (int64_t k = 0; k < nodes.times(); ++k)
+      store3(&nodes.anchor(n, k, 0), nodes::place_of(nodes, motion, n, k));
+  }
 }
 
 namespace {

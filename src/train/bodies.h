@@ -41,6 +41,12 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
 // Those of the bodies that are meant (one value a body). On the CPU.
 Nodes nodes_of(const Nodes& nodes, const std::vector<bool>& bodies);
 
+// Takes a body's poses, and what its nodes do, from elsewhere. On the CPU.
+void take_body(int32_t body, const Motion& from, const Nodes& nodes_from, Motion& motion, Nodes& nodes);
+
+// Training keeps a body's nodes where they are now (ops/motion/nodes.h). On the CPU.
+void anchor_nodes(const Motion& motion, int32_t body, Nodes& nodes);
+
 // Light that has not changed yet, in the box around all places of the bodies' opaque surfels, wider by 0.4 of
 // its longest side in each direction, at every `every`th time of the motion. cells: along the longest side.
 // on_bodies: on bodies too. On the CPU.

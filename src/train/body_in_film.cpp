@@ -24,12 +24,13 @@ BodyInFilm::BodyInFilm(const Surfels& surfels, int32_t of_body, const raster::Op
   choose_points();
 }
 
-void BodyInFilm::look_at(std::vector<FilmView> views) {
+void BodyInFilm::look_at(FilmViews views) {
+  film = std::move(views);
   looks.clear();
-  for (FilmView& view : views) {
-    FilmLook look;
+  for (const FilmView& view : *film) {
+    BodyInView look;
+    look.view = &view;
     if (bends()) look.span = motion::KeySpan<float>(all_nodes->time.data(), times(), motion.time[view.key]);
-    look.view = std::move(view);
     looks.push_back(std::move(look));
   }
   find_what_is_in_front();
@@ -51,27 +52,27 @@ void BodyInFilm::choose_points() {
     const int64_t surfel = opaque[i];
     const Vec4<double> rotation = unit_quaternion(load4<double>(main.rotation.row(surfel)));
     FilmPoint point{load3<double>(main.position.row(surfel)), rotation_from_quaternion(rotation)[2], {}};
-    hold(point);
+    find_nodes(point);
     points.push_back(std::move(point));
   }
 }
 
-void BodyInFilm::hold(FilmPoint& point) const {
+void BodyInFilm::find_nodes(FilmPoint& point) const {
   for (size_t n = 0; n < nodes.size(); ++n) {
     const Vec3<double> arm = (point.rest - load3<double>(all_nodes->centre.row(nodes[n]))) / node_radius(n);
-    point.held.push_back({static_cast<int64_t>(n), -dot(arm, arm) / 2});
+    point.nodes.push_back({static_cast<int64_t>(n), -dot(arm, arm) / 2});
   }
-  std::stable_sort(point.held.begin(), point.held.end(),
-                   [](const HeldBy& a, const HeldBy& b) { return a.weight > b.weight; });
-  if (point.held.size() > most_holders) point.held.resize(most_holders);
+  std::stable_sort(point.nodes.begin(), point.nodes.end(),
+                   [](const NodeWeight& a, const NodeWeight& b) { return a.weight > b.weight; });
+  if (point.nodes.size() > most_nodes) point.nodes.resize(most_nodes);
   double sum = 0;
-  const double largest = point.held.empty() ? 0 : point.held.front().weight;
-  for (HeldBy& held : point.held) sum += held.weight = std::exp(held.weight - largest);
-  for (HeldBy& held : point.held) held.weight /= sum;
+  const double largest = point.nodes.empty() ? 0 : point.nodes.front().weight;
+  for (NodeWeight& of : point.nodes) sum += of.weight = std::exp(of.weight - largest);
+  for (NodeWeight& of : point.nodes) of.weight /= sum;
 }
 
-void BodyInFilm::pose(FilmLook& look) const {
-  look.rotation = rotations_at(motion, look.view.key)[static_cast<size_t>(body)];
+void BodyInFilm::pose(BodyInView& look) const {
+  look.rotation = rotations_at(motion, look.view->key)[static_cast<size_t>(body)];
   look.nodes.clear();
   for (size_t n = 0; n < nodes.size(); ++n) {
     const auto at = [&](const Tensor<float>& values) {
@@ -84,47 +85,47 @@ void BodyInFilm::pose(FilmLook& look) const {
   }
 }
 
-Vec3<double> BodyInFilm::bent(const FilmPoint& point, const FilmLook& look) {
-  if (point.held.empty()) return point.rest;
+Vec3<double> BodyInFilm::bent(const FilmPoint& point, const BodyInView& look) {
+  if (point.nodes.empty()) return point.rest;
   Vec3<double> sum(0);
-  for (const HeldBy& held : point.held) {
-    const NodeInView& node = look.nodes[static_cast<size_t>(held.node)];
-    sum += held.weight * (node.rotation * (point.rest - node.rest) + node.rest + node.shift);
+  for (const NodeWeight& of : point.nodes) {
+    const NodeInView& node = look.nodes[static_cast<size_t>(of.node)];
+    sum += of.weight * (node.rotation * (point.rest - node.rest) + node.rest + node.shift);
   }
   return sum;
 }
-Mat3<double> BodyInFilm::bend_of(const FilmPoint& point, const FilmLook& look) {
+Mat3<double> BodyInFilm::bend_of(const FilmPoint& point, const BodyInView& look) {
   Vec3<double> sum(0);
-  for (const HeldBy& held : point.held) sum += held.weight * look.nodes[static_cast<size_t>(held.node)].turn;
+  for (const NodeWeight& of : point.nodes) sum += of.weight * look.nodes[static_cast<size_t>(of.node)].turn;
   return rotation_from_quaternion(quaternion_exp(sum));
 }
-Vec3<double> BodyInFilm::arm(const FilmPoint& point, const FilmLook& look) const {
+Vec3<double> BodyInFilm::arm(const FilmPoint& point, const BodyInView& look) const {
   return look.rotation * (bent(point, look) - load3<double>(motion.centre.row(body)));
 }
-Vec3<double> BodyInFilm::pivot(const FilmLook& look) const {
-  return load3<double>(motion.centre.row(body)) + load3<double>(&motion.shift(body, look.view.key, 0));
+Vec3<double> BodyInFilm::pivot(const BodyInView& look) const {
+  return load3<double>(motion.centre.row(body)) + load3<double>(&motion.shift(body, look.view->key, 0));
 }
 
 void BodyInFilm::find_what_is_in_front() {
-  for (FilmLook& look : looks) {
+  for (BodyInView& look : looks) {
     pose(look);
     PosedSurfels posed;
-    const float time = motion.time[look.view.key];
+    const float time = motion.time[look.view->key];
     deform::forward(main, nullptr, time, {}, 0, field::Precision::fp32, posed, nullptr);
     if (all_nodes != nullptr) nodes::forward(*all_nodes, main.body, time, {}, posed, *nodes::make_saved());
     motion::forward(motion, main.body, time, {}, posed, *motion::make_saved());
     for (int64_t i = 0; i < main.count(); ++i) posed.opacity[i] = main.body[i] < 0 ? 0 : solid_opacity;
     raster::Output picture;
-    raster::forward(posed, look.view.drawn, options, picture, nullptr);
+    raster::forward(posed, look.view->drawn, options, picture, nullptr);
     find_what_is_in_front(picture, look);
   }
 }
 
-void BodyInFilm::find_what_is_in_front(const raster::Output& picture, FilmLook& look) const {
+void BodyInFilm::find_what_is_in_front(const raster::Output& picture, BodyInView& look) const {
   constexpr float known = 0.7F;         // the share of a pixel that bodies cover
   constexpr double behind = 0.1;        // radii
   constexpr double least_cosine = 0.3;  // between the surface and the ray to it
-  const Camera<double> camera = convert<double>(look.view.drawn);
+  const Camera<double> camera = convert<double>(look.view->drawn);
   look.in_front.assign(points.size(), 0);
   for (size_t i = 0; i < points.size(); ++i) {
     const Vec3<double> at = pivot(look) + arm(points[i], look);
@@ -146,7 +147,7 @@ void BodyInFilm::show(bool with_derivatives) {
       [&](int64_t k) { show(looks[static_cast<size_t>(k)], with_derivatives); }, 1);
 }
 
-void BodyInFilm::show(FilmLook& look, bool with_derivatives) const {
+void BodyInFilm::show(BodyInView& look, bool with_derivatives) const {
   pose(look);
   look.shown.assign(points.size(), {});
   for (size_t i = 0; i < points.size(); ++i) {
@@ -154,15 +155,15 @@ void BodyInFilm::show(FilmLook& look, bool with_derivatives) const {
     ShownPoint& shown = look.shown[i];
     shown.arm = arm(points[i], look);
     shown.bend = bend_of(points[i], look);
-    shown.is = show(look, look.view.photo, 0, with_derivatives, shown);
-    if (!shown.is || look.view.normals.detail.empty()) continue;
-    shown.has_normal = show(look, look.view.normals, 3, with_derivatives, shown);
+    shown.is_shown = show(look, look.view->photo, 0, with_derivatives, shown);
+    if (!shown.is_shown || look.view->normals.detail.empty()) continue;
+    shown.has_normal = show(look, look.view->normals, 3, with_derivatives, shown);
     if (shown.has_normal) take_to_rest(look, with_derivatives, shown);
   }
 }
 
 // Three film_channels at a point, and how they change with it; false where the picture does not show it.
-bool BodyInFilm::show(const FilmLook& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
+bool BodyInFilm::show(const BodyInView& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
                       ShownPoint& shown) const {
   const Camera<double> camera = convert<double>(photo.camera);
   const Vec3<double> in_camera = camera.point_in_camera(pivot(look) + shown.arm);
@@ -181,7 +182,7 @@ bool BodyInFilm::show(const FilmLook& look, const DetailPhoto& photo, size_t fir
   return true;
 }
 
-void BodyInFilm::take_to_rest(const FilmLook& look, bool with_derivatives, ShownPoint& shown) {
+void BodyInFilm::take_to_rest(const BodyInView& look, bool with_derivatives, ShownPoint& shown) {
   const Vec3<double> in_body =
       transpose(look.rotation) * Vec3<double>(shown.value[3], shown.value[4], shown.value[5]);
   const Vec3<double> at_rest = transpose(shown.bend) * in_body;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "ops/motion/key_span.h"
@@ -22,11 +23,14 @@ struct FilmView {
   DetailPhoto normals;  // the prior's, in world, where the mask is set; empty without
 };
 
-inline constexpr size_t film_channels = 6;  // detail and normal
-inline constexpr size_t most_holders = 4;   // nodes that hold a point: those of the largest weights
+// Ascending by key.
+using FilmViews = std::shared_ptr<const std::vector<FilmView>>;
 
-// A node that holds a point: its place among those of the body, and its weight.
-struct HeldBy {
+inline constexpr size_t film_channels = 6;  // detail and normal
+inline constexpr size_t most_nodes = 4;     // that move a point: those of the largest weights
+
+// A node that moves a point: its place among those of the body, and its weight.
+struct NodeWeight {
   int64_t node = 0;
   double weight = 0;
 };
@@ -34,7 +38,7 @@ struct HeldBy {
 // A point of the body's surface at rest.
 struct FilmPoint {
   Vec3<double> rest, normal;
-  std::vector<HeldBy> held;
+  std::vector<NodeWeight> nodes;
 };
 
 // A node at the time of a view.
@@ -45,7 +49,7 @@ struct NodeInView {
 
 // What a view shows of a point.
 struct ShownPoint {
-  bool is = false, has_normal = false;
+  bool is_shown = false, has_normal = false;
   Mat3<double> bend{1};
   Vec3<double> arm{0};  // from the body's pivot, in world
   std::array<double, film_channels> value{};
@@ -53,9 +57,9 @@ struct ShownPoint {
   std::array<Vec3<double>, 3> by_turn{};               // of the normal, by a turn of the bent frame
 };
 
-// A view, and what it shows.
-struct FilmLook {
-  FilmView view;
+// Where the body is in a view, and what that shows of it.
+struct BodyInView {
+  const FilmView* view = nullptr;
   motion::KeySpan<float> span{nullptr, 0, 0};  // of the nodes' times
   std::vector<NodeInView> nodes;
   Mat3<double> rotation{1};
@@ -73,7 +77,8 @@ struct BodyInFilm {
   double radius = 1;           // root mean square of its surfels' distances from its pivot
   std::vector<int64_t> nodes;  // of the body
   std::vector<FilmPoint> points;
-  std::vector<FilmLook> looks;
+  FilmViews film;
+  std::vector<BodyInView> looks;
 
   // At most 1,000 points: opaque surfels, evenly drawn.
   BodyInFilm(const Surfels& surfels, int32_t of_body, const raster::Options& drawing, Motion& moves,
@@ -85,29 +90,29 @@ struct BodyInFilm {
   float* turn(size_t n, int64_t time) const { return &all_nodes->turn(nodes[n], time, 0); }
   float* shift(size_t n, int64_t time) const { return &all_nodes->shift(nodes[n], time, 0); }
 
-  // Takes views, ascending by key, instead of those it had.
-  void look_at(std::vector<FilmView> views);
+  // Takes views instead of those it had.
+  void look_at(FilmViews views);
   // By pictures of all bodies where they stand.
   void find_what_is_in_front();
   // What each view shows where the body stands.
   void show(bool with_derivatives);
   // Where the body's pivot is at the time of a view.
-  Vec3<double> pivot(const FilmLook& look) const;
+  Vec3<double> pivot(const BodyInView& look) const;
 
  private:
   void choose_points();
-  void hold(FilmPoint& point) const;
-  void pose(FilmLook& look) const;
-  static Vec3<double> bent(const FilmPoint& point, const FilmLook& look);
-  static Mat3<double> bend_of(const FilmPoint& point, const FilmLook& look);
-  Vec3<double> arm(const FilmPoint& point, const FilmLook& look) const;
-  void find_what_is_in_front(const raster::Output& picture, FilmLook& look) const;
-  void show(FilmLook& look, bool with_derivatives) const;
+  void find_nodes(FilmPoint& point) const;
+  void pose(BodyInView& look) const;
+  static Vec3<double> bent(const FilmPoint& point, const BodyInView& look);
+  static Mat3<double> bend_of(const FilmPoint& point, const BodyInView& look);
+  Vec3<double> arm(const FilmPoint& point, const BodyInView& look) const;
+  void find_what_is_in_front(const raster::Output& picture, BodyInView& look) const;
+  void show(BodyInView& look, bool with_derivatives) const;
   // Three channels at a point, and how they change with it; false where the picture does not show it.
-  bool show(const FilmLook& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
+  bool show(const BodyInView& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
             ShownPoint& shown) const;
   // The normal, as it would be at rest, and its derivatives.
-  static void take_to_rest(const FilmLook& look, bool with_derivatives, ShownPoint& shown);
+  static void take_to_rest(const BodyInView& look, bool with_derivatives, ShownPoint& shown);
 };
 
 }  // namespace traceflow

@@ -77,6 +77,16 @@ Json to_json(const events::DensityChanged& e) {
           {"count", e.count}};
 }
 
+Json to_json(const events::BendingDecided& e) {
+  Json json = {{"event", "bending_decided"},
+               {"iteration", e.iteration},
+               {"body", e.body},
+               {"bends", e.bends},
+               {"silhouettes", e.silhouettes}};
+  if (e.photographs) json["photographs"] = *e.photographs;
+  return json;
+}
+
 Json to_json(const events::PhaseEntered& e) {
   return {{"event", "phase_entered"}, {"iteration", e.iteration}, {"phase", e.phase}};
 }

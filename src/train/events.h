@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -73,6 +74,15 @@ struct DensityChanged {
   int64_t count = 0;    // surfels of the set from now on
 };
 
+// Whether a body bends has been decided (train/options.h, BendOptions).
+struct BendingDecided {
+  int64_t iteration = 0;
+  int64_t body = 0;
+  bool bends = false;
+  double silhouettes = 0;             // mean misfit, of all bodies, over that of the first view
+  std::optional<double> photographs;  // what differs of them with nodes, over without; of textured bodies
+};
+
 struct PhaseEntered {
   int64_t iteration = 0;
   std::string phase;
@@ -133,8 +143,8 @@ struct Finished {
   std::string reason;  // one line where the ending is not `completed`
 };
 
-using Event = std::variant<Started, Step, DensityChanged, PhaseEntered, Evaluated, Warning, Paused, Saved,
-                           Measured, Finished>;
+using Event = std::variant<Started, Step, DensityChanged, BendingDecided, PhaseEntered, Evaluated, Warning,
+                           Paused, Saved, Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
 // Hands every event to every listener, in the order in which they were added.

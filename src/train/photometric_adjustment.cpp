@@ -35,7 +35,7 @@ struct ViewPair {
 };
 
 // Numbers of the equations that follow each other, and where they come from: a pair's numbers, times a share.
-struct NumberRun {
+struct Segment {
   int64_t block, offset, from, size;
   double share;
 };
@@ -95,7 +95,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
   }
   int64_t block_of(int64_t key) const { return block_of_key[static_cast<size_t>(key)]; }
 
-  void look_at(std::vector<FilmView> views) {
+  void look_at(FilmViews views) {
     BodyInFilm::look_at(std::move(views));
     pair_views();
     find_rays();
@@ -107,18 +107,18 @@ struct PhotometricAdjustment::State : BodyInFilm {
     pairs.clear();
     reach = 1;
     for (size_t later = 0; later < looks.size(); ++later) {
-      const FilmView& view = looks[later].view;
+      const FilmView& view = *looks[later].view;
       for (const int64_t apart : keys_apart) {
         std::optional<size_t> nearest;
         const auto away = [&](size_t other) {
-          return distance(looks[other].view.drawn.position, view.drawn.position);
+          return distance(looks[other].view->drawn.position, view.drawn.position);
         };
         for (size_t k = 0; k < later; ++k) {
-          if (looks[k].view.key == view.key - apart && (!nearest || away(k) < away(*nearest))) nearest = k;
+          if (looks[k].view->key == view.key - apart && (!nearest || away(k) < away(*nearest))) nearest = k;
         }
         if (!nearest) continue;
         pairs.push_back({later, *nearest});
-        reach = std::max(reach, block_of(view.key) + 1 - block_of(looks[*nearest].view.key));
+        reach = std::max(reach, block_of(view.key) + 1 - block_of(looks[*nearest].view->key));
       }
     }
     reach = std::min<int64_t>(reach, static_cast<int64_t>(block_sizes.size()) - 1);
@@ -126,39 +126,40 @@ struct PhotometricAdjustment::State : BodyInFilm {
 
   void find_rays() {
     pose_rays.assign(static_cast<size_t>(motion.keys()), Vec3<double>(0));
-    for (const FilmLook& look : looks) {
-      const int64_t key = look.view.key;
+    for (const BodyInView& look : looks) {
+      const int64_t key = look.view->key;
       pose_rays[static_cast<size_t>(key)] =
           normalize(load3<double>(motion.centre.row(body)) + load3<double>(&motion.shift(body, key, 0)) -
-                    Vec3<double>(look.view.drawn.position));
+                    Vec3<double>(look.view->drawn.position));
     }
     node_rays.assign(nodes.size() * static_cast<size_t>(times()), Vec3<double>(0));
     for (int64_t time = 0; time < times() && !looks.empty(); ++time) {
-      const auto away = [&](const FilmLook& look) {
-        return std::abs(motion.time[look.view.key] - all_nodes->time[time]);
+      const auto away = [&](const BodyInView& look) {
+        return std::abs(motion.time[look.view->key] - all_nodes->time[time]);
       };
-      const FilmLook& look =
+      const BodyInView& look =
           *std::min_element(looks.begin(), looks.end(),
-                            [&](const FilmLook& a, const FilmLook& b) { return away(a) < away(b); });
-      const Mat3<double> rotation = rotations_at(motion, look.view.key)[static_cast<size_t>(body)];
+                            [&](const BodyInView& a, const BodyInView& b) { return away(a) < away(b); });
+      const Mat3<double> rotation = rotations_at(motion, look.view->key)[static_cast<size_t>(body)];
       const Vec3<double> pivot = load3<double>(motion.centre.row(body));
       for (size_t n = 0; n < nodes.size(); ++n) {
         const Vec3<double> arm =
             load3<double>(all_nodes->centre.row(nodes[n])) + load3<double>(shift(n, time)) - pivot;
-        const Vec3<double> at = pivot + rotation * arm + load3<double>(&motion.shift(body, look.view.key, 0));
+        const Vec3<double> at =
+            pivot + rotation * arm + load3<double>(&motion.shift(body, look.view->key, 0));
         node_rays[static_cast<size_t>(time) * nodes.size() + n] =
-            transpose(rotation) * normalize(at - Vec3<double>(look.view.drawn.position));
+            transpose(rotation) * normalize(at - Vec3<double>(look.view->drawn.position));
       }
     }
   }
 
   double pair_cost(const ViewPair& pair) const {
-    const FilmLook &later = looks[pair.later], &earlier = looks[pair.earlier];
+    const BodyInView &later = looks[pair.later], &earlier = looks[pair.earlier];
     double cost = 0;
     for (size_t i = 0; i < points.size(); ++i) {
       if (later.in_front[i] == 0 || earlier.in_front[i] == 0) continue;
       const ShownPoint &a = later.shown[i], &b = earlier.shown[i];
-      if (!a.is || !b.is) {
+      if (!a.is_shown || !b.is_shown) {
         cost += robust_width / 2;  // leaving the view pays no better than a difference
         continue;
       }
@@ -184,19 +185,19 @@ struct PhotometricAdjustment::State : BodyInFilm {
     return static_cast<double>(count);
   }
 
-  // One channel's derivatives by what one view sees: of the nodes that hold the point, and of the pose.
+  // One channel's derivatives by what one view sees: of the nodes that move the point, and of the pose.
   // by_point: in the frame at rest; by_turn: of the bent frame.
   template <class F>
-  void for_numbers(const FilmPoint& point, const FilmLook& look, const ShownPoint& shown,
+  void for_numbers(const FilmPoint& point, const BodyInView& look, const ShownPoint& shown,
                    const Vec3<double>& by_point, const Vec3<double>& by_turn, F&& f) const {
     const Vec3<double> in_body = shown.bend * by_point;
-    for (const HeldBy& held : point.held) {
-      const auto n = static_cast<size_t>(held.node);
+    for (const NodeWeight& of : point.nodes) {
+      const auto n = static_cast<size_t>(of.node);
       const NodeInView& node = look.nodes[n];
-      const Vec3<double> force = held.weight * in_body;
+      const Vec3<double> force = of.weight * in_body;
       const Vec3<double> torque =
-          cross(node.rotation * (point.rest - node.rest), force) + held.weight * by_turn;
-      f(pose_numbers * held.node, torque, node_radius(n) * force);
+          cross(node.rotation * (point.rest - node.rest), force) + of.weight * by_turn;
+      f(pose_numbers * of.node, torque, node_radius(n) * force);
     }
     const Vec3<double> in_world = look.rotation * in_body;
     f(node_numbers(), cross(shown.arm, in_world) + look.rotation * by_turn, radius * in_world);
@@ -208,12 +209,12 @@ struct PhotometricAdjustment::State : BodyInFilm {
   void add_pair(const ViewPair& pair, Derivatives derivatives, Eigen::MatrixXd& a, Eigen::VectorXd& b) const {
     a.setZero(2 * view_numbers(), 2 * view_numbers());
     b.setZero(2 * view_numbers());
-    const FilmLook &later = looks[pair.later], &earlier = looks[pair.earlier];
-    std::array<int64_t, 2 * pose_numbers*(most_holders + 1)> at{};
-    std::array<double, 2 * pose_numbers*(most_holders + 1)> row{};
+    const BodyInView &later = looks[pair.later], &earlier = looks[pair.earlier];
+    std::array<int64_t, 2 * pose_numbers*(most_nodes + 1)> at{};
+    std::array<double, 2 * pose_numbers*(most_nodes + 1)> row{};
     for (size_t i = 0; i < points.size(); ++i) {
       const std::array<const ShownPoint*, 2> shown = {&later.shown[i], &earlier.shown[i]};
-      if (!shown[0]->is || !shown[1]->is) continue;
+      if (!shown[0]->is_shown || !shown[1]->is_shown) continue;
       const size_t count = shown[0]->has_normal && shown[1]->has_normal ? film_channels : 3;
       for (size_t c = 0; c < count; ++c) {
         const double residual = weight_of(c) * (shown[0]->value[c] - shown[1]->value[c]);
@@ -248,24 +249,24 @@ struct PhotometricAdjustment::State : BodyInFilm {
     }
   }
 
-  std::array<NumberRun, 3> parts_of(const FilmLook& look, int64_t from) const {
-    const int64_t count = node_numbers(), key = look.view.key;
-    return {NumberRun{look.span.from, 0, from, count, 1 - look.span.share},
-            NumberRun{look.span.to, 0, from, count, look.span.share},
-            NumberRun{block_of(key), pose_offset(key), from + count, pose_numbers, 1}};
+  std::array<Segment, 3> parts_of(const BodyInView& look, int64_t from) const {
+    const int64_t count = node_numbers(), key = look.view->key;
+    return {Segment{look.span.from, 0, from, count, 1 - look.span.share},
+            Segment{look.span.to, 0, from, count, look.span.share},
+            Segment{block_of(key), pose_offset(key), from + count, pose_numbers, 1}};
   }
 
   void scatter(const ViewPair& pair, const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
                Equations& to) const {
-    const std::array<NumberRun, 3> later = parts_of(looks[pair.later], 0),
-                                   earlier = parts_of(looks[pair.earlier], view_numbers());
-    std::array<NumberRun, 6> parts{};
+    const std::array<Segment, 3> later = parts_of(looks[pair.later], 0),
+                                 earlier = parts_of(looks[pair.earlier], view_numbers());
+    std::array<Segment, 6> parts{};
     std::copy(later.begin(), later.end(), parts.begin());
     std::copy(earlier.begin(), earlier.end(), parts.begin() + 3);
-    for (const NumberRun& p : parts) {
+    for (const Segment& p : parts) {
       if (p.share == 0 || p.size == 0) continue;
       to.b.segment(to.a.first(p.block) + p.offset, p.size) += p.share * b.segment(p.from, p.size);
-      for (const NumberRun& q : parts) {
+      for (const Segment& q : parts) {
         if (q.share == 0 || q.size == 0 || q.block > p.block) continue;
         to.a.at(p.block, q.block).block(p.offset, q.offset, p.size, q.size) +=
             p.share * q.share * a.block(p.from, q.from, p.size, q.size);
@@ -468,8 +469,9 @@ PhotometricAdjustment::PhotometricAdjustment(const Surfels& main, int32_t body,
                                              const raster::Options& options, Motion& motion, Nodes* nodes)
     : state_(std::make_unique<State>(main, body, options, motion, nodes)) {}
 PhotometricAdjustment::~PhotometricAdjustment() = default;
+PhotometricAdjustment::PhotometricAdjustment(PhotometricAdjustment&&) noexcept = default;
 
-void PhotometricAdjustment::look_at(std::vector<FilmView> views) { state_->look_at(std::move(views)); }
+void PhotometricAdjustment::look_at(FilmViews views) { state_->look_at(std::move(views)); }
 
 void PhotometricAdjustment::solve(int steps) {
   for (int k = 0; k < steps && !state_->pairs.empty(); ++k) {

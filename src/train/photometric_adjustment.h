@@ -30,9 +30,10 @@ class PhotometricAdjustment {
   PhotometricAdjustment(const Surfels& main, int32_t body, const raster::Options& options, Motion& motion,
                         Nodes* nodes);
   ~PhotometricAdjustment();
+  PhotometricAdjustment(PhotometricAdjustment&&) noexcept;
 
-  // Takes views of another size, ascending by key.
-  void look_at(std::vector<FilmView> views);
+  // Takes views of another size.
+  void look_at(FilmViews views);
   // Up to so many steps, as long as the cost falls.
   void solve(int steps);
   // The robust cost of the views, without what keeps the shape: a mean over compared points.

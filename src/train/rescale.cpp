@@ -1,9 +1,55 @@
 #include "train/rescale.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+
+#include "ops/motion/key_span.h"
+#include "ops/motion/nodes.h"
 
 namespace traceflow {
+
+namespace {
+
+// Sizes that are tried: 1 + size_step · i, i from −most_steps to most_steps.
+constexpr double size_step = 0.0025;
+constexpr size_t most_steps = 60, sizes = 2 * most_steps + 1;
+double growth(size_t i) { return size_step * (static_cast<double>(i) - static_cast<double>(most_steps)); }
+
+Vec3<double> scaled(const Vec3<double>& point, const Vec3<double>& about, double by) {
+  return about + by * (point - about);
+}
+
+int64_t nearest_key(const Motion& motion, float time) {
+  int64_t nearest = 0;
+  for (int64_t k = 1; k < motion.keys(); ++k) {
+    if (std::abs(motion.time[k] - time) < std::abs(motion.time[nearest] - time)) nearest = k;
+  }
+  return nearest;
+}
+
+// How much of a body has left its place, with each size at the k-th time.
+std::array<double, sizes> costs_of_sizes(const Vec3<double>& eye, const Motion& motion, const Nodes& nodes,
+                                         int32_t body, int64_t k) {
+  constexpr double near = 0.5;  // radii
+  constexpr double stays = 10;
+  std::array<double, sizes> left{};
+  double count = 0;
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    if (nodes.body[n] != body) continue;
+    ++count;
+    const Vec3<double> now = nodes::place_of(nodes, motion, n, k), first = load3<double>(nodes.centre.row(n));
+    for (size_t i = 0; i < sizes; ++i) {
+      const Vec3<double> off = (scaled(now, eye, 1 + growth(i)) - first) / (near * nodes.radius[n]);
+      left[i] += dot(off, off) / (1 + dot(off, off));
+    }
+  }
+  for (size_t i = 0; i < sizes; ++i) left[i] = left[i] / std::max(1.0, count) + stays * growth(i) * growth(i);
+  return left;
+}
+
+}  // namespace
 
 std::optional<std::vector<Vec3<double>>> positions_of_single_cameras(const Capture& capture,
                                                                      const Motion& motion) {
@@ -37,6 +83,58 @@ void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<dou
       const Vec3<double> at = centre + load3<double>(shift);
       store3(shift, towards(at, eyes[static_cast<size_t>(key)], ratio[static_cast<size_t>(b)]) - centre);
     }
+  }
+}
+
+std::vector<double> standing_ratios(const std::vector<Vec3<double>>& eyes, const Motion& motion,
+                                    const Nodes& nodes, int32_t body) {
+  constexpr double steady = 30;
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  const auto times = static_cast<size_t>(nodes.times());
+  std::vector<std::array<size_t, sizes>> came_from(times);
+  std::array<double, sizes> best{};
+  best.fill(infinite);
+  best[most_steps] = 0;
+  for (size_t k = 1; k < times; ++k) {
+    const auto key = static_cast<size_t>(nearest_key(motion, nodes.time[static_cast<int64_t>(k)]));
+    const std::array<double, sizes> here =
+        costs_of_sizes(eyes[key], motion, nodes, body, static_cast<int64_t>(k));
+    std::array<double, sizes> next{};
+    for (size_t to = 0; to < sizes; ++to) {
+      next[to] = infinite;
+      for (size_t from = 0; from < sizes; ++from) {
+        const double change = growth(to) - growth(from);
+        const double cost = best[from] + steady * change * change;
+        if (cost < next[to]) next[to] = cost, came_from[k][to] = from;
+      }
+      next[to] += here[to];
+    }
+    best = next;
+  }
+  std::vector<double> ratios(times, 1);
+  auto at = static_cast<size_t>(std::min_element(best.begin(), best.end()) - best.begin());
+  for (size_t k = times; k-- > 1; at = came_from[k][at]) ratios[k] = 1 + growth(at);
+  return ratios;
+}
+
+void rescale_bent_body(const std::vector<double>& ratios, const std::vector<Vec3<double>>& eyes, int32_t body,
+                       Motion& motion, Nodes& nodes) {
+  const Vec3<double> pivot = load3<double>(motion.centre.row(body));
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    if (nodes.body[n] != body) continue;
+    const Vec3<double> rest = load3<double>(nodes.centre.row(n));
+    for (int64_t k = 0; k < nodes.times(); ++k) {
+      float* const shift = &nodes.shift(n, k, 0);
+      store3(shift, scaled(rest + load3<double>(shift), pivot, ratios[static_cast<size_t>(k)]) - rest);
+    }
+  }
+  for (int64_t key = 0; key < motion.keys(); ++key) {
+    const motion::KeySpan<float> span(nodes.time.data(), nodes.times(), motion.time[key]);
+    const double from = ratios[static_cast<size_t>(span.from)], to = ratios[static_cast<size_t>(span.to)];
+    float* const shift = &motion.shift(body, key, 0);
+    store3(shift, scaled(pivot + load3<double>(shift), eyes[static_cast<size_t>(key)],
+                         from + span.share * (to - from)) -
+                      pivot);
   }
 }
 

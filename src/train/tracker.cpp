@@ -10,6 +10,7 @@
 #include "train/body_parts.h"
 #include "train/mirror_image.h"
 #include "train/redetection.h"
+#include "train/rescale.h"
 
 namespace traceflow {
 
@@ -273,8 +274,8 @@ std::vector<DetailPhoto> Tracker::film_normals(const Surfels& main, const Motion
   return normals;
 }
 
-std::vector<FilmView> Tracker::film_views(const Motion& motion, int64_t widest, double blur,
-                                          const std::vector<DetailPhoto>& normals) const {
+FilmViews Tracker::film_views(const Motion& motion, int64_t widest, double blur,
+                              const std::vector<DetailPhoto>& normals) const {
   std::vector<FilmView> views;
   for (int64_t key = 0; key < motion.keys(); ++key) {
     for (const size_t view : views_at(motion, key)) {
@@ -284,20 +285,43 @@ std::vector<FilmView> Tracker::film_views(const Motion& motion, int64_t widest, 
                        cropped(detail_of(std::move(photograph), blur)), normals[view]});
     }
   }
-  return views;
+  return std::make_shared<const std::vector<FilmView>>(std::move(views));
 }
 
-double Tracker::adjust(const Surfels& main, int32_t body, Motion& motion, Nodes* nodes, float extent) const {
+std::vector<Tracker::Adjusted> Tracker::adjust(const Surfels& main, const std::vector<int32_t>& bodies,
+                                               const Motion& motion, const Nodes& nodes, float extent) const {
   constexpr double blurs_across = 60;  // the coarsest blur, in a picture's width
-  const std::vector<DetailPhoto> normals = film_normals(main, motion, extent);
-  PhotometricAdjustment adjustment(main, body, render_.raster_options(extent), motion, nodes);
-  for (double blur = capture_.train.front().camera.width / blurs_across; blur >= 1; blur /= 2) {
-    adjustment.look_at(film_views(motion, 1, blur, normals));
-    adjustment.solve(options_.adjust);
+  std::vector<Adjusted> adjusted(bodies.size());
+  std::vector<Motion> rigid(bodies.size(), motion);
+  std::vector<PhotometricAdjustment> as_rigid, as_bent;
+  const raster::Options drawing = render_.raster_options(extent);
+  for (size_t b = 0; b < bodies.size(); ++b) {
+    adjusted[b] = {bodies[b], 0, 0, motion, nodes};
+    as_rigid.emplace_back(main, bodies[b], drawing, rigid[b], nullptr);
+    as_bent.emplace_back(main, bodies[b], drawing, adjusted[b].motion, &adjusted[b].nodes);
   }
-  adjustment.look_at(film_views(motion, widest_photograph, 0, normals));
-  adjustment.solve(options_.adjust);
-  return adjustment.mean_texture_cost();
+  const std::vector<DetailPhoto> normals = film_normals(main, motion, extent);
+  const auto solve = [&](int64_t widest, double blur) {
+    const FilmViews views = film_views(motion, widest, blur, normals);
+    for (std::vector<PhotometricAdjustment>* tried : {&as_rigid, &as_bent}) {
+      for (PhotometricAdjustment& adjustment : *tried) {
+        adjustment.look_at(views);
+        adjustment.solve(options_.adjust);
+      }
+    }
+  };
+  for (double blur = capture_.train.front().camera.width / blurs_across; blur >= 1; blur /= 2) solve(1, blur);
+  solve(widest_photograph, 0);
+  const std::optional<std::vector<Vec3<double>>> eyes = positions_of_single_cameras(capture_, motion);
+  for (size_t b = 0; b < bodies.size(); ++b) {
+    Adjusted& result = adjusted[b];
+    result.as_rigid = as_rigid[b].mean_texture_cost();
+    result.as_bent = as_bent[b].mean_texture_cost();
+    if (!eyes) continue;
+    const std::vector<double> ratios = standing_ratios(*eyes, result.motion, result.nodes, result.body);
+    rescale_bent_body(ratios, *eyes, result.body, result.motion, result.nodes);
+  }
+  return adjusted;
 }
 
 std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& motion, float extent,

@@ -38,9 +38,18 @@ class Tracker {
   std::vector<double> distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                       const PoseSteps& steps, const TextureTrust& trust) const;
 
-  // Photometric bundle adjustment (train/photometric_adjustment.h) of one body over all keys, on photographs
-  // from coarse to fine. nodes: null where it is rigid. Returns what remains: the mean cost of a point.
-  double adjust(const Surfels& main, int32_t body, Motion& motion, Nodes* nodes, float extent) const;
+  // Photometric bundle adjustment (train/photometric_adjustment.h) of each of some bodies over all keys, on
+  // photographs from coarse to fine: as if it were rigid, and as its nodes bend it. To one camera what grows
+  // looks like what comes closer: of the two, bodies that bend then do what leaves the most of them in place
+  // (train/rescale.h).
+  struct Adjusted {
+    int32_t body = 0;
+    double as_rigid = 0, as_bent = 0;  // what remains: the mean cost of a point
+    Motion motion;                     // as bent, like the nodes
+    Nodes nodes;
+  };
+  std::vector<Adjusted> adjust(const Surfels& main, const std::vector<int32_t>& bodies, const Motion& motion,
+                               const Nodes& nodes, float extent) const;
 
   // Makes bodies of parts of bodies (train/body_parts.h) that move by themselves: with poses of their own the
   // keys from 1 to `key` cost clearly less. Those poses are found anew. Returns how many bodies have been
@@ -87,8 +96,8 @@ class Tracker {
                       int64_t key) const;
   // The views as adjustment compares them, photographs at most `widest` wide, less what is finer than `blur`
   // pixels. normals: priors of each training view, empty where there is none.
-  std::vector<FilmView> film_views(const Motion& motion, int64_t widest, double blur,
-                                   const std::vector<DetailPhoto>& normals) const;
+  FilmViews film_views(const Motion& motion, int64_t widest, double blur,
+                       const std::vector<DetailPhoto>& normals) const;
   // The priors as they agree with what stands still, at the size for tracking.
   std::vector<DetailPhoto> film_normals(const Surfels& main, const Motion& motion, float extent) const;
   std::vector<size_t> views_at(const Motion& motion, int64_t key) const;

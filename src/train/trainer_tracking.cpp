@@ -252,19 +252,30 @@ void Trainer::let_bend(const std::vector<double>& misfits) {
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   Nodes nodes = place_nodes(motion, main, bend.nodes, bend.every);
-  const Tracker tracker(track, options_.render, capture_);
-  const bool by_silhouettes = mean_of(misfits) > bend.misfit * misfits.front();
-  std::vector<bool> bends(static_cast<size_t>(motion.bodies()), by_silhouettes);
-  for (int32_t body = 0; body < motion.bodies() && nodes.count() > 0 && track.adjust > 0; ++body) {
-    if (!texture_trust_.holds_texture(body)) continue;
-    Motion rigid = motion, bent = motion;
-    Nodes bending = nodes;
-    const double as_rigid = tracker.adjust(main, body, rigid, nullptr, scene_.extent);
-    const double as_bent = tracker.adjust(main, body, bent, &bending, scene_.extent);
-    bends[static_cast<size_t>(body)] = by_silhouettes || as_bent < bend.better * as_rigid;
-    if (!bends[static_cast<size_t>(body)]) continue;
-    motion = bent;
-    nodes = bending;
+  if (nodes.count() == 0) return;
+  const double silhouettes = misfits.front() > 0 ? mean_of(misfits) / misfits.front() : 1;
+  std::vector<int32_t> textured;
+  for (int32_t body = 0; body < motion.bodies() && track.adjust > 0; ++body) {
+    if (texture_trust_.holds_texture(body)) textured.push_back(body);
+  }
+  std::vector<Tracker::Adjusted> adjusted;
+  if (!textured.empty()) {
+    adjusted = Tracker(track, options_.render, capture_).adjust(main, textured, motion, nodes, scene_.extent);
+  }
+  std::vector<bool> bends(static_cast<size_t>(motion.bodies()), silhouettes > bend.misfit);
+  for (const Tracker::Adjusted& body : adjusted) {
+    const auto b = static_cast<size_t>(body.body);
+    bends[b] = bends[b] || body.as_bent < bend.better * body.as_rigid;
+    if (bends[b]) take_body(body.body, body.motion, body.nodes, motion, nodes);
+    anchor_nodes(motion, body.body, nodes);
+  }
+  for (size_t b = 0; b < bends.size(); ++b) {
+    events::BendingDecided decided{iteration_, static_cast<int64_t>(b), bends[b], silhouettes, std::nullopt};
+    for (const Tracker::Adjusted& body : adjusted) {
+      if (static_cast<size_t>(body.body) == b && body.as_rigid > 0)
+        decided.photographs = body.as_bent / body.as_rigid;
+    }
+    stream_.emit(decided);
   }
   nodes = nodes_of(nodes, bends);
   if (nodes.count() == 0) return;

@@ -55,6 +55,7 @@ Scene full_scene() {
                            noise({3, 3}, random),
                            tensor_of(std::vector<float>{1, 2, 3}),
                            noise({3, 2, 3}, random),
+                           noise({3, 2, 3}, random),
                            noise({3, 2, 3}, random)};
   scene.lighting = Lighting{tensor_of(std::vector<float>{0, 0, 0, 1, 2, 3}),
                             tensor_of(std::vector<float>{0, 1}),
@@ -84,6 +85,7 @@ std::vector<float> all_numbers(const Scene& scene) {
     take("", scene.main_nodes->time);
     take("", scene.main_nodes->centre);
     take("", scene.main_nodes->radius);
+    take("", scene.main_nodes->anchor);
     for (const int32_t body : scene.main_nodes->body.values()) all.push_back(static_cast<float>(body));
   }
   if (scene.lighting) {

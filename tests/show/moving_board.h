@@ -65,7 +65,8 @@ struct MovingBoard : Fixture {
   void bend() {
     scene.main_nodes = Nodes{Tensor<int32_t>(Shape{1}),     tensor_of(std::vector<float>{0, 1}),
                              Tensor<float>(Shape{1, 3}),    tensor_of(std::vector<float>{1}),
-                             Tensor<float>(Shape{1, 2, 3}), Tensor<float>(Shape{1, 2, 3})};
+                             Tensor<float>(Shape{1, 2, 3}), Tensor<float>(Shape{1, 2, 3}),
+                             Tensor<float>(Shape{1, 2, 3})};
     scene.main_nodes->shift(0, 1, 0) = 0.2F;
   }
 

@@ -365,6 +365,7 @@ TEST(Bodies, GetNodesThatAreSpreadOverThem) {
   EXPECT_EQ(nodes.times(), (at.scene.main_motion->keys() + 2) / 3);
   for (int64_t n = 0; n < nodes.count(); ++n) {
     const Vec3<float> centre = load3<float>(nodes.centre.row(n));
+    for (int64_t k = 0; k < nodes.times(); ++k) EXPECT_EQ(load3<float>(&nodes.anchor(n, k, 0)), centre);
     bool is_surfel = false;
     for (int64_t i = 0; i < main.count(); ++i)
       is_surfel =
@@ -402,6 +403,40 @@ TEST(Bodies, NodesOfSomeBodiesAreTheirs) {
       }
     }
     ++next;
+  }
+}
+
+TEST(Bodies, TakeWhatTheirNodesDoAlone) {
+  Tumbling at;
+  at.scene.main.opacity_logit.fill(1);
+  Motion motion = *at.scene.main_motion;
+  Nodes nodes = place_nodes(motion, at.scene.main, 12, 3);
+  Motion motion_from = motion;
+  Nodes nodes_from = nodes;
+  for (Tensor<float>* values :
+       {&motion_from.rotation, &motion_from.shift, &nodes_from.turn, &nodes_from.shift}) {
+    for (int64_t i = 0; i < values->size(); ++i) (*values)[i] = 1 + static_cast<float>(i % 7);
+  }
+  const Motion before = motion;
+  take_body(1, motion_from, nodes_from, motion, nodes);
+  anchor_nodes(motion, 1, nodes);
+  for (int64_t key = 0; key < motion.keys(); ++key) {
+    EXPECT_EQ(load4<float>(&motion.rotation(0, key, 0)), load4<float>(&before.rotation(0, key, 0)));
+    EXPECT_EQ(load3<float>(&motion.shift(0, key, 0)), load3<float>(&before.shift(0, key, 0)));
+    EXPECT_EQ(load4<float>(&motion.rotation(1, key, 0)), load4<float>(&motion_from.rotation(1, key, 0)));
+    EXPECT_EQ(load3<float>(&motion.shift(1, key, 0)), load3<float>(&motion_from.shift(1, key, 0)));
+  }
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    const bool its = nodes.body[n] == 1;
+    for (int64_t k = 0; k < nodes.times(); ++k) {
+      EXPECT_EQ(load3<float>(&nodes.turn(n, k, 0)),
+                its ? load3<float>(&nodes_from.turn(n, k, 0)) : Vec3<float>(0));
+      EXPECT_EQ(load3<float>(&nodes.shift(n, k, 0)),
+                its ? load3<float>(&nodes_from.shift(n, k, 0)) : Vec3<float>(0));
+      const Vec3<float> place(its ? nodes::place_of(nodes, motion, n, k)
+                                  : load3<double>(nodes.centre.row(n)));
+      EXPECT_EQ(load3<float>(&nodes.anchor(n, k, 0)), place);
+    }
   }
 }
 
@@ -459,7 +494,19 @@ TEST(Bodies, BendWhereSilhouettesGetWorse) {
     made.width = 120;
     made.height = 68;
     made.points = 4000;
-    return followed(made, 400, folder)->scene().main_nodes.has_value();
+    std::vector<events::BendingDecided> decided;
+    const auto trainer = followed(made, 400, folder, [&](const events::Event& event) {
+      if (const auto* e = std::get_if<events::BendingDecided>(&event)) decided.push_back(*e);
+    });
+    const Scene& after = trainer->scene();
+    EXPECT_EQ(decided.size(), static_cast<size_t>(after.main_motion->bodies()));
+    for (const events::BendingDecided& e : decided) {
+      const bool has_nodes = after.main_nodes && std::ranges::count(after.main_nodes->body.values(),
+                                                                    static_cast<int32_t>(e.body)) > 0;
+      EXPECT_EQ(e.bends, has_nodes) << e.body;
+      EXPECT_GT(e.silhouettes, 0);
+    }
+    return after.main_nodes.has_value();
   };
   EXPECT_TRUE(bends(SynthScene::soft));
   EXPECT_FALSE(bends(SynthScene::balls));

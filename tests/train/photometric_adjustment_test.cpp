@@ -74,7 +74,7 @@ struct Film {
     return s;
   }
 
-  std::vector<FilmView> views(double blur, double noise = 0) const {
+  FilmViews views(double blur, double noise = 0) const {
     Random random(1);
     std::vector<FilmView> result;
     for (int64_t k = 0; k < film_keys; ++k) {
@@ -85,7 +85,7 @@ struct Film {
                         detail_of({picture.camera, picture.colour, picture.coverage}, blur),
                         DetailPhoto{picture.camera, picture.normal_prior, picture.mask}});
     }
-    return result;
+    return std::make_shared<const std::vector<FilmView>>(std::move(result));
   }
 
   // How far points are from where they should be, on average, in radii.

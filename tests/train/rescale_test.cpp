@@ -9,6 +9,7 @@
 #include "math/rotation_group.h"
 #include "ops/deform/deform.h"
 #include "ops/motion/motion.h"
+#include "ops/motion/nodes.h"
 #include "train/ball_body.h"
 #include "train/tumbling.h"
 
@@ -96,6 +97,84 @@ TEST(Rescale, OnlyOneCameraAtEachTimeLeavesTheSizeOpen) {
   EXPECT_EQ((*eyes)[3], Vec3<double>(view->camera.position));
   at.capture.train.push_back(at.capture.train[2]);
   EXPECT_FALSE(positions_of_single_cameras(at.capture, motion));
+}
+
+// A column of nodes, each twice a radius above the other, that grows from its foot and leans, before a camera
+// that moves.
+struct GrowingColumn {
+  static constexpr int64_t times = 7;
+  Motion motion;
+  Nodes nodes;
+  std::vector<Vec3<double>> eyes;
+
+  GrowingColumn() {
+    constexpr int64_t count = 8, keys = 2 * times - 1;
+    std::vector<float> time, key_time;
+    for (int64_t k = 0; k < times; ++k) time.push_back(static_cast<float>(k) / (times - 1));
+    for (int64_t k = 0; k < keys; ++k) key_time.push_back(static_cast<float>(k) / (keys - 1));
+    Tensor<float> pivot({1, 3});
+    store3(pivot.row(0), Vec3<double>(0.1, -0.2, 2));
+    motion = still_motion(pivot, tensor_of(key_time));
+    for (int64_t k = 0; k < keys; ++k)
+      eyes.emplace_back(0.05 * static_cast<double>(k), 0.1, -0.02 * static_cast<double>(k));
+    nodes.body.reset({count});
+    nodes.time = tensor_of(time);
+    nodes.centre.resize({count, 3});
+    nodes.radius.resize({count});
+    nodes.radius.fill(0.05F);
+    for (Tensor<float>* values : {&nodes.turn, &nodes.shift, &nodes.anchor}) values->reset({count, times, 3});
+    for (int64_t n = 0; n < count; ++n) {
+      const double height = 0.1 * static_cast<double>(n);
+      store3(nodes.centre.row(n), Vec3<double>(0, -height, 2));
+      for (int64_t k = 0; k < times; ++k) {
+        const double share = std::sin(3.14 * static_cast<double>(k) / (times - 1));
+        const double grown = share * std::max(0.0, height - 0.25);
+        store3(&nodes.shift(n, k, 0), Vec3<double>(0.3 * grown, -0.4 * grown, 0.2 * grown));
+      }
+    }
+  }
+};
+
+TEST(Rescale, FindsTheSizesWithWhichAFootStands) {
+  const GrowingColumn at;
+  const std::vector<double> as_it_is = standing_ratios(at.eyes, at.motion, at.nodes, 0);
+  for (const double ratio : as_it_is) EXPECT_NEAR(ratio, 1, 1e-9);
+  // What looks the same, as large as at first and closer.
+  std::vector<double> closer;
+  for (int64_t k = 0; k < GrowingColumn::times; ++k)
+    closer.push_back(1 - 0.06 * std::sin(3.14 * static_cast<double>(k) / (GrowingColumn::times - 1)));
+  Motion motion = at.motion;
+  Nodes nodes = at.nodes;
+  rescale_bent_body(closer, at.eyes, 0, motion, nodes);
+  const std::vector<double> found = standing_ratios(at.eyes, motion, nodes, 0);
+  for (size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k] * closer[k], 1, 0.006) << k;
+  // Nothing tells of what stands nowhere.
+  for (int64_t i = 0; i < motion.shift.size(); i += 3) motion.shift[i] += i > 0 ? 2.0F : 0.0F;
+  for (const double ratio : standing_ratios(at.eyes, motion, nodes, 0)) EXPECT_NEAR(ratio, 1, 1e-9);
+}
+
+TEST(Rescale, CamerasSeeTheNodesOfABentBodyWhereTheyDid) {
+  const GrowingColumn at;
+  Motion motion = at.motion;
+  Nodes nodes = at.nodes;
+  for (int64_t key = 0; key < motion.keys(); ++key) {
+    const Vec4<double> turn = quaternion_exp(Vec3<double>(0.2, -0.1, 0.3) * static_cast<double>(key));
+    for (int c = 0; c < 4; ++c) motion.rotation(0, key, c) = static_cast<float>(turn[c]);
+    store3(&motion.shift(0, key, 0), 0.02 * static_cast<double>(key) * Vec3<double>(1, 2, -3));
+  }
+  const Motion motion_before = motion;
+  const Nodes nodes_before = nodes;
+  std::vector<double> ratios;
+  for (int64_t k = 0; k < GrowingColumn::times; ++k) ratios.push_back(1 + 0.02 * static_cast<double>(k));
+  rescale_bent_body(ratios, at.eyes, 0, motion, nodes);
+  for (int64_t n = 0; n < nodes.count(); ++n) {
+    for (int64_t k = 0; k < nodes.times(); ++k) {
+      const Vec3<double> eye = at.eyes[static_cast<size_t>(2 * k)];
+      const Vec3<double> was = nodes::place_of(nodes_before, motion_before, n, k) - eye;
+      const Vec3<double> is = nodes::place_of(nodes, motion, n, k) - eye;
+      EXPECT_LT(length(is - ratios[static_cast<size_t>(k)] * was), 1e-5);
+    }
+  }
 }
 
 // Bodies that are made larger are so much larger than the first picture shows them.

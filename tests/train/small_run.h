@@ -34,7 +34,8 @@ inline const fs::path& capture_folder() {
 }
 
 // A run without reflections on a capture that is made for it, up to where its bodies have been followed.
-inline std::unique_ptr<Trainer> followed(SynthOptions capture, int iterations, const fs::path& folder) {
+inline std::unique_ptr<Trainer> followed(SynthOptions capture, int iterations, const fs::path& folder,
+                                         const events::Listener& listener = nullptr) {
   capture.samples = 1;
   write_synthetic_capture(capture, folder);
   TrainOptions options = preset("cpu");
@@ -42,6 +43,7 @@ inline std::unique_ptr<Trainer> followed(SynthOptions capture, int iterations, c
   options.specular = Specular::none;
   options.initial.max_points = options.density.max_surfels = capture.points;
   auto trainer = std::make_unique<Trainer>(options, load_capture(folder, {}), folder / "run");
+  if (listener) trainer->stream().listen(listener);
   const auto keys = static_cast<int>(trainer->scene().main_motion->keys());
   while (trainer->iteration() <= iterations / 8 + (keys - 1) * options.deform.track.map_each) trainer->step();
   return trainer;

@@ -262,6 +262,14 @@ export type TrainingEvent =
       at_cap: boolean;
       count: number;
     }
+  | {
+      event: 'bending_decided';
+      iteration: number;
+      body: number;
+      bends: boolean;
+      silhouettes: number; // misfit over that of the first view
+      photographs?: number; // what differs of them with nodes, over without; of textured bodies
+    }
   | { event: 'phase_entered'; iteration: number; phase: string }
   | { event: 'evaluated'; iteration: number; split: string; views: number; psnr: number; ssim: number; seconds: number }
   | { event: 'warning'; iteration: number; text: string }

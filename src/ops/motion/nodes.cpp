@@ -83,21 +83,32 @@ void bend(const Nodes& nodes, const Tensor<int32_t>& body, float time, Surfels& 
       saved);
 }
 
+namespace {
+BodyPoses poses_of(const Motion& motion) {
+  return {motion.time.data(), motion.centre.data(), motion.rotation.data(), motion.shift.data(),
+          motion.keys()};
+}
+}  // namespace
+
 void resist(const Nodes& nodes, const Motion& motion, const Stiffness& weights, Nodes& gradient) {
-  const BodyPoses poses{motion.time.data(), motion.centre.data(), motion.rotation.data(), motion.shift.data(),
-                        motion.keys()};
-  const Resistance of{poses,
+  const Resistance of{poses_of(motion),
                       nodes.body.data(),
                       nodes.time.data(),
                       nodes.centre.data(),
                       nodes.radius.data(),
                       nodes.turn.data(),
                       nodes.shift.data(),
+                      nodes.anchor.data(),
                       nodes.count(),
                       nodes.times(),
                       weights};
   parallel_for(nodes.device(), "nodes: resist", nodes.count() * nodes.times(),
                ResistanceGradient{of, gradient.turn.data(), gradient.shift.data()}, 16);
+}
+
+Vec3<double> place_of(const Nodes& nodes, const Motion& motion, int64_t n, int64_t k) {
+  return poses_of(motion).at(nodes.body[n], nodes.time[k])(load3<double>(nodes.centre.row(n)) +
+                                                           load3<double>(&nodes.shift(n, k, 0)));
 }
 
 void hold_first(Nodes& gradient) {

@@ -38,8 +38,7 @@ struct Stiffness {
   double strain = 0;  // Σ_m a_nm |R_n (c_m − c_n) + c_n + s_n − c_m − s_m|²/r_n² over others of the body,
                       // a_nm ∝ exp(−|c_m − c_n|²/8r_n²) with Σ a_nm = 1 (Sumner et al. 2007, E_reg)
   double haste = 0;  // |dω_n/dt|² + |ds_n/dt|²/r_n², t in lengths of the film
-  // d²/(1 + d²)/2 (Geman-McClure), d r_n being how far the body's pose has taken c_n + s_n from c_n.
-  // To one camera what grows and what comes closer look alike. Where its foot stands, it grows.
+  // d²/(1 + d²)/2 (Geman-McClure), d r_n being how far the body's pose has taken c_n + s_n from the anchor.
   double travel = 0;
 };
 // Adds the gradient of the term. motion: of the bodies, held.
@@ -47,6 +46,9 @@ void resist(const Nodes& nodes, const Motion& motion, const Stiffness& weights, 
 // The term itself, in double precision.
 double resist_reference(const BasicNodes<double>& nodes, const BasicMotion<double>& motion,
                         const Stiffness& weights);
+
+// Where the bodies' poses take a node, c_n + s_n, at the k-th of the nodes' times.
+Vec3<double> place_of(const Nodes& nodes, const Motion& motion, int64_t n, int64_t k);
 
 // Zeroes the gradient by the first time: there bodies are at rest.
 void hold_first(Nodes& gradient);

@@ -225,7 +225,7 @@ struct BodyPoses {
 struct Resistance {
   BodyPoses poses;
   const int32_t* body;
-  const float *times, *centre, *radius, *turn, *shift;
+  const float *times, *centre, *radius, *turn, *shift, *anchor;
   int64_t count, keys;
   Stiffness weights;
 
@@ -262,7 +262,8 @@ struct Resistance {
   TRACEFLOW_HD Vec3<double> travel_pull(int64_t n, int64_t k) const {
     const Vec3<double> rest = load3<double>(centre + 3 * n);
     const BodyPoses::Pose pose = poses.at(body[n], times[k]);
-    const Vec3<double> off = (pose(rest + at(shift, n, k)) - rest) / static_cast<double>(radius[n]);
+    const Vec3<double> off =
+        (pose(rest + at(shift, n, k)) - at(anchor, n, k)) / static_cast<double>(radius[n]);
     const double pull = weights.travel / std::pow(1 + dot(off, off), 2);
     return (pull / static_cast<double>(radius[n]) * off) * pose.rotation;
   }

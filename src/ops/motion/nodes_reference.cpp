@@ -33,7 +33,7 @@ Vec3<double> carried(const BasicNodes<double>& nodes, int64_t n, const Vec3<doub
   return rotation_from_quaternion(quaternion_exp(turn)) * (p - centre) + centre + shift;
 }
 
-// Squared distance of a node from where it is at rest, once its body's pose has moved it.
+// Squared distance of a node from its anchor, once its body's pose has moved it.
 double travelled2(const BasicNodes<double>& nodes, const BasicMotion<double>& motion, int64_t n, int64_t k) {
   const Vec3<double> rest = load3<double>(nodes.centre.row(n));
   BasicPosedSurfels<double> point;
@@ -44,7 +44,7 @@ double travelled2(const BasicNodes<double>& nodes, const BasicMotion<double>& mo
   Tensor<int32_t> body({1});
   body[0] = nodes.body[n];
   motion::forward_reference(motion, body, nodes.time[k], point);
-  const Vec3<double> off = load3<double>(point.position.row(0)) - rest;
+  const Vec3<double> off = load3<double>(point.position.row(0)) - load3<double>(&nodes.anchor(n, k, 0));
   return dot(off, off);
 }
 

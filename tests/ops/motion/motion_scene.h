@@ -82,6 +82,7 @@ inline Nodes random_nodes(int64_t count, int64_t bodies, int64_t keys, uint64_t 
   nodes.radius = random_tensor<float>({count}, random, 0.4, 0.9);
   nodes.turn = random_tensor<float>({count, keys, 3}, random, -1, 1);
   nodes.shift = random_tensor<float>({count, keys, 3}, random, -1, 1);
+  nodes.anchor = random_tensor<float>({count, keys, 3}, random, -1, 1);
   return nodes;
 }
 

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "motion_scene.h"
 #include "ops/motion/key_span.h"
 
@@ -88,6 +90,7 @@ TEST(Nodes, ThatMoveAsOneKeepShapes) {
 TEST(Nodes, ThatStandStillAreNotPulled) {
   Nodes nodes = random_nodes(6, 2, 4);
   const Motion motion = random_motion(2, 3);
+  for (int64_t i = 0; i < 6 * 4; ++i) std::copy_n(nodes.centre.row(i / 4), 3, &nodes.anchor[3 * i]);
   for (int64_t n = 0; n < 6; ++n) {
     const int64_t b = nodes.body[n];
     const Vec3<double> rest = load3<double>(nodes.centre.row(n)),
@@ -102,6 +105,17 @@ TEST(Nodes, ThatStandStillAreNotPulled) {
   Nodes gradient = zeros_like<float>(nodes);
   nodes::resist(nodes, motion, {0, 0, 1}, gradient);
   for (const float by : gradient.shift.values()) EXPECT_NEAR(by, 0, 1e-4);
+}
+
+TEST(Nodes, AreNotPulledFromTheirAnchors) {
+  Nodes nodes = random_nodes(6, 2, 4);
+  const Motion motion = random_motion(2, 3);
+  for (int64_t n = 0; n < 6; ++n) {
+    for (int64_t k = 0; k < 4; ++k) store3(&nodes.anchor(n, k, 0), nodes::place_of(nodes, motion, n, k));
+  }
+  Nodes gradient = zeros_like<float>(nodes);
+  nodes::resist(nodes, motion, {0, 0, 1}, gradient);
+  for (const float by : gradient.shift.values()) EXPECT_NEAR(by, 0, 1e-6);
 }
 
 TEST(Nodes, ABrokenSurfelGivesNothingAndTheFirstTimeIsHeld) {
