@@ -240,7 +240,9 @@ struct BendOptions {
             "So do bodies whose photographs differ by so many times as much with nodes as without.");
     v.field("strain", strain, "", "Weight of the loss that keeps neighbouring nodes together.");
     v.field("haste", haste, "", "Weight of the loss that keeps nodes slow.");
-    v.field("travel", travel, "", "Weight of the loss that keeps nodes at their anchors: where they were at first, or were adjusted to.");
+    v.field("travel", travel, "",
+            "Weight of the loss that keeps nodes at their anchors: where they were at first, or were "
+            "adjusted to.");
   }
   void validate() const;
 };
