@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "math/types.h"
 #include "scene/motion.h"
 #include "scene/nodes.h"
 #include "scene/surfels.h"
