@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/rotation.h"
-#include "math/rotation_group.h"
 #include "scene/neighbours.h"
+#include "train/body_centre.h"
 
 namespace traceflow {
 
@@ -106,19 +105,15 @@ Motion with_part(const Motion& motion, int32_t body, const std::vector<int64_t>&
   for (const int64_t row : part) main.body[row] = static_cast<int32_t>(added);
   Tensor<float> centre({added + 1, 3});
   std::copy_n(motion.centre.data(), motion.centre.size(), centre.data());
-  const Vec3<double> old_centre = load3<double>(motion.centre.row(body)),
-                     middle = middle_of(places_of(main, part));
-  store3(centre.row(added), middle);
+  std::copy_n(motion.centre.row(body), 3, centre.row(added));
   Motion result = still_motion(centre, motion.time);
   std::copy_n(motion.rotation.data(), motion.rotation.size(), result.rotation.data());
   std::copy_n(motion.shift.data(), motion.shift.size(), result.shift.data());
   for (int64_t key = 0; key < keys; ++key) {
-    const float* const q = &motion.rotation(body, key, 0);
-    std::copy_n(q, 4, &result.rotation(added, key, 0));
-    const Vec3<double> arm = middle - old_centre;
-    const Vec3<double> turned = rotation_from_quaternion(unit_quaternion(load4<double>(q))) * arm;
-    store3(&result.shift(added, key, 0), load3<double>(&motion.shift(body, key, 0)) + turned - arm);
+    std::copy_n(&motion.rotation(body, key, 0), 4, &result.rotation(added, key, 0));
+    std::copy_n(&motion.shift(body, key, 0), 3, &result.shift(added, key, 0));
   }
+  move_centre(static_cast<int32_t>(added), middle_of(places_of(main, part)), result);
   return result;
 }
 

@@ -1,10 +1,13 @@
 #include "train/photo_alignment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
+#include "math/rotation.h"
 #include "train/gaussian_blur.h"
 
 namespace traceflow {
@@ -37,6 +40,90 @@ void take_mean(const Tensor<float>& coverage, int64_t channels, double sigma, Te
     image[i] = share[i / channels] > least ? image[i] / share[i / channels] : 0.0F;
 }
 
+// Takes what is clipped, and what is near it, out of a photograph's coverage. A highlight stays where it is
+// when a body turns, and is so bright that it outweighs the texture. Where much is clipped the body is white.
+void leave_clipped_out(FinePhotograph& photograph) {
+  constexpr float clipped = 0.97F;
+  constexpr int64_t margin = 2;         // pixels
+  constexpr double most_clipped = 0.2;  // of what the mask covers
+  Tensor<float>& coverage = photograph.coverage;
+  const int64_t height = coverage.dim(0), width = coverage.dim(1);
+  std::vector<std::array<int64_t, 2>> bright;
+  int64_t covered = 0;
+  for (int64_t y = 0; y < height; ++y) {
+    for (int64_t x = 0; x < width; ++x) {
+      if (coverage(y, x) < 0.5F) continue;
+      ++covered;
+      const float* const colour = &photograph.colour(y, x, 0);
+      if (std::min({colour[0], colour[1], colour[2]}) >= clipped) bright.push_back({y, x});
+    }
+  }
+  if (static_cast<double>(bright.size()) > most_clipped * static_cast<double>(covered)) return;
+  for (const auto& [y, x] : bright) {
+    for (int64_t r = std::max<int64_t>(0, y - margin); r <= std::min(height - 1, y + margin); ++r) {
+      for (int64_t c = std::max<int64_t>(0, x - margin); c <= std::min(width - 1, x + margin); ++c)
+        coverage(r, c) = 0;
+    }
+  }
+}
+
+// A sample that a photograph shows: its residuals, and their derivatives by ω.
+struct SeenSample {
+  std::array<double, 3> residual;
+  std::array<Vec3<double>, 3> by_turn;
+};
+
+std::optional<SeenSample> see(const DetailSample& sample, const Camera<double>& camera,
+                              const DetailPhoto& photo, const Vec3<double>& centre, const Vec3<double>& shift,
+                              const Mat3<double>& rotation) {
+  const Vec3<double> arm = rotation * (Vec3<double>(sample.rest.position) - centre);
+  const Vec3<double> point = centre + arm + shift, in_camera = camera.point_in_camera(point);
+  if (!(in_camera.z > 0) || !faces(rotation * Vec3<double>(sample.rest.normal), point - camera.position))
+    return std::nullopt;
+  const Vec2<double> at = camera.project(in_camera);
+  const std::optional<Looked> there = look(photo, at.x, at.y);
+  if (!there) return std::nullopt;
+  const auto [x_by, y_by] = pixel_by_point(camera, in_camera);
+  SeenSample seen;
+  for (int c = 0; c < 3; ++c) {
+    const auto channel = static_cast<size_t>(c);
+    seen.residual[channel] = weight * (there->value[c] - static_cast<double>(sample.detail[c]));
+    seen.by_turn[channel] = cross(arm, weight * (there->by_x[c] * x_by + there->by_y[c] * y_by));
+  }
+  return seen;
+}
+
+// The cost of one body's samples. What is hidden costs as much as what is seen: a turn that hides what
+// differs pays nothing.
+double align_body(const Alignment& alignment, std::span<const DetailSample> samples, const Motion& motion,
+                  int64_t key, const Mat3<double>& loose, NormalEquations* equations) {
+  constexpr double least_seen = 0.25, full = 1;
+  const auto body = samples.front().rest.body;
+  const Camera<double> camera = convert<double>(alignment.photo->camera);
+  const Mat3<double> rotation = rotation_from_quaternion(load4<double>(&motion.rotation(body, key, 0)));
+  const Vec3<double> centre = load3<double>(motion.centre.row(body));
+  const Vec3<double> shift = load3<double>(&motion.shift(body, key, 0));
+  std::vector<SeenSample> seen;
+  for (const DetailSample& sample : samples) {
+    if (auto now = see(sample, camera, *alignment.photo, centre, shift, rotation)) seen.push_back(*now);
+  }
+  const auto all = static_cast<double>(samples.size());
+  if (static_cast<double>(seen.size()) < least_seen * all) return alignment.weight * full * all;
+  const double share = alignment.weight * all / static_cast<double>(seen.size());
+  double cost = 0;
+  for (const SeenSample& now : seen) {
+    for (size_t c = 0; c < 3; ++c) {
+      const double size = std::abs(now.residual[c]);
+      cost += share * (size < huber_width ? size * size / (2 * huber_width) : size - huber_width / 2);
+      if (equations == nullptr) continue;
+      const Vec3<double> by_turn = loose * now.by_turn[c];
+      equations->add<3>(6 * static_cast<size_t>(body), {by_turn.x, by_turn.y, by_turn.z}, now.residual[c],
+                        share / std::max(huber_width, size));
+    }
+  }
+  return cost;
+}
+
 }  // namespace
 
 std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
@@ -58,6 +145,7 @@ std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
 }
 
 DetailPhoto detail_of(FinePhotograph photograph, double blur) {
+  leave_clipped_out(photograph);
   DetailPhoto photo{photograph.camera, std::move(photograph.colour),
                     Tensor<uint8_t>(photograph.coverage.shape())};
   const Tensor<float>& coverage = photograph.coverage;
@@ -129,35 +217,14 @@ std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySur
 
 double align(const Alignment& alignment, const Motion& motion, int64_t key, const LooseTurns& loose,
              NormalEquations* equations) {
-  const Camera<double> camera = convert<double>(alignment.photo->camera);
-  const std::vector<Mat3<double>> rotation = rotations_at(motion, key);
   double cost = 0;
-  for (const DetailSample& sample : alignment.samples) {
-    const auto body = static_cast<size_t>(sample.rest.body);
-    const Vec3<double> centre = load3<double>(motion.centre.row(sample.rest.body));
-    const Vec3<double> arm = rotation[body] * (Vec3<double>(sample.rest.position) - centre);
-    const Vec3<double> point = centre + arm + load3<double>(&motion.shift(sample.rest.body, key, 0));
-    const Vec3<double> in_camera = camera.point_in_camera(point);
-    if (!(in_camera.z > 0)) continue;
-    const Vec2<double> at = camera.project(in_camera);
-    const bool is_seen = faces(rotation[body] * Vec3<double>(sample.rest.normal), point - camera.position);
-    const std::optional<Looked> there = is_seen ? look(*alignment.photo, at.x, at.y) : std::nullopt;
-    if (!there) {
-      cost += alignment.weight * huber_width / 2;  // leaving the view pays no better than a difference
-      continue;
-    }
-    const auto [x_by, y_by] = pixel_by_point(camera, in_camera);
-    for (int c = 0; c < 3; ++c) {
-      const double residual = weight * (there->value[c] - static_cast<double>(sample.detail[c]));
-      const double size = std::abs(residual);
-      cost +=
-          alignment.weight * (size < huber_width ? size * size / (2 * huber_width) : size - huber_width / 2);
-      if (equations == nullptr) continue;
-      const Vec3<double> by_point = weight * (there->by_x[c] * x_by + there->by_y[c] * y_by);
-      const Vec3<double> by_turn = loose[body] * cross(arm, by_point);
-      equations->add<3>(6 * body, {by_turn.x, by_turn.y, by_turn.z}, residual,
-                        alignment.weight / std::max(huber_width, size));
-    }
+  for (size_t first = 0; first < alignment.samples.size();) {
+    const int32_t body = alignment.samples[first].rest.body;
+    size_t last = first;
+    while (last < alignment.samples.size() && alignment.samples[last].rest.body == body) ++last;
+    const std::span<const DetailSample> samples(&alignment.samples[first], last - first);
+    cost += align_body(alignment, samples, motion, key, loose[static_cast<size_t>(body)], equations);
+    first = last;
   }
   return cost;
 }

@@ -19,7 +19,8 @@ struct DetailPhoto {
       detail;  // H×W×3, the colour less its mean within a few pixels of the mask: what shading leaves
   Tensor<uint8_t> mask;  // H×W
 };
-// blur: pixels; detail is then what is coarser than that and finer than three times it.
+// blur: pixels; detail is then what is coarser than that and finer than three times it. The mask leaves out
+// what is clipped, unless that is more than a fifth.
 DetailPhoto detail_of(FinePhotograph photograph, double blur = 0);
 
 // The part that the mask covers; as it is where it covers nothing.
@@ -41,7 +42,8 @@ struct DetailSample {
 // Which turns of each body photographs decide: projects its ω onto them; 0 for none.
 using LooseTurns = std::vector<Mat3<double>>;
 
-// The samples of a key, at most 2,000 of each body that has loose turns. surface: as drawn at that key.
+// The samples of a key, body after body, at most 2,000 of each body that has loose turns. surface: as drawn
+// at that key.
 std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySurface& surface,
                                          const Motion& motion, int64_t key, const LooseTurns& loose);
 
@@ -52,9 +54,9 @@ struct Alignment {
   double weight = 1;  // of a sample's cost
 };
 
-// The robust cost (Huber) of the alignment with bodies as they stand at a key. Adds to `equations`, six
-// numbers a body of which ω (about its pivot) is used, unless it is null. Its b is the cost's derivative,
-// negative.
+// The robust cost (Huber) of the alignment with bodies as they stand at a key; samples that do not show count
+// as the mean of their body's that do. Adds to `equations`, six numbers a body of which ω (about its pivot)
+// is used, unless it is null. Its b is the cost's derivative, negative.
 double align(const Alignment& alignment, const Motion& motion, int64_t key, const LooseTurns& loose,
              NormalEquations* equations);
 

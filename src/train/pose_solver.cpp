@@ -318,16 +318,13 @@ double PoseSolver::cost_of_texture(const TrackWeights& weights, NormalEquations*
   return cost + cost_of_tracks(weights.tracks, equations);
 }
 
-std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWeights& weights) {
+std::vector<PoseSolver::PoseStiffness> PoseSolver::pose_stiffness(const TrackWeights& weights) {
   // Surfels are flat. The blur takes out how they show one by one as a round surface turns.
   constexpr double sigma = 2;  // pixels
-  const bool any = std::any_of(targets_.begin(), targets_.end(),
-                               [](const TrackTarget& target) { return !target.normal_prior.empty(); });
-  if (!any) return {};
   weigh(weights);
   NormalEquations equations(params_);
   add_targets(weights, sigma, equations);
-  std::vector<SymmetricEigen<3, double>> result;
+  std::vector<PoseStiffness> result;
   for (size_t body = 0; body < radius_.size(); ++body) {
     const auto block = [&](size_t down, size_t right) {
       Mat3<double> m;
@@ -340,15 +337,50 @@ std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWei
       }
       return m;
     };
+    result.push_back({block(0, 0), block(0, 3), block(3, 3) + Mat3<double>(1e-9)});
+  }
+  return result;
+}
+
+std::vector<SymmetricEigen<3, double>> PoseSolver::turn_stiffness(const TrackWeights& weights) {
+  const bool any = std::any_of(targets_.begin(), targets_.end(),
+                               [](const TrackTarget& target) { return !target.normal_prior.empty(); });
+  if (!any) return {};
+  std::vector<SymmetricEigen<3, double>> result;
+  const std::vector<PoseStiffness> stiffness = pose_stiffness(weights);
+  for (size_t body = 0; body < radius_.size(); ++body) {
     double pixels = 0;
     for (const TrackTarget& target : targets_) {
       const Vec3<double> away =
           load3<double>(pivot_.row(static_cast<int64_t>(body))) - Vec3<double>(target.camera.position);
       pixels += pi * std::pow(target.camera.focal_x * radius_[body] / glm::length(away), 2);
     }
-    const Mat3<double> turn = block(0, 0), both = block(0, 3), shift = block(3, 3) + Mat3<double>(1e-9);
-    const Mat3<double> reduced = turn - both * inverse(shift) * transpose(both);
-    result.push_back(symmetric_eigen(reduced / pixels));
+    const auto& [turn, both, shift] = stiffness[body];
+    result.push_back(symmetric_eigen((turn - both * inverse(shift) * transpose(both)) / pixels));
+  }
+  return result;
+}
+
+std::vector<Vec3<double>> PoseSolver::turn_centres(const TrackWeights& weights) {
+  std::vector<Vec3<double>> result;
+  const std::vector<PoseStiffness> stiffness = pose_stiffness(weights);
+  for (size_t body = 0; body < stiffness.size(); ++body) {
+    // About a point d from the pivot, shifts and turns are coupled by A_sω + A_ss [d]×.
+    const auto& [turn, both, shift] = stiffness[body];
+    Mat3<double> a(0);
+    Vec3<double> b(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      Vec3<double> e(0);
+      e[axis] = 1;
+      const Mat3<double> cross_e(cross(e, Vec3<double>(1, 0, 0)), cross(e, Vec3<double>(0, 1, 0)),
+                                 cross(e, Vec3<double>(0, 0, 1)));
+      a += transpose(cross_e) * shift * cross_e;
+      b -= cross(e, transpose(both)[axis]);
+    }
+    const double most = radius_[body];
+    Vec3<double> d = inverse(a) * b;
+    d *= most / std::max(most, length(d));
+    result.push_back(load3<double>(pivot_.row(static_cast<int64_t>(body))) + d);
   }
   return result;
 }

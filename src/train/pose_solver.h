@@ -59,6 +59,9 @@ class PoseSolver {
   // normal equations of ω (radians, its shift free), over the pixels of a disk of its size, and their axes.
   // Empty without normal priors: silhouettes alone hold hardly anything.
   std::vector<SymmetricEigen<3, double>> turn_stiffness(const TrackWeights& weights);
+  // The points, in world, about which what is weighed tells turns and shifts apart: the centre of a ball,
+  // about which nothing but its texture tells a turn. At most a radius from where a body turns now.
+  std::vector<Vec3<double>> turn_centres(const TrackWeights& weights);
   // Turns that silhouettes, normals and the model's colours do not change: only photographs that are compared
   // and tracked points do, by_texture of them.
   void loosen(LooseTurns loose, LooseTurns by_texture) {
@@ -84,6 +87,11 @@ class PoseSolver {
     Tensor<float> value;     // n×7: silhouette, normal, colour
     Tensor<float> jacobian;  // n×P×7; as it was where not asked for
   };
+  // The blocks of a body in the normal equations: of ω, of ω by the shift, and of the shift.
+  struct PoseStiffness {
+    Mat3<double> turn, both, shift;
+  };
+  std::vector<PoseStiffness> pose_stiffness(const TrackWeights& weights);
   void pose();
   // Set each pixel's weights, which then stand while bodies move. Normals count in the masks, or only as far
   // as bodies cover them: what a mask shows beyond them is surface that has come into view, and normals that

@@ -63,8 +63,8 @@ std::optional<std::vector<Vec3<double>>> positions_of_single_cameras(const Captu
   return eyes;
 }
 
-void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<double>>& eyes, Surfels& main,
-                    Motion& motion) {
+void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<double>>& eyes, int64_t first,
+                    Surfels& main, Motion& motion) {
   const auto towards = [](const Vec3<double>& from, const Vec3<double>& to, double by) {
     return to + (from - to) / by;
   };
@@ -78,7 +78,7 @@ void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<dou
   }
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     const Vec3<double> centre = load3<double>(motion.centre.row(b));
-    for (int64_t key = 1; key < motion.keys(); ++key) {
+    for (int64_t key = first; key < motion.keys(); ++key) {
       float* const shift = &motion.shift(b, key, 0);
       const Vec3<double> at = centre + load3<double>(shift);
       store3(shift, towards(at, eyes[static_cast<size_t>(key)], ratio[static_cast<size_t>(b)]) - centre);

@@ -17,10 +17,11 @@ namespace traceflow {
 std::optional<std::vector<Vec3<double>>> positions_of_single_cameras(const Capture& capture,
                                                                      const Motion& motion);
 
-// Divides by ratio[b] the size of rigid body b, about its centre, and at all keys but the first its distance
-// from the camera: there the camera sees the same as before. eyes: of each key, scene units. On the CPU.
-void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<double>>& eyes, Surfels& main,
-                    Motion& motion);
+// Divides by ratio[b] the size of rigid body b, about its centre, and at all keys from `first` on its
+// distance from the camera: there the camera sees the same as before. eyes: of each key, scene units. On the
+// CPU.
+void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<double>>& eyes, int64_t first,
+                    Surfels& main, Motion& motion);
 
 // So a bent body that grows looks like one that comes closer. Of all sizes at each time of its nodes, up to
 // 15 % more or less than it has, those at which the most of the body is where it was at first: where its foot

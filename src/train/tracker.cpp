@@ -7,10 +7,13 @@
 
 #include "math/rotation_group.h"
 #include "scene/rows.h"
+#include "train/body_centre.h"
 #include "train/body_parts.h"
 #include "train/mirror_image.h"
+#include "train/point_distance.h"
 #include "train/redetection.h"
 #include "train/rescale.h"
+#include "train/turn_search.h"
 
 namespace traceflow {
 
@@ -27,6 +30,12 @@ constexpr double most_judged = 0.3;
 
 // Photographs are compared at this width or less, and with those of so many keys before at most.
 constexpr int64_t widest_photograph = 640, oldest_photograph = 9;
+
+template <class Views>
+auto oldest_of(const Views& earlier) {
+  return std::find_if(earlier.begin(), earlier.end(),
+                      [](const auto& view) { return view.keys_back == oldest_photograph; });
+}
 
 // Average of factor × factor pixels.
 Tensor<float> smaller(const Tensor<float>& image, int64_t numbers, int64_t factor) {
@@ -55,6 +64,18 @@ Vec3<double> turn_between(const Motion& motion, int64_t body, int64_t first, int
   const Vec4<double> from = unit_quaternion(load4<double>(&motion.rotation(body, first, 0)));
   const Vec4<double> to = unit_quaternion(load4<double>(&motion.rotation(body, last, 0)));
   return quaternion_log(quaternion_product(to, quaternion_conjugate(from)));
+}
+
+// Bodies turn about the points in world (one a body) that they have at a key, where turns of them are loose:
+// a turn of a ball about another point moves it.
+void centre_loose_bodies(const std::vector<Vec3<double>>& centres, const LooseTurns& loose, int64_t key,
+                         Motion& motion) {
+  for (size_t b = 0; b < loose.size(); ++b) {
+    if (loose[b] == Mat3<double>(0)) continue;
+    const auto body = static_cast<int32_t>(b);
+    const SurfacePoint rest = at_rest({body, Vec3<float>(centres[b]), Vec3<float>(0)}, motion, key);
+    move_centre(body, Vec3<double>(rest.position), motion);
+  }
 }
 
 // Nothing tells the loose turns of bodies that mirror: they do not go on.
@@ -164,7 +185,8 @@ std::vector<Tracker::EarlierView> Tracker::earlier_views(const Surfels& main, co
 
 void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier,
                                   const Motion& motion, int64_t key, const LooseTurns& loose) const {
-  constexpr double weight = 1.0 / 3;
+  // Over few times a glaze, which shows what hardly moves, holds a texture back.
+  constexpr double weight = 1.0 / oldest_photograph;
   if (!any_turns(loose)) return;
   std::shared_ptr<const DetailPhoto> now;
   int64_t last = 0;
@@ -183,25 +205,47 @@ void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierV
     const double finer = static_cast<double>(now->camera.focal_x) / surface.camera.focal_x;
     solver.compare(
         Alignment{now, detail_samples(detail_of(std::move(photograph)), surface, motion, key - back, loose),
-                  weight / (finer * finer)});
+                  weight * static_cast<double>(back) / (finer * finer)});
   }
+}
+
+bool Tracker::seek_turns(const std::vector<EarlierView>& earlier, Motion& motion, int64_t key,
+                         const LooseTurns& loose) const {
+  const auto from = oldest_of(earlier);
+  if (from == earlier.end() || !any_turns(loose)) return false;
+  FinePhotograph then = load_fine_photograph(capture_, capture_.train[from->view], widest_photograph);
+  FinePhotograph now =
+      load_fine_photograph(capture_, capture_.train[views_at(motion, key).front()], widest_photograph);
+  if (then.coverage.empty() || now.coverage.empty()) return false;
+  const auto photo = std::make_shared<const DetailPhoto>(detail_of(std::move(now)));
+  const DetailPhoto before = detail_of(std::move(then));
+  bool any = false;
+  for (int32_t body = 0; body < motion.bodies(); ++body) {
+    LooseTurns alone(loose.size(), Mat3<double>(0));
+    alone[static_cast<size_t>(body)] = loose[static_cast<size_t>(body)];
+    if (!any_turns(alone)) continue;
+    const Alignment alignment{photo,
+                              detail_samples(before, from->surface, motion, key - oldest_photograph, alone)};
+    const std::optional<Vec3<double>> turn = seek_turn(alignment, motion, body, key, alone);
+    if (!turn) continue;
+    spread_turn(body, key - oldest_photograph, key, *turn, motion);
+    any = true;
+  }
+  return any;
 }
 
 void Tracker::look_for_mirror_images(const std::vector<EarlierView>& earlier, const Motion& motion,
                                      int64_t key, const LooseTurns& loose, TextureTrust& trust) const {
-  // Long enough for a mirror image to turn, short enough for photographs to tell.
-  constexpr int64_t keys_back = 3;
-  const auto is_meant = [](const EarlierView& view) { return view.keys_back == keys_back; };
-  const auto from = std::find_if(earlier.begin(), earlier.end(), is_meant);
+  const auto from = oldest_of(earlier);
   if (from == earlier.end()) return;
   const Vec3<double> eye(capture_.train[views_at(motion, key).front()].camera.position);
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     const Mat3<double>& turns = loose[static_cast<size_t>(b)];
     if (turns == Mat3<double>(0)) continue;
     const Vec3<double> shift =
-        load3<double>(&motion.shift(b, key, 0)) - load3<double>(&motion.shift(b, key - keys_back, 0));
+        load3<double>(&motion.shift(b, key, 0)) - load3<double>(&motion.shift(b, key - oldest_photograph, 0));
     trust.add_turn(b, turns * turn_of_mirror_image(from->surface, static_cast<int32_t>(b), eye, shift),
-                   turns * turn_between(motion, b, key - keys_back, key));
+                   turns * turn_between(motion, b, key - oldest_photograph, key));
   }
 }
 
@@ -344,6 +388,14 @@ std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& 
   return ratios;
 }
 
+std::vector<double> Tracker::distances_by_points(const Surfels& main, const Motion& motion,
+                                                 float extent) const {
+  const View& first = capture_.train[views_at(motion, 0).front()];
+  const BodySurface surface =
+      draw_bodies(drawn_camera(first, widest_for_sizes), motion, 0, main, render_.raster_options(extent));
+  return distance_by_points(surface, capture_.points, motion.bodies());
+}
+
 void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float extent,
                      TextureTrust& trust) const {
   predict(motion, key);
@@ -361,6 +413,7 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   const std::vector<SymmetricEigen<3, double>> stiffness = solver.turn_stiffness(geometry);
   trust.add_stiffness(stiffness);
   const LooseTurns loose = trust.loose_turns(stiffness), by_texture = trust.without_mirrors(loose);
+  if (any_turns(loose)) centre_loose_bodies(solver.turn_centres(geometry), loose, key, motion);
   hold_mirrors(motion, key, loose, trust);
   solver.refresh();
   solver.loosen(loose, by_texture);
@@ -368,6 +421,10 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   find_lost_bodies(solver, main, motion, key, geometry, steps);
   std::vector<EarlierView> earlier;
   if (any_turns(by_texture) || has_tracks()) earlier = earlier_views(main, motion, key, extent);
+  if (seek_turns(earlier, motion, key, by_texture)) {
+    earlier = earlier_views(main, motion, key, extent);
+    solver.refresh();
+  }
   compare_photographs(solver, earlier, motion, key, by_texture);
   compare_tracks(solver, earlier, motion, key);
   const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();

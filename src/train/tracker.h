@@ -38,6 +38,10 @@ class Tracker {
   std::vector<double> distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                       const PoseSteps& steps, const TextureTrust& trust) const;
 
+  // How many times as far from the first key's camera as they are drawn bodies are by the capture's points
+  // (train/point_distance.h).
+  std::vector<double> distances_by_points(const Surfels& main, const Motion& motion, float extent) const;
+
   // Photometric bundle adjustment (train/photometric_adjustment.h) of each of some bodies over all keys, on
   // photographs from coarse to fine: as if it were rigid, and as its nodes bend it. To one camera what grows
   // looks like what comes closer: of the two, bodies that bend then do what leaves the most of them in place
@@ -89,6 +93,10 @@ class Tracker {
   // Lets the solver compare the key's photograph with earlier ones, where photographs decide turns.
   void compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier, const Motion& motion,
                            int64_t key, const LooseTurns& loose) const;
+  // Of loose turns that went astray: whether any was found elsewhere. Those of the times between are turned
+  // by their share.
+  bool seek_turns(const std::vector<EarlierView>& earlier, Motion& motion, int64_t key,
+                  const LooseTurns& loose) const;
   // Whether what photographs decided is how a mirror image turns.
   void look_for_mirror_images(const std::vector<EarlierView>& earlier, const Motion& motion, int64_t key,
                               const LooseTurns& loose, TextureTrust& trust) const;

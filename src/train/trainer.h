@@ -105,9 +105,10 @@ class Trainer {
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
-  // Makes rigid bodies as large as the first picture shows them, and the motion what fits. Everything on the
-  // CPU; the scene takes it over, all but the motion.
-  void keep_sizes(const Tracker& tracker, Surfels& main, Motion& motion);
+  // Makes rigid bodies as large as the first picture shows them, where poses are known well, and puts them as
+  // far away as the points are; and the motion what fits. Everything on the CPU; the scene takes it over, all
+  // but the motion.
+  void keep_sizes(const Tracker& tracker, bool poses_are_known, Surfels& main, Motion& motion);
   // What lies behind a body may have been taken for a part of it: the times up to this one tell.
   void let_strays_go(int64_t key);
   // What bodies become when the film has been followed.

@@ -79,13 +79,18 @@ void Trainer::settle() {
   if (options_.deform.lighting.cells > 0) let_light_change();
 }
 
-void Trainer::keep_sizes(const Tracker& tracker, Surfels& main, Motion& motion) {
+void Trainer::keep_sizes(const Tracker& tracker, bool poses_are_known, Surfels& main, Motion& motion) {
   const std::optional<std::vector<Vec3<double>>> eyes = positions_of_single_cameras(capture_, motion);
   if (!eyes) return;
   const TrackOptions& track = options_.deform.track;
-  const std::vector<double> ratios = tracker.distance_ratios(
-      main, motion, scene_.extent, {track.steps, little_blur * track.blur}, texture_trust_);
-  rescale_bodies(ratios, *eyes, main, motion);
+  if (poses_are_known) {
+    const std::vector<double> ratios = tracker.distance_ratios(
+        main, motion, scene_.extent, {track.steps, little_blur * track.blur}, texture_trust_);
+    rescale_bodies(ratios, *eyes, 1, main, motion);
+  }
+  std::vector<double> ratios = tracker.distances_by_points(main, motion, scene_.extent);
+  for (double& ratio : ratios) ratio = 1 / ratio;
+  rescale_bodies(ratios, *eyes, 0, main, motion);
   scene_.main.position = main.position.on(device_);
   scene_.main.log_scale = main.log_scale.on(device_);
 }
@@ -100,7 +105,7 @@ void Trainer::follow_again() {
   if (scene_.main_nodes) nodes = scene_.main_nodes->on(Device::cpu);
   const bool refines = tracking(iteration_).refines;
   // What bends may be larger at the first time than at others.
-  if (refines && !nodes) keep_sizes(tracker, main, motion);
+  if (!nodes) keep_sizes(tracker, refines, main, motion);
   const PoseSteps steps{few_steps, little_blur * track.blur, refines};
   for (int64_t key = 0; key < motion.keys(); ++key)
     tracker.solve(main, nodes ? &*nodes : nullptr, motion, key, scene_.extent, steps, texture_trust_);

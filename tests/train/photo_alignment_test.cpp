@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "math/rotation_group.h"
@@ -58,6 +59,30 @@ TEST(PhotoAlignment, DetailIsOfTheMaskAlone) {
       ASSERT_FLOAT_EQ(photos[0].detail[i], photos[1].detail[i]);
     }
   }
+}
+
+// A highlight is left out as if the mask did not cover it; where much is clipped, all is kept.
+TEST(PhotoAlignment, HighlightsAreLeftOut) {
+  const TrackTarget picture = picture_of(patterned_ball(), Vec3<double>(0), false);
+  const auto with_highlight = [&](int64_t size) {
+    TrackTarget bright = picture;
+    for (int64_t y = 32 - size; y < 32 + size; ++y) {
+      for (int64_t x = 28 - size; x < 28 + size; ++x) std::fill_n(&bright.colour(y, x, 0), 3, 1.0F);
+    }
+    return bright;
+  };
+  TrackTarget without = with_highlight(3);
+  for (int64_t y = 27; y < 37; ++y) {
+    for (int64_t x = 23; x < 33; ++x) without.coverage(y, x) = 0;
+  }
+  const DetailPhoto left_out = photo_of(with_highlight(3)), expected = photo_of(without);
+  for (int64_t i = 0; i < expected.mask.size(); ++i) {
+    ASSERT_EQ(left_out.mask[i], expected.mask[i]);
+    for (int64_t c = 0; c < 3 && expected.mask[i] != 0; ++c)
+      ASSERT_EQ(left_out.detail[3 * i + c], expected.detail[3 * i + c]);
+  }
+  EXPECT_EQ(expected.mask(32, 28), 0);
+  EXPECT_NE(photo_of(with_highlight(12)).mask(32, 28), 0);
 }
 
 // A cropped photograph shows the same where a ray meets it.
@@ -123,6 +148,28 @@ TEST(PhotoAlignment, TheEquationsHoldTheCostsDerivative) {
   }
   EXPECT_GT(size, 1);
   EXPECT_LT(off, 0.03 * size);
+}
+
+// As many samples again that the photograph does not show make the cost twice as large, and so its
+// derivatives.
+TEST(PhotoAlignment, WhatIsHiddenCountsAsWhatIsSeen) {
+  const LooseTurns loose{Mat3<double>(1)};
+  const Motion there = turned_by(Vec3<double>(0));
+  Alignment alignment = alignment_of(patterned_ball(), loose);
+  std::erase_if(alignment.samples, [&](const DetailSample& sample) {
+    return length(Vec2<float>(sample.rest.position.x, sample.rest.position.y)) > 0.7 * radius;
+  });
+  NormalEquations seen(6), both(6);
+  const double cost = align(alignment, there, 0, loose, &seen);
+  const size_t count = alignment.samples.size();
+  ASSERT_GT(count, 200U);
+  for (size_t i = 0; i < count; ++i) {
+    DetailSample behind = alignment.samples[i];
+    behind.rest.normal = -behind.rest.normal;
+    alignment.samples.push_back(behind);
+  }
+  EXPECT_NEAR(align(alignment, there, 0, loose, &both), 2 * cost, 1e-9 * cost);
+  for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(both.b[i], 2 * seen.b[i], 1e-9 * std::abs(seen.b[i]));
 }
 
 // Neither silhouettes nor normals tell how a ball has turned. Its photographs do, and where they are not

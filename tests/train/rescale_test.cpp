@@ -60,7 +60,7 @@ TEST(Rescale, ChangesTheFirstPictureAlone) {
   MovingBall at;
   std::vector<raster::Output> before;
   for (int64_t key = 0; key < 3; ++key) before.push_back(at.picture(key));
-  rescale_bodies({ratio}, at.eyes, at.surfels, at.motion);
+  rescale_bodies({ratio}, at.eyes, 1, at.surfels, at.motion);
   for (int64_t key = 0; key < 3; ++key) {
     const raster::Output& was = before[static_cast<size_t>(key)];
     const raster::Output is = at.picture(key);
@@ -77,11 +77,28 @@ TEST(Rescale, ChangesTheFirstPictureAlone) {
   }
 }
 
+// From the first key on, no camera sees a difference.
+TEST(Rescale, ChangesNoPictureWhereAllDistancesChange) {
+  MovingBall at;
+  std::vector<raster::Output> before;
+  for (int64_t key = 0; key < 3; ++key) before.push_back(at.picture(key));
+  rescale_bodies({1.08}, at.eyes, 0, at.surfels, at.motion);
+  for (int64_t key = 0; key < 3; ++key) {
+    const raster::Output& was = before[static_cast<size_t>(key)];
+    const raster::Output is = at.picture(key);
+    for (int64_t i = 0; i < was.alpha.size(); ++i) {
+      ASSERT_NEAR(is.alpha[i], was.alpha[i], 2e-3) << key << " " << i;
+      if (was.alpha[i] < 0.9F) continue;
+      ASSERT_NEAR(was.depth[i] / is.depth[i], 1.08, 2e-3) << key << " " << i;
+    }
+  }
+}
+
 TEST(Rescale, LeavesOthersAlone) {
   MovingBall at;
   at.surfels.body[0] = stands_still;
   const Surfels before = at.surfels;
-  rescale_bodies({1.08}, at.eyes, at.surfels, at.motion);
+  rescale_bodies({1.08}, at.eyes, 1, at.surfels, at.motion);
   EXPECT_EQ(load3<float>(at.surfels.position.row(0)), load3<float>(before.position.row(0)));
   EXPECT_EQ(at.surfels.log_scale(0, 1), before.log_scale(0, 1));
   EXPECT_NE(at.surfels.log_scale(1, 1), before.log_scale(1, 1));
@@ -192,7 +209,7 @@ TEST(Tracker, TheFirstPictureTellsHowLargeBodiesAre) {
   const std::vector<double> before = ratios();
   const std::vector<double> smaller(before.size(), 1 / larger);
   Motion motion = *at.scene.main_motion;
-  rescale_bodies(smaller, *positions_of_single_cameras(at.capture, motion), at.scene.main, motion);
+  rescale_bodies(smaller, *positions_of_single_cameras(at.capture, motion), 1, at.scene.main, motion);
   const std::vector<double> after = ratios();
   ASSERT_EQ(before.size(), 2U);
   for (const size_t b : {0, 1}) EXPECT_NEAR(after[b] / before[b], larger, 0.015) << b;
