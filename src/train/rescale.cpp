@@ -86,6 +86,31 @@ void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<dou
   }
 }
 
+std::vector<double> ratios_of_what_moves(std::vector<double> ratio, const std::vector<Vec3<double>>& eyes,
+                                         const Motion& motion) {
+  constexpr double least = 3;
+  const auto spread_of = [](const std::vector<Vec3<double>>& places) {
+    Vec3<double> sum(0);
+    double squares = 0;
+    for (const Vec3<double>& place : places) sum += place;
+    const Vec3<double> mean = sum / static_cast<double>(places.size());
+    for (const Vec3<double>& place : places) squares += dot(place - mean, place - mean);
+    return std::sqrt(squares);
+  };
+  for (size_t b = 0; b < ratio.size(); ++b) {
+    std::vector<Vec3<double>> places, added;
+    for (int64_t key = 0; key < motion.keys(); ++key) {
+      const auto body = static_cast<int64_t>(b);
+      const Vec3<double> place =
+          load3<double>(motion.centre.row(body)) + load3<double>(&motion.shift(body, key, 0));
+      places.push_back(place);
+      added.push_back((1 / ratio[b] - 1) * (place - eyes[static_cast<size_t>(key)]));
+    }
+    if (spread_of(places) < least * spread_of(added)) ratio[b] = 1;
+  }
+  return ratio;
+}
+
 std::vector<double> standing_ratios(const std::vector<Vec3<double>>& eyes, const Motion& motion,
                                     const Nodes& nodes, int32_t body) {
   constexpr double steady = 30;

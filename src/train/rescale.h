@@ -23,6 +23,11 @@ std::optional<std::vector<Vec3<double>>> positions_of_single_cameras(const Captu
 void rescale_bodies(const std::vector<double>& ratio, const std::vector<Vec3<double>>& eyes, int64_t first,
                     Surfels& main, Motion& motion);
 
+// The ratios of bodies that move at least three times as much as rescaling them from the first key on would
+// add; 1 for others. What hardly moves tells its distance by parallax. eyes: of each key, scene units.
+std::vector<double> ratios_of_what_moves(std::vector<double> ratio, const std::vector<Vec3<double>>& eyes,
+                                         const Motion& motion);
+
 // So a bent body that grows looks like one that comes closer. Of all sizes at each time of its nodes, up to
 // 15 % more or less than it has, those at which the most of the body is where it was at first: where its foot
 // stands, it grows. Minimises over g_k, ratios being 1 + g_k,

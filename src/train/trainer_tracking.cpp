@@ -90,7 +90,7 @@ void Trainer::keep_sizes(const Tracker& tracker, bool poses_are_known, Surfels& 
   }
   std::vector<double> ratios = tracker.distances_by_points(main, motion, scene_.extent);
   for (double& ratio : ratios) ratio = 1 / ratio;
-  rescale_bodies(ratios, *eyes, 0, main, motion);
+  rescale_bodies(ratios_of_what_moves(ratios, *eyes, motion), *eyes, 0, main, motion);
   scene_.main.position = main.position.on(device_);
   scene_.main.log_scale = main.log_scale.on(device_);
 }

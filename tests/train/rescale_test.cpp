@@ -94,6 +94,15 @@ TEST(Rescale, ChangesNoPictureWhereAllDistancesChange) {
   }
 }
 
+// The camera goes around: a ball that stands still would follow it if it were made larger.
+TEST(Rescale, IsForWhatMoves) {
+  MovingBall at;
+  EXPECT_EQ(ratios_of_what_moves({1.02}, at.eyes, at.motion)[0], 1.02);
+  at.motion.shift.fill(0);
+  EXPECT_EQ(ratios_of_what_moves({1.02}, at.eyes, at.motion)[0], 1);
+  EXPECT_EQ(ratios_of_what_moves({1}, at.eyes, at.motion)[0], 1);
+}
+
 TEST(Rescale, LeavesOthersAlone) {
   MovingBall at;
   at.surfels.body[0] = stands_still;
