@@ -77,6 +77,13 @@ Json to_json(const events::DensityChanged& e) {
           {"count", e.count}};
 }
 
+Json to_json(const events::FollowingDecided& e) {
+  return {{"event", "following_decided"},
+          {"iteration", e.iteration},
+          {"follows", e.follows},
+          {"silhouettes", e.silhouettes}};
+}
+
 Json to_json(const events::BendingDecided& e) {
   Json json = {{"event", "bending_decided"},
                {"iteration", e.iteration},

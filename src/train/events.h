@@ -74,6 +74,13 @@ struct DensityChanged {
   int64_t count = 0;    // surfels of the set from now on
 };
 
+// Whether bodies are followed has been decided (TrackOptions::still).
+struct FollowingDecided {
+  int64_t iteration = 0;
+  bool follows = false;
+  double silhouettes = 0;  // mean misfit at rest, a share of the masks' area
+};
+
 // Whether a body bends has been decided (train/options.h, BendOptions).
 struct BendingDecided {
   int64_t iteration = 0;
@@ -143,8 +150,8 @@ struct Finished {
   std::string reason;  // one line where the ending is not `completed`
 };
 
-using Event = std::variant<Started, Step, DensityChanged, BendingDecided, PhaseEntered, Evaluated, Warning,
-                           Paused, Saved, Measured, Finished>;
+using Event = std::variant<Started, Step, DensityChanged, FollowingDecided, BendingDecided, PhaseEntered,
+                           Evaluated, Warning, Paused, Saved, Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
 // Hands every event to every listener, in the order in which they were added.

@@ -173,6 +173,7 @@ void TrackOptions::validate() const {
   check_option(window > 0, "deform.track.window", window, "a positive number");
   check_not_negative(rounds, "deform.track.rounds");
   check_not_negative(adjust, "deform.track.adjust");
+  check_not_negative(still, "deform.track.still");
   check_not_negative(blur, "deform.track.blur");
   check_not_negative(silhouette, "deform.track.silhouette");
   check_not_negative(normal, "deform.track.normal");

@@ -184,6 +184,7 @@ struct TrackOptions {
   int window = 10;
   int rounds = 4;
   int adjust = 4;
+  float still = 0.15F;
   float blur = 2;
   float silhouette = 0.5F;
   float normal = 0.3F;
@@ -205,6 +206,10 @@ struct TrackOptions {
     v.field("adjust", adjust, "",
             "Photometric bundle adjustment of bodies that may bend and whose texture is seen to move with "
             "them: steps on photographs of each size; 0: none.");
+    v.field(
+        "still", still, "",
+        "Bodies whose silhouettes at rest are off by less, over the film, stand still and are not followed; "
+        "a share of the masks' area.");
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");

@@ -105,6 +105,8 @@ class Trainer {
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
+  // Before the first time is followed: whether the masks of all times fit bodies that stand still.
+  void see_whether_bodies_stand();
   // Makes rigid bodies as large as the first picture shows them, where poses are known well, and puts them as
   // far away as the points are; and the motion what fits. Everything on the CPU; the scene takes it over, all
   // but the motion.
@@ -198,7 +200,8 @@ class Trainer {
   int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
   // Main surfels at these points; those made up, or added while bodies are followed, come after.
   int64_t initial_main_count_ = 0;
-  bool carries_ = true;  // bodies carry something
+  bool carries_ = true;        // bodies carry something
+  bool bodies_stand_ = false;  // and none is followed
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;

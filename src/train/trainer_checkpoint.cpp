@@ -72,6 +72,7 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["capture_folder"] = capture_folder_;
   file.metadata["found_masks"] = std::to_string(capture_.found_masks);
   file.metadata["initial_main_count"] = std::to_string(initial_main_count_);
+  file.metadata["bodies_stand"] = std::to_string(bodies_stand_ ? 1 : 0);
   file.metadata["environment_radius"] = fmt::format("{}", environment_radius_);
   put_views(capture_, file);
   put_caps(memory_.caps, file);
@@ -142,6 +143,7 @@ void Trainer::resume() {
                             : scene_.main.count();
   const Tensor<int32_t> body = scene_.main.body.on(Device::cpu);
   carries_ = std::any_of(body.values().begin(), body.values().end(), [](int32_t b) { return b >= 0; });
+  bodies_stand_ = file.metadata.contains("bodies_stand") && count_in(file, "bodies_stand") != 0;
   // Drawn with as many surfels as there was memory for then.
   const bool tells_radius = file.metadata.contains("environment_radius");
   environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;

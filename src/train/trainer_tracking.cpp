@@ -96,7 +96,7 @@ void Trainer::keep_sizes(const Tracker& tracker, bool poses_are_known, Surfels& 
 }
 
 void Trainer::follow_again() {
-  if (options_.deform.track.true_poses) return;
+  if (options_.deform.track.true_poses || bodies_stand_) return;
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
@@ -116,8 +116,19 @@ void Trainer::follow_again() {
   scene_.lighting = lighting.on(device_);
 }
 
+void Trainer::see_whether_bodies_stand() {
+  const std::vector<double> misfits = silhouette_misfits();
+  if (misfits.empty()) return;
+  const double misfit = mean_of(misfits);
+  bodies_stand_ = misfit < options_.deform.track.still;
+  stream_.emit(events::FollowingDecided{iteration_, !bodies_stand_, misfit});
+}
+
 void Trainer::follow(int64_t key) {
+  health_.expect_fall();
   if (options_.deform.track.true_poses) return;
+  if (key == 1) see_whether_bodies_stand();
+  if (bodies_stand_) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
@@ -142,12 +153,12 @@ void Trainer::follow(int64_t key) {
     }
   }
   scene_.main_motion = motion.on(device_);
-  health_.expect_fall();
 }
 
 void Trainer::part_bodies(int64_t key) {
   constexpr std::array<int64_t, 4> at = {5, 10, 20, 40};
-  if (options_.deform.track.true_poses || std::find(at.begin(), at.end(), key) == at.end()) return;
+  if (options_.deform.track.true_poses || bodies_stand_ || std::find(at.begin(), at.end(), key) == at.end())
+    return;
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const Tracker tracker(options_.deform.track, options_.render, capture_);

@@ -263,6 +263,12 @@ export type TrainingEvent =
       count: number;
     }
   | {
+      event: 'following_decided';
+      iteration: number;
+      follows: boolean;
+      silhouettes: number; // mean misfit at rest, a share of the masks' area
+    }
+  | {
       event: 'bending_decided';
       iteration: number;
       body: number;

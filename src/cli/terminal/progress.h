@@ -27,6 +27,7 @@ class Progress {
   void show(const events::Started& e);
   void show(const events::Step& e);
   void show(const events::DensityChanged& e);
+  void show(const events::FollowingDecided& e);
   void show(const events::BendingDecided& e);
   void show(const events::PhaseEntered& e);
   void show(const events::Evaluated& e);
