@@ -97,7 +97,7 @@ std::optional<SeenSample> see(const DetailSample& sample, const Camera<double>& 
 // differs pays nothing.
 double align_body(const Alignment& alignment, std::span<const DetailSample> samples, const Motion& motion,
                   int64_t key, const Mat3<double>& loose, NormalEquations* equations) {
-  constexpr double least_seen = 0.25, full = 1;
+  constexpr double least_seen = 0.25;  // of the samples; where it is less, each costs 1
   const auto body = samples.front().rest.body;
   const Camera<double> camera = convert<double>(alignment.photo->camera);
   const Mat3<double> rotation = rotation_from_quaternion(load4<double>(&motion.rotation(body, key, 0)));
@@ -108,7 +108,7 @@ double align_body(const Alignment& alignment, std::span<const DetailSample> samp
     if (auto now = see(sample, camera, *alignment.photo, centre, shift, rotation)) seen.push_back(*now);
   }
   const auto all = static_cast<double>(samples.size());
-  if (static_cast<double>(seen.size()) < least_seen * all) return alignment.weight * full * all;
+  if (static_cast<double>(seen.size()) < least_seen * all) return alignment.weight * all;
   const double share = alignment.weight * all / static_cast<double>(seen.size());
   double cost = 0;
   for (const SeenSample& now : seen) {

@@ -93,8 +93,8 @@ class Tracker {
   // Lets the solver compare the key's photograph with earlier ones, where photographs decide turns.
   void compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier, const Motion& motion,
                            int64_t key, const LooseTurns& loose) const;
-  // Of loose turns that went astray: whether any was found elsewhere. Those of the times between are turned
-  // by their share.
+  // Seeks loose turns that went astray (train/turn_search.h) in the photograph of nine keys before, and turns
+  // the keys between by their share. Returns whether any was found.
   bool seek_turns(const std::vector<EarlierView>& earlier, Motion& motion, int64_t key,
                   const LooseTurns& loose) const;
   // Whether what photographs decided is how a mirror image turns.

@@ -105,7 +105,7 @@ class Trainer {
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
-  // Before the first time is followed: whether the masks of all times fit bodies that stand still.
+  // Before the second time is followed: whether the masks of all times fit bodies that stand still.
   void see_whether_bodies_stand();
   // Makes rigid bodies as large as the first picture shows them, where poses are known well, and puts them as
   // far away as the points are; and the motion what fits. Everything on the CPU; the scene takes it over, all
