@@ -388,7 +388,7 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
   Nodes nodes{tensor_of(body),          tensor_of(times),         Tensor<float>({n, 3}),   tensor_of(radius),
               Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3}), Tensor<float>({n, l, 3})};
   std::copy(centre.begin(), centre.end(), nodes.centre.data());
-  for (int64_t i = 0; i < n * l; ++i) std::copy_n(nodes.centre.row(i / l), 3, &nodes.anchor[3 * i]);
+  for (int64_t i = 0; i < n * l; ++i) store3(&nodes.anchor[3 * i], nodes::place_of(nodes, motion, i / l, 0));
   return nodes;
 }
 

@@ -39,7 +39,8 @@ std::array<double, sizes> costs_of_sizes(const Vec3<double>& eye, const Motion& 
   for (int64_t n = 0; n < nodes.count(); ++n) {
     if (nodes.body[n] != body) continue;
     ++count;
-    const Vec3<double> now = nodes::place_of(nodes, motion, n, k), first = load3<double>(nodes.centre.row(n));
+    const Vec3<double> now = nodes::place_of(nodes, motion, n, k),
+                       first = nodes::place_of(nodes, motion, n, 0);
     for (size_t i = 0; i < sizes; ++i) {
       const Vec3<double> off = (scaled(now, eye, 1 + growth(i)) - first) / (near * nodes.radius[n]);
       left[i] += dot(off, off) / (1 + dot(off, off));

@@ -174,6 +174,14 @@ TEST(Rescale, FindsTheSizesWithWhichAFootStands) {
   rescale_bent_body(closer, at.eyes, 0, motion, nodes);
   const std::vector<double> found = standing_ratios(at.eyes, motion, nodes, 0);
   for (size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k] * closer[k], 1, 0.006) << k;
+  // Nor does it matter where it rests while nothing moves it.
+  const Vec3<double> off(0.02, 0, 0.03);
+  for (int64_t n = 0; n < nodes.count(); ++n)
+    store3(nodes.centre.row(n), load3<double>(nodes.centre.row(n)) - off);
+  for (int64_t key = 0; key < motion.keys(); ++key)
+    store3(&motion.shift(0, key, 0), load3<double>(&motion.shift(0, key, 0)) + off);
+  const std::vector<double> from_elsewhere = standing_ratios(at.eyes, motion, nodes, 0);
+  for (size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(from_elsewhere[k], found[k], 0.0026) << k;
   // Nothing tells of what stands nowhere.
   for (int64_t i = 0; i < motion.shift.size(); i += 3) motion.shift[i] += i > 0 ? 2.0F : 0.0F;
   for (const double ratio : standing_ratios(at.eyes, motion, nodes, 0)) EXPECT_NEAR(ratio, 1, 1e-9);

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -18,19 +19,32 @@ struct Followed {
   bool moves = false;
 };
 
-Followed followed_a_little(const Capture& capture, float still) {
+// Resumes from its own checkpoint as soon as it is decided where `resumes`.
+Followed followed_a_little(const Capture& capture, float still, bool resumes = false) {
   TrainOptions options = preset("cpu");
   options.iterations = 400;
   options.specular = Specular::none;
   options.initial.max_points = options.density.max_surfels = 4000;
   options.deform.track.still = still;
-  Trainer trainer(options, capture, fs::path(::testing::TempDir()) / ("still_" + std::to_string(::getpid())));
+  const fs::path folder = fs::path(::testing::TempDir()) / ("still_" + std::to_string(::getpid()));
   Followed result;
-  trainer.stream().listen([&](const events::Event& event) {
-    if (const auto* e = std::get_if<events::FollowingDecided>(&event)) result.decided = *e;
-  });
-  while (trainer.iteration() < options.iterations / 8 + 4 * options.deform.track.map_each) trainer.step();
-  result.moves = std::ranges::any_of(trainer.scene().main_motion->shift.values(),
+  const auto listen = [&](Trainer& trainer) {
+    trainer.stream().listen([&](const events::Event& event) {
+      if (const auto* e = std::get_if<events::FollowingDecided>(&event)) result.decided = *e;
+    });
+  };
+  auto trainer = std::make_unique<Trainer>(options, capture, folder);
+  listen(*trainer);
+  while (trainer->iteration() < options.iterations / 8 + 4 * options.deform.track.map_each) {
+    trainer->step();
+    if (!resumes || !result.decided) continue;
+    resumes = false;
+    trainer->save();
+    trainer = std::make_unique<Trainer>(options, capture, folder);
+    listen(*trainer);
+    trainer->resume();
+  }
+  result.moves = std::ranges::any_of(trainer->scene().main_motion->shift.values(),
                                      [](float shift) { return shift != 0; });
   return result;
 }
@@ -55,6 +69,10 @@ TEST(StillBodies, AreNotFollowed) {
   EXPECT_LT(standing.decided->silhouettes, moving.decided->silhouettes);
   EXPECT_FALSE(standing.moves);
   EXPECT_TRUE(followed_a_little(still, 0).decided->follows);
+
+  const Followed resumed = followed_a_little(still, TrackOptions().still, true);
+  EXPECT_FALSE(resumed.decided->follows);
+  EXPECT_FALSE(resumed.moves);
 }
 
 }  // namespace
