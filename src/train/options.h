@@ -209,7 +209,7 @@ struct TrackOptions {
     v.field(
         "still", still, "",
         "Bodies whose silhouettes at rest are off by less, over the film, stand still and are not followed; "
-        "a share of the masks' area; 0: all are.");
+        "a share of the masks' area; 0: all are followed.");
     v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
     v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
     v.field("normal", normal, "", "Weight of the residual of normals.");

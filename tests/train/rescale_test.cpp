@@ -174,7 +174,7 @@ TEST(Rescale, FindsTheSizesWithWhichAFootStands) {
   rescale_bent_body(closer, at.eyes, 0, motion, nodes);
   const std::vector<double> found = standing_ratios(at.eyes, motion, nodes, 0);
   for (size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k] * closer[k], 1, 0.006) << k;
-  // Nor does it matter where it rests while nothing moves it.
+  // Where nodes rest does not matter, only where the first pose puts them.
   const Vec3<double> off(0.02, 0, 0.03);
   for (int64_t n = 0; n < nodes.count(); ++n)
     store3(nodes.centre.row(n), load3<double>(nodes.centre.row(n)) - off);
