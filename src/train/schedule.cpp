@@ -84,6 +84,15 @@ double Schedule::latest_time(int iteration, double first, double last) const {
   return std::lerp(first, last, std::lerp(static_cast<double>(options_.schedule.first_times), 1.0, grown));
 }
 
+bool Schedule::solves_poses_again(int iteration, int64_t followed) const {
+  constexpr int longest = 2000;
+  const int rounds = options_.deform.track.rounds;
+  if (rounds == 0) return false;
+  const int part = std::clamp(options_.iterations / rounds, 1, longest);
+  // What was followed a moment ago is not known better yet.
+  return iteration % part == 0 && 2 * (iteration - followed) >= part;
+}
+
 bool Schedule::densifies(int iteration, const DensityOptions& density) const {
   return iteration >= mark(density.from) && iteration < mark(density.until) && iteration > 0 &&
          iteration % interval(density.every) == 0;
@@ -148,8 +157,12 @@ double Schedule::field_rate(int iteration) const {
 }
 
 double Schedule::motion_rate(int iteration) const {
-  return optimize::log_linear(options_.rates.motion, options_.rates.motion_end, iteration,
-                              options_.iterations);
+  const RateOptions& rates = options_.rates;
+  constexpr int longest = 8000;
+  const int falls_in = std::min(options_.iterations, longest);
+  const double beyond = static_cast<double>(std::max(0, iteration - falls_in)) / falls_in;
+  return optimize::log_linear(rates.motion, rates.motion_end, iteration, falls_in) *
+         std::pow(rates.motion_end / rates.motion, beyond);
 }
 
 double Schedule::map_rate(int iteration) const {

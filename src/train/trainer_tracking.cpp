@@ -42,11 +42,8 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
   const int64_t key = 1 + since / track.map_each;
   if (key < keys) return {.goes_on = true, .enters = since % track.map_each == 0, .key = key};
   Tracking now{.enters = key == keys && since % track.map_each == 0, .key = keys - 1};
-  if (track.rounds == 0 || now.enters) return now;
-  // What was followed a moment ago is not known better yet.
-  const int part = std::max(1, options_.iterations / track.rounds);
   const int64_t followed = iteration - since + (keys - 1) * track.map_each;
-  now.refines = iteration % part == 0 && 2 * (iteration - followed) >= part;
+  now.refines = !now.enters && schedule_.solves_poses_again(iteration, followed);
   return now;
 }
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
+#include <vector>
 
 namespace traceflow {
 namespace {
@@ -120,6 +122,48 @@ TEST(Schedule, DensityControlRunsAsTheMethodSays) {
 }
 
 // Whatever the run's length: the optimiser needs its iterations to bring an opacity back from a reset.
+TEST(Schedule, PosesAreSolvedAgainAtAQuarterOfARunAndNoLaterThanAfterTwoThousand) {
+  const auto solved = [](int iterations, int rounds, int followed) {
+    TrainOptions options = preset("cpu");
+    options.iterations = iterations;
+    options.deform.track.rounds = rounds;
+    const Schedule schedule(options);
+    std::vector<int> at;
+    for (int i = followed; i < iterations; ++i) {
+      if (schedule.solves_poses_again(i, followed)) at.push_back(i);
+    }
+    return at;
+  };
+  EXPECT_EQ(solved(2500, 4, 300), (std::vector<int>{625, 1250, 1875}));
+  EXPECT_EQ(solved(2500, 4, 600), (std::vector<int>{1250, 1875}));
+  EXPECT_EQ(solved(8000, 4, 600), (std::vector<int>{2000, 4000, 6000}));
+  const std::vector<int> often = solved(60000, 4, 600);
+  ASSERT_EQ(often.size(), 29U);
+  EXPECT_EQ(often.front(), 2000);
+  EXPECT_EQ(often.back(), 58000);
+  EXPECT_TRUE(solved(8000, 0, 600).empty());
+}
+
+TEST(Schedule, PosesLearnNoLongerForALongerRun) {
+  TrainOptions options = preset("cpu");
+  const double start = options.rates.motion, end = options.rates.motion_end;
+  for (const int iterations : {1000, 8000}) {
+    options.iterations = iterations;
+    const Schedule s(options);
+    EXPECT_NEAR(s.motion_rate(0), start, 1e-9);
+    EXPECT_NEAR(s.motion_rate(iterations / 2), std::sqrt(start * end), 1e-9);
+    EXPECT_NEAR(s.motion_rate(iterations), end, 1e-9);
+  }
+  const Schedule usual(options);
+  options.iterations = 60000;
+  const Schedule longer(options);
+  double turned = 0;
+  for (int i = 0; i < 60000; ++i) turned += longer.motion_rate(i);
+  for (int i = 0; i <= 8000; ++i) EXPECT_EQ(longer.motion_rate(i), usual.motion_rate(i)) << i;
+  // The integral of a decay without end.
+  EXPECT_NEAR(turned, 8000 * start / std::log(start / end), 0.001 * turned);
+}
+
 TEST(Schedule, OpacitiesHaveTimeToRecoverBeforeTheFaintGo) {
   for (const int iterations : {1200, 6000, 10000, 20000, 25000, 40000, 50000, 60000, 90000}) {
     TrainOptions options = paper();
