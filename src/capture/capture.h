@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,6 +23,9 @@ struct View {
   std::string id;
   float time = 0;  // in [0, 1]
   Camera<float> camera;
+  // Takes normal priors in the mask, in world axes, back by what they are off by together; none where nobody
+  // knows.
+  std::optional<Mat3<float>> prior_turn = {};
 };
 
 // The pixels of a view. Tensors that the capture lacks are empty.
@@ -74,8 +78,8 @@ Capture load_capture(const std::filesystem::path& path, const CaptureOptions& op
 // Every time at which it has a view of either split, ascending.
 std::vector<float> times_of(const Capture& capture);
 
-// Decodes a view's pixels, or finds them in the cache, whose size is bounded. Safe to call from several
-// threads.
+// Decodes a view's pixels, or finds them in the cache, whose size is bounded; priors are turned as the view
+// says. Safe to call from several threads.
 std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View& view);
 // Decodes the views that are not in the cache, on all threads, until the cache is full. Whoever reads views
 // in order calls this ahead with the next few.

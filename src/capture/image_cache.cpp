@@ -141,7 +141,7 @@ void ImageCache::insert(const std::string& id, const std::shared_ptr<const ViewP
 
 std::shared_ptr<const ViewImages> load_images(const Capture& capture, const View& view) {
   auto images = std::make_shared<ViewImages>();
-  widen(*load_pixels(capture, view), *images);
+  widen(*load_pixels(capture, view), view.prior_turn, *images);
   return images;
 }
 
@@ -155,7 +155,7 @@ FinePhotograph load_fine_photograph(const Capture& capture, const View& view, in
   pixels.colour = decode_colour(source).colour;
   pixels.coverage = capture.images->fine_coverage(view.id, source);
   ViewImages images;
-  widen(pixels, images);
+  widen(pixels, std::nullopt, images);
   FinePhotograph photograph{view.camera, std::move(images.colour), std::move(images.coverage)};
   Camera<float>& camera = photograph.camera;
   camera.width = static_cast<int>(source.width());

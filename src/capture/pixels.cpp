@@ -6,7 +6,8 @@
 
 namespace traceflow {
 
-void widen(const ViewPixels& pixels, ViewImages& images, bool with_coverage) {
+void widen(const ViewPixels& pixels, const std::optional<Mat3<float>>& prior_turn, ViewImages& images,
+           bool with_coverage) {
   const Device device = pixels.colour.device();
   images.colour.place(device).resize(pixels.colour.shape());
   images.known = pixels.known;
@@ -20,8 +21,11 @@ void widen(const ViewPixels& pixels, ViewImages& images, bool with_coverage) {
     parallel_for(device, "capture: widen coverages", images.coverage.size(),
                  WidenColour{pixels.coverage.data(), images.coverage.data()}, grain);
   }
+  const bool turns = prior_turn && !pixels.mask.empty();
   parallel_for(device, "capture: widen normals", images.normal_prior.size() / 3,
-               WidenNormal{pixels.normal_prior.data(), images.normal_prior.data()}, grain);
+               WidenNormal{pixels.normal_prior.data(), turns ? pixels.mask.data() : nullptr,
+                           prior_turn.value_or(Mat3<float>(1)), images.normal_prior.data()},
+               grain);
 }
 
 void take_unknown(const Tensor<float>& rendered, ViewImages& images) {

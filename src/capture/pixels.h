@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "capture/capture.h"
 
@@ -25,8 +26,9 @@ struct ViewPixels {
 };
 
 // Numbers of [0, 1] and unit or zero normals again, where the pixels are; `images` is resized and put there.
-// Without with_coverage its coverage stays empty.
-void widen(const ViewPixels& pixels, ViewImages& images, bool with_coverage = true);
+// prior_turn: the view's. Without with_coverage its coverage stays empty.
+void widen(const ViewPixels& pixels, const std::optional<Mat3<float>>& prior_turn, ViewImages& images,
+           bool with_coverage = true);
 
 // Where a photograph says nothing it takes the colours that were rendered (H×W×3, where the images are): what
 // is not known is no error.

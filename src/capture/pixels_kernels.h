@@ -32,11 +32,14 @@ struct LeaveUnknown {
 
 struct WidenNormal {
   const int16_t* from;
+  const uint8_t* turned;  // the mask, or null: none is turned
+  Mat3<float> turn;
   float* to;
   TRACEFLOW_HD void operator()(int64_t pixel) const {
-    const Vec3<float> n = load3<float>(from + 3 * pixel);
+    Vec3<float> n = load3<float>(from + 3 * pixel);
     const float length2 = dot(n, n);
-    store3(to + 3 * pixel, length2 > 0 ? n / std::sqrt(length2) : Vec3<float>(0));
+    n = length2 > 0 ? n / std::sqrt(length2) : Vec3<float>(0);
+    store3(to + 3 * pixel, turned != nullptr && turned[pixel] != 0 ? turn * n : n);
   }
 };
 

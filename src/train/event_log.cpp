@@ -94,6 +94,10 @@ Json to_json(const events::BendingDecided& e) {
   return json;
 }
 
+Json to_json(const events::PriorsTurned& e) {
+  return {{"event", "priors_turned"}, {"iteration", e.iteration}, {"degrees", e.degrees}};
+}
+
 Json to_json(const events::PhaseEntered& e) {
   return {{"event", "phase_entered"}, {"iteration", e.iteration}, {"phase", e.phase}};
 }

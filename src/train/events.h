@@ -90,6 +90,12 @@ struct BendingDecided {
   std::optional<double> photographs;  // what differs of them with nodes, over without; of textured bodies
 };
 
+// Normal priors in masks have been turned back by what they are off by together (train/prior_bias.h).
+struct PriorsTurned {
+  int64_t iteration = 0;
+  double degrees = 0;
+};
+
 struct PhaseEntered {
   int64_t iteration = 0;
   std::string phase;
@@ -150,8 +156,8 @@ struct Finished {
   std::string reason;  // one line where the ending is not `completed`
 };
 
-using Event = std::variant<Started, Step, DensityChanged, FollowingDecided, BendingDecided, PhaseEntered,
-                           Evaluated, Warning, Paused, Saved, Measured, Finished>;
+using Event = std::variant<Started, Step, DensityChanged, FollowingDecided, BendingDecided, PriorsTurned,
+                           PhaseEntered, Evaluated, Warning, Paused, Saved, Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
 // Hands every event to every listener, in the order in which they were added.

@@ -192,6 +192,7 @@ struct TrackOptions {
   float colour = 0.3F;
   float tracks = 0.3F;
   bool new_surface = true;
+  bool prior_turn = false;
   bool true_poses = false;
 
   template <class Visitor>
@@ -221,6 +222,9 @@ struct TrackOptions {
             "Weight of the capture's tracked points, on bodies that they are seen to turn with.");
     v.field("new_surface", new_surface, "",
             "Add surfels inside masks where no body has any, at each new time.");
+    v.field("prior_turn", prior_turn, "",
+            "Turn normal priors in masks, once all times have been followed, by the one rotation in the "
+            "camera's axes that makes them agree with the normals of the rendered depth.");
     v.field("true_poses", true_poses, "",
             "Take poses from the capture's true motion, for tests: an upper bound for tracking.");
   }

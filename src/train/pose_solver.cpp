@@ -7,11 +7,11 @@
 
 #include "base/parallel.h"
 #include "math/rotation_group.h"
-#include "math/similarity_fit.h"
 #include "ops/deform/deform.h"
 #include "ops/motion/nodes.h"
 #include "ops/raster/body_jacobian.h"
 #include "train/gaussian_blur.h"
+#include "train/prior_bias.h"
 
 namespace traceflow {
 
@@ -45,48 +45,19 @@ std::vector<double> solve_symmetric(std::vector<double> a, std::vector<double> b
   return b;
 }
 
-// The rotation that takes `from` nearest to `to`, given Σ to · fromᵀ.
-Mat3<double> rotation_of_moments(const Mat3<double>& moments) {
-  std::array<Vec3<double>, 6> from, to;
-  // Axes and their opposites: as points about the origin they have these moments.
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto k = static_cast<size_t>(axis);
-    Vec3<double> unit(0);
-    unit[axis] = 1;
-    from[2 * k] = unit;
-    from[2 * k + 1] = -unit;
-    to[2 * k] = moments[axis];
-    to[2 * k + 1] = -moments[axis];
+// Turns priors by what those of the surroundings are off by.
+void turn_by_surroundings(const raster::Output& picture, TrackTarget& target) {
+  PriorBias surroundings;
+  for (int64_t i = 0; i < picture.alpha.size(); ++i) {
+    if (picture.alpha[i] < 0.9F || (!target.mask.empty() && target.mask[i] != 0)) continue;
+    surroundings.add(target.camera, load3<double>(picture.normal.data() + 3 * i),
+                     load3<double>(target.normal_prior.data() + 3 * i));
   }
-  return fit_similarity(from, to).rotation;
-}
-
-void turn_prior(const raster::Output& picture, const Camera<float>& camera, const Tensor<uint8_t>& mask,
-                Tensor<float>& prior) {
-  constexpr double pull = 0.05;  // towards none
-  constexpr int rounds = 6;
-  constexpr int64_t least_pixels = 50;
-  const Mat3<double> to_camera(camera.camera_from_world);
-  Mat3<double> bias(1);
-  for (int round = 0; round < rounds; ++round) {
-    const double within = std::cos((round == 0 ? 25 : 15) * 0.017453292519943295);
-    Mat3<double> moments(0);
-    int64_t count = 0;
-    for (int64_t i = 0; i < picture.alpha.size(); ++i) {
-      if (picture.alpha[i] < 0.9F || (!mask.empty() && mask[i] != 0)) continue;
-      const Vec3<double> model = load3<double>(picture.normal.data() + 3 * i);
-      const Vec3<double> told = load3<double>(prior.data() + 3 * i);
-      if (dot(model, model) < 0.25 || dot(told, told) < 0.25) continue;
-      const Vec3<double> a = to_camera * normalize(model), b = to_camera * normalize(told);
-      if (!(dot(bias * a, b) > within)) continue;
-      moments += outerProduct(b, a);
-      ++count;
-    }
-    if (count < least_pixels) return;
-    bias = rotation_of_moments(moments + pull * static_cast<double>(count) * bias);
-  }
-  const Mat3<float> turn(transpose(to_camera) * transpose(bias) * to_camera);
-  for (int64_t i = 0; i < prior.size(); i += 3) store3(&prior[i], turn * load3<float>(&prior[i]));
+  const std::optional<Mat3<double>> bias = surroundings.rotation();
+  if (!bias) return;
+  const Mat3<float> turn = without_bias(target.camera, *bias);
+  for (int64_t i = 0; i < target.normal_prior.size(); i += 3)
+    store3(&target.normal_prior[i], turn * load3<float>(&target.normal_prior[i]));
 }
 
 // The root mean square distance of each body's surfels from its centre.
@@ -188,9 +159,9 @@ void PoseSolver::pose() {
 
 void PoseSolver::turn_priors() {
   for (TrackTarget& target : targets_) {
-    if (target.normal_prior.empty()) continue;
+    if (target.normal_prior.empty() || target.prior_is_unbiased) continue;
     raster::forward(posed_, target.camera, options_, whole_, nullptr);
-    turn_prior(whole_, target.camera, target.mask, target.normal_prior);
+    turn_by_surroundings(whole_, target);
   }
 }
 

@@ -19,10 +19,11 @@ namespace traceflow {
 struct TrackTarget {
   Camera<float> camera;
   bool is_shrunk = false;
-  Tensor<float> colour;        // H×W×3
-  Tensor<float> coverage;      // H×W
-  Tensor<uint8_t> mask;        // H×W
-  Tensor<float> normal_prior;  // H×W×3 or empty
+  Tensor<float> colour;            // H×W×3
+  Tensor<float> coverage;          // H×W
+  Tensor<uint8_t> mask;            // H×W
+  Tensor<float> normal_prior;      // H×W×3 or empty
+  bool prior_is_unbiased = false;  // in the mask
 };
 
 // Weights of what is compared: residuals are in [0, 1], normals unit.
@@ -49,8 +50,8 @@ class PoseSolver {
   PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key,
              const raster::Options& options, std::vector<TrackTarget> targets);
 
-  // Turns each target's priors, in the camera's axes, so that those of what stands still agree with the
-  // model.
+  // Turns each target's priors whose bias is not known, in the camera's axes, so that those of what stands
+  // still agree with the model.
   void turn_priors();
   const std::vector<TrackTarget>& targets() const { return targets_; }
   // How pictures are drawn.

@@ -4,9 +4,9 @@ namespace traceflow {
 
 ViewImages& Targets::of(const Capture& capture, const View& view, bool with_coverage) {
   if (device_ == Device::cpu) {
-    widen(*load_pixels(capture, view), images_, with_coverage);
+    widen(*load_pixels(capture, view), view.prior_turn, images_, with_coverage);
   } else {
-    widen(on_device(capture, view), images_, with_coverage);
+    widen(on_device(capture, view), view.prior_turn, images_, with_coverage);
   }
   return images_;
 }

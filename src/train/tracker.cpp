@@ -136,6 +136,7 @@ TrackTarget Tracker::target_of(const View& view, int widest) const {
   target.mask.resize(target.coverage.shape());
   for (int64_t i = 0; i < target.mask.size(); ++i) target.mask[i] = target.coverage[i] >= 0.5F ? 1 : 0;
   if (images->normal_prior.empty()) return target;
+  target.prior_is_unbiased = view.prior_turn.has_value();
   target.normal_prior = smaller(images->normal_prior, 3, factor);
   for (int64_t i = 0; i < target.normal_prior.size(); i += 3) {
     const Vec3<float> n = load3<float>(&target.normal_prior[i]);

@@ -94,6 +94,7 @@ class Trainer {
     int64_t key = 0;       // the newest time
   };
   Tracking tracking(int iteration) const;
+  Tracker make_tracker() const;
   // What an iteration does to bodies before it trains. Returns surfels for surface that has come into view.
   Surfels follow_bodies(const Tracking& now);
   // Follows bodies to a new time.
@@ -105,6 +106,9 @@ class Trainer {
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
+  // Measures by what the normal priors in masks are off together, and turns them back.
+  void turn_priors();
+  void set_prior_bias(const Mat3<double>& bias);
   // Before the second time is followed: whether the masks of all times fit bodies that stand still.
   void see_whether_bodies_stand();
   // Makes rigid bodies as large as the first picture shows them, where poses are known well, and puts them as
@@ -222,7 +226,8 @@ class Trainer {
   std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
   Draws before_step_;
   Review review_;
-  TextureTrust texture_trust_;  // while bodies are followed
+  TextureTrust texture_trust_;              // while bodies are followed
+  std::optional<Mat3<double>> prior_bias_;  // that the views' priors are turned back by
   // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
   bool torn_ = false;
   std::atomic<bool> stop_soon_{false};

@@ -30,6 +30,33 @@ int64_t count_in(const Safetensors& file, const std::string& key) {
   return static_cast<int64_t>(value);
 }
 
+Tensor<double> rows_of(const Mat3<double>& matrix) {
+  Tensor<double> rows({3, 3});
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) rows(r, c) = matrix[c][r];
+  }
+  return rows;
+}
+
+Mat3<double> rotation_in(const Tensor<double>& rows) {
+  constexpr double rounding = 1e-6;
+  Mat3<double> matrix(0);
+  bool is_rotation = rows.shape() == Shape{3, 3};
+  if (is_rotation) {
+    matrix = transpose(
+        Mat3<double>(load3<double>(rows.row(0)), load3<double>(rows.row(1)), load3<double>(rows.row(2))));
+    const Mat3<double> unit = transpose(matrix) * matrix;
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r)
+        is_rotation = is_rotation && std::abs(unit[c][r] - (c == r ? 1 : 0)) < rounding;
+    }
+    is_rotation = is_rotation && determinant(matrix) > 0;
+  }
+  if (!is_rotation)
+    throw InputError("checkpoint", "prior_bias", rows.shape().to_string() + " numbers", "a rotation");
+  return matrix;
+}
+
 // each: bonds of a surfel.
 void check_bonds(const Neighbours& bonds, int64_t surfels, int64_t each) {
   bool fits = bonds.index.shape() == Shape{surfels, each} && bonds.distance2.shape() == bonds.index.shape();
@@ -59,6 +86,7 @@ Safetensors Trainer::checkpoint() const {
     file.add("texture_trust/stiffness", texture_trust_.stiffness);
     file.add("texture_trust/mirror_image", texture_trust_.mirror_image);
   }
+  if (prior_bias_) file.add("prior_bias", rows_of(*prior_bias_));
   file.add("views/order", views_.order());
   Tensor<int64_t> random(Shape{4});
   for (size_t i = 0; i < 4; ++i) random[static_cast<int64_t>(i)] = std::bit_cast<int64_t>(random_.state()[i]);
@@ -126,6 +154,8 @@ void Trainer::resume() {
       throw InputError("checkpoint", "texture_trust", texture_trust_.turned.shape().to_string(),
                        bodies.to_string());
   }
+  // Checkpoints of programs before 28 November 2026 have none.
+  if (file.has("prior_bias")) set_prior_bias(rotation_in(file.tensor<double>("prior_bias")));
   views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");
   const Tensor<double> health = file.tensor<double>("health");

@@ -10,6 +10,7 @@
 #include "ops/motion/nodes.h"
 #include "train/bodies.h"
 #include "train/initialise.h"
+#include "train/prior_bias.h"
 #include "train/rescale.h"
 #include "train/trainer.h"
 
@@ -30,6 +31,18 @@ double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
+// Spread over the film, in the order of time.
+std::vector<const View*> some_views(const Capture& capture) {
+  constexpr size_t most_views = 20;
+  std::vector<const View*> all;
+  for (const View& view : capture.train) all.push_back(&view);
+  std::stable_sort(all.begin(), all.end(), [](const View* a, const View* b) { return a->time < b->time; });
+  const size_t step = (all.size() + most_views - 1) / most_views;
+  std::vector<const View*> some;
+  for (size_t k = 0; k < all.size(); k += step) some.push_back(all[k]);
+  return some;
+}
+
 }  // namespace
 
 Trainer::Tracking Trainer::tracking(int iteration) const {
@@ -47,6 +60,8 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
   return now;
 }
 
+Tracker Trainer::make_tracker() const { return {options_.deform.track, options_.render, capture_}; }
+
 Surfels Trainer::follow_bodies(const Tracking& now) {
   constexpr int64_t strays_every = 5;  // times
   Surfels made;
@@ -57,6 +72,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
     if (options_.deform.track.new_surface) made = new_surface(now.key);
   }
   if ((now.refines && carries_) || has_come_to_the_end) follow_again();
+  if (now.refines && carries_) turn_priors();
   if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);
   if (has_come_to_the_end) settle();
   return made;
@@ -97,7 +113,7 @@ void Trainer::follow_again() {
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
-  const Tracker tracker(track, options_.render, capture_);
+  const Tracker tracker = make_tracker();
   std::optional<Nodes> nodes;
   if (scene_.main_nodes) nodes = scene_.main_nodes->on(Device::cpu);
   const bool refines = tracking(iteration_).refines;
@@ -129,7 +145,7 @@ void Trainer::follow(int64_t key) {
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
-  const Tracker tracker(track, options_.render, capture_);
+  const Tracker tracker = make_tracker();
   if (key == 1)
     tracker.solve(main, nullptr, motion, 0, scene_.extent, {track.steps, little_blur * track.blur},
                   texture_trust_);
@@ -158,7 +174,7 @@ void Trainer::part_bodies(int64_t key) {
     return;
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
-  const Tracker tracker(options_.deform.track, options_.render, capture_);
+  const Tracker tracker = make_tracker();
   if (tracker.part_bodies(main, initial_main_count_, motion, key, scene_.extent) == 0) return;
   scene_.main.body = main.body.on(device_);
   scene_.main_motion = motion.on(device_);
@@ -171,9 +187,8 @@ Surfels Trainer::new_surface(int64_t key) const {
   const InitialOptions& initial = options_.initial;
   const float tint = initial.tint_in_mask > 0 ? initial.tint_in_mask : initial.tint;
   Motion motion = scene_.main_motion->on(Device::cpu);
-  return Tracker(options_.deform.track, options_.render, capture_)
-      .new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, tint,
-                   memory_.caps.main - scene_.main.count());
+  return make_tracker().new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, tint,
+                                    memory_.caps.main - scene_.main.count());
 }
 
 void Trainer::let_strays_go(int64_t key) {
@@ -245,17 +260,46 @@ void Trainer::hold_nodes() {
 }
 
 std::vector<double> Trainer::silhouette_misfits() {
-  constexpr size_t most_views = 20;
-  std::vector<const View*> views;
-  for (const View& view : capture_.train) views.push_back(&view);
-  std::stable_sort(views.begin(), views.end(),
-                   [](const View* a, const View* b) { return a->time < b->time; });
-  const size_t step = (views.size() + most_views - 1) / most_views;
   std::vector<double> misfits;
-  for (size_t k = 0; k < views.size(); k += step) {
-    if (const std::optional<double> misfit = silhouette_misfit(*views[k])) misfits.push_back(*misfit);
+  for (const View* view : some_views(capture_)) {
+    if (const std::optional<double> misfit = silhouette_misfit(*view)) misfits.push_back(*misfit);
   }
   return misfits;
+}
+
+void Trainer::turn_priors() {
+  // Once: what priors pull surfaces to comes back in the depth, and would be measured with them.
+  if (!options_.deform.track.prior_turn || prior_bias_) return;
+  constexpr float opaque = 0.95F;
+  PriorBias in_masks;
+  for (const View* view : some_views(capture_)) {
+    const std::shared_ptr<const ViewImages> images = load_images(capture_, *view);
+    if (images->mask.empty() || images->normal_prior.empty()) continue;
+    FrameRequest request;
+    request.camera = view->camera;
+    request.time = view->time;
+    request.deform_main = request.specular = false;
+    request.pseudo_normals = true;
+    const Frame& frame = renderer_.forward(scene_, request, false);
+    const Tensor<float> alpha = frame.raster.alpha.on(Device::cpu),
+                        normal = frame.pseudo_normal.on(Device::cpu);
+    for (int64_t i = 0; i < alpha.size(); ++i) {
+      if (images->mask[i] == 0 || alpha[i] < opaque) continue;
+      in_masks.add(view->camera, load3<double>(&normal[3 * i]), load3<double>(&images->normal_prior[3 * i]));
+    }
+  }
+  const std::optional<Mat3<double>> bias = in_masks.rotation();
+  if (!bias) return;
+  set_prior_bias(*bias);
+  constexpr double degrees = 57.29577951308232;
+  const double angle =
+      std::acos(std::clamp(((*bias)[0][0] + (*bias)[1][1] + (*bias)[2][2] - 1) / 2, -1.0, 1.0));
+  stream_.emit(events::PriorsTurned{iteration_, degrees * angle});
+}
+
+void Trainer::set_prior_bias(const Mat3<double>& bias) {
+  prior_bias_ = bias;
+  for (View& view : capture_.train) view.prior_turn = without_bias(view.camera, bias);
 }
 
 void Trainer::let_bend(const std::vector<double>& misfits) {
@@ -273,7 +317,7 @@ void Trainer::let_bend(const std::vector<double>& misfits) {
   }
   std::vector<Tracker::Adjusted> adjusted;
   if (!textured.empty()) {
-    adjusted = Tracker(track, options_.render, capture_).adjust(main, textured, motion, nodes, scene_.extent);
+    adjusted = make_tracker().adjust(main, textured, motion, nodes, scene_.extent);
   }
   std::vector<bool> bends(static_cast<size_t>(motion.bodies()), silhouettes > bend.misfit);
   for (const Tracker::Adjusted& body : adjusted) {

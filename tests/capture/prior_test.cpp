@@ -55,6 +55,29 @@ TEST(Priors, png_values_turn_to_unit_world_normals) {
   EXPECT_TRUE(load_images(capture, capture.train[0])->normal_prior.empty());
 }
 
+TEST(Priors, turn_with_the_view_in_the_mask_alone) {
+  NerfDsCapture fake;
+  Tensor<uint8_t> mask({8, 12});
+  for (int64_t i = 30; i < 60; ++i) mask[i] = 255;
+  Tensor<float> array({4, 8, 12, 3});
+  for (int64_t i = 0; i < array.size(); i += 3) store3(&array[i], direction(i));
+  fake.write_image("mask/1x/000000_left.png.png", mask);
+  write_npy(fake.path() / "normal.npy", array);
+  fake.save();
+  Capture capture = load_capture(fake.path(), {});
+  View& view = capture.train[0];
+  const auto before = load_images(capture, view);
+  view.prior_turn = Mat3<float>(0, 1, 0, 0, 0, 1, 1, 0, 0);  // (x, y, z) → (z, x, y)
+  const auto turned = load_images(capture, view);
+  for (int64_t i = 0; i < mask.size(); ++i) {
+    const Vec3<float> n = load3<float>(&before->normal_prior[3 * i]);
+    const Vec3<float> expected = mask[i] != 0 ? Vec3<float>(n.z, n.x, n.y) : n;
+    EXPECT_EQ(load3<float>(&turned->normal_prior[3 * i]), expected) << i;
+  }
+  capture.train[1].prior_turn = view.prior_turn;  // and has no mask
+  EXPECT_FALSE(load_images(capture, capture.train[1])->normal_prior.empty());
+}
+
 // Frame t of an array of priors, of odd lengths and with holes.
 void fill_frame(Tensor<float>& array, int64_t t) {
   for (int64_t i = 0; i < 96; ++i) {

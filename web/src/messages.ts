@@ -276,6 +276,7 @@ export type TrainingEvent =
       silhouettes: number; // misfit over that of the first view
       photographs?: number; // what differs of them with nodes, over without; of textured bodies
     }
+  | { event: 'priors_turned'; iteration: number; degrees: number }
   | { event: 'phase_entered'; iteration: number; phase: string }
   | { event: 'evaluated'; iteration: number; split: string; views: number; psnr: number; ssim: number; seconds: number }
   | { event: 'warning'; iteration: number; text: string }

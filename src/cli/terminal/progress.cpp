@@ -142,6 +142,7 @@ void Progress::show(const events::Step& e) {
 void Progress::show(const events::DensityChanged&) {}
 void Progress::show(const events::FollowingDecided&) {}
 void Progress::show(const events::BendingDecided&) {}
+void Progress::show(const events::PriorsTurned&) {}
 
 void Progress::show(const events::PhaseEntered& e) {
   print_line(fmt::format("phase {} from iteration {}", e.phase, e.iteration));

@@ -29,6 +29,7 @@ class Progress {
   void show(const events::DensityChanged& e);
   void show(const events::FollowingDecided& e);
   void show(const events::BendingDecided& e);
+  void show(const events::PriorsTurned& e);
   void show(const events::PhaseEntered& e);
   void show(const events::Evaluated& e);
   void show(const events::Warning& e);
