@@ -23,8 +23,7 @@ struct View {
   std::string id;
   float time = 0;  // in [0, 1]
   Camera<float> camera;
-  // Takes normal priors in the mask, in world axes, back by what they are off by together; none where nobody
-  // knows.
+  // Rotates normal priors in the mask (world axes), to undo their bias; none while the bias is not known.
   std::optional<Mat3<float>> prior_turn = {};
 };
 

@@ -90,7 +90,7 @@ struct BendingDecided {
   std::optional<double> photographs;  // what differs of them with nodes, over without; of textured bodies
 };
 
-// Normal priors in masks have been turned back by what they are off by together (train/prior_bias.h).
+// The bias of normal priors in masks has been measured, and is undone from now on (train/prior_bias.h).
 struct PriorsTurned {
   int64_t iteration = 0;
   double degrees = 0;

@@ -83,7 +83,7 @@ struct RateOptions {
     v.field("field_end", field_end, "", "Residual fields, last iteration (log-linear between).");
     v.field("motion", motion, "radians", "Poses of bodies, first iteration; shifts in extents.");
     v.field("motion_end", motion_end, "radians",
-            "Poses of bodies, last iteration, or the 8,000th, and on at that pace (log-linear between).");
+            "Poses of bodies, last iteration, of longer runs the 8,000th (log-linear, and on beyond it).");
     v.field("lighting", lighting, "", "Logarithms of brightness (deform.lighting).");
     v.field("map", map, "", "Environment map, first iteration.");
     v.field("map_end", map_end, "", "Environment map, last iteration (log-linear between).");
@@ -203,9 +203,10 @@ struct TrackOptions {
     v.field("steps", steps, "", "Gauss-Newton steps for the poses of a new time.");
     v.field("again", again, "times", "Recent times whose poses are solved again before each new one.");
     v.field("window", window, "times", "How far back these lie at most.");
-    v.field("rounds", rounds, "",
-            "Equal parts of the run, of 2,000 iterations at most, at whose ends all poses are solved again, "
-            "depths held; 0: never.");
+    v.field(
+        "rounds", rounds, "",
+        "All poses are solved again, depths held, at the end of each of so many equal parts of the run, at "
+        "least every 2,000 iterations; 0: never.");
     v.field("adjust", adjust, "",
             "Photometric bundle adjustment of bodies that may bend and whose texture is seen to move with "
             "them: steps on photographs of each size; 0: none.");

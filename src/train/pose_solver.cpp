@@ -55,7 +55,7 @@ void turn_by_surroundings(const raster::Output& picture, TrackTarget& target) {
   }
   const std::optional<Mat3<double>> bias = surroundings.rotation();
   if (!bias) return;
-  const Mat3<float> turn = without_bias(target.camera, *bias);
+  const Mat3<float> turn = inverse_of_bias(target.camera, *bias);
   for (int64_t i = 0; i < target.normal_prior.size(); i += 3)
     store3(&target.normal_prior[i], turn * load3<float>(&target.normal_prior[i]));
 }

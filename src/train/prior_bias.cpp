@@ -35,7 +35,7 @@ void PriorBias::add(const Camera<float>& camera, const Vec3<double>& normal, con
 }
 
 std::optional<Mat3<double>> PriorBias::rotation() const {
-  constexpr double pull = 0.05;  // towards none
+  constexpr double pull = 0.05;  // towards the round before
   constexpr int rounds = 6;
   constexpr int64_t least_pairs = 50;
   constexpr double degree = 0.017453292519943295;
@@ -55,7 +55,7 @@ std::optional<Mat3<double>> PriorBias::rotation() const {
   return bias;
 }
 
-Mat3<float> without_bias(const Camera<float>& camera, const Mat3<double>& bias) {
+Mat3<float> inverse_of_bias(const Camera<float>& camera, const Mat3<double>& bias) {
   const Mat3<double> to_camera(camera.camera_from_world);
   return Mat3<float>(transpose(to_camera) * transpose(bias) * to_camera);
 }

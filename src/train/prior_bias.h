@@ -8,16 +8,16 @@
 
 namespace traceflow {
 
-// By which one rotation, in the camera's axes, normal priors are off together: an estimator turns all normals
-// of a surface alike.
+// The bias of normal priors: one rotation in the camera's axes, since an estimator turns all normals of a
+// surface alike.
 class PriorBias {
  public:
-  // A pixel's normal as the model has it, and its prior, both in world axes. What is shorter than a half is
-  // none.
+  // The model's normal of a pixel and its prior, both in world axes. A pixel counts where both are at least
+  // half a unit long.
   void add(const Camera<float>& camera, const Vec3<double>& normal, const Vec3<double>& prior);
 
-  // The least-squares rotation from normals to priors over the pairs that it leaves within 15 degrees, in
-  // rounds. None from fewer than 50 such pairs.
+  // The least-squares rotation from normals to priors (Kabsch), found in rounds: each over the pairs that the
+  // round before left within 15 degrees. None from fewer than 50 such pairs.
   std::optional<Mat3<double>> rotation() const;
 
  private:
@@ -27,7 +27,7 @@ class PriorBias {
   std::vector<Pair> pairs_;
 };
 
-// What takes priors, in world axes, back by a bias.
-Mat3<float> without_bias(const Camera<float>& camera, const Mat3<double>& bias);
+// The rotation, in world axes, that undoes a bias.
+Mat3<float> inverse_of_bias(const Camera<float>& camera, const Mat3<double>& bias);
 
 }  // namespace traceflow

@@ -30,8 +30,8 @@ class Schedule {
   // at once.
   double latest_time(int iteration, double first, double last) const;
 
-  // Whether all poses are solved again before this iteration, where bodies had been followed to the film's
-  // end after `followed`. Poses that train drift away, the farther the longer nobody solves them.
+  // Whether all poses are solved again before this iteration. followed: the iteration at which bodies had
+  // been followed to the film's end. Poses that train drift away, the farther the longer they are not solved.
   bool solves_poses_again(int iteration, int64_t followed) const;
 
   // What is done to a set after so many iterations. The environment is left alone until it has trained.
@@ -50,8 +50,8 @@ class Schedule {
   // Learning rates that fall along the run.
   double position_rate(int iteration) const;
   double field_rate(int iteration) const;
-  // Of poses: falls to its end within 8,000 iterations, and on at that pace. Poses that learn as fast for
-  // longer drift away with the surfels that they carry.
+  // Of poses: log-linear over the run or 8,000 iterations, whichever is shorter, and on beyond. Poses that
+  // keep a high rate for longer drift away with the surfels that they carry.
   double motion_rate(int iteration) const;
   double map_rate(int iteration) const;
 

@@ -106,7 +106,7 @@ class Trainer {
   // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
   // get better.
   void follow_again();
-  // Measures by what the normal priors in masks are off together, and turns them back.
+  // Measures the bias of normal priors in masks, and undoes it from then on.
   void turn_priors();
   void set_prior_bias(const Mat3<double>& bias);
   // Before the second time is followed: whether the masks of all times fit bodies that stand still.
@@ -227,7 +227,7 @@ class Trainer {
   Draws before_step_;
   Review review_;
   TextureTrust texture_trust_;              // while bodies are followed
-  std::optional<Mat3<double>> prior_bias_;  // that the views' priors are turned back by
+  std::optional<Mat3<double>> prior_bias_;  // of normal priors in masks, where it is undone
   // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
   bool torn_ = false;
   std::atomic<bool> stop_soon_{false};

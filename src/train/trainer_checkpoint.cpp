@@ -53,7 +53,8 @@ Mat3<double> rotation_in(const Tensor<double>& rows) {
     is_rotation = is_rotation && determinant(matrix) > 0;
   }
   if (!is_rotation)
-    throw InputError("checkpoint", "prior_bias", rows.shape().to_string() + " numbers", "a rotation");
+    throw InputError("checkpoint", "prior_bias", rows.shape().to_string() + " that rotates nothing",
+                     "a rotation, 3x3");
   return matrix;
 }
 

@@ -268,7 +268,7 @@ std::vector<double> Trainer::silhouette_misfits() {
 }
 
 void Trainer::turn_priors() {
-  // Once: what priors pull surfaces to comes back in the depth, and would be measured with them.
+  // Once: the depth follows the priors, so that a second measurement would find what the first one changed.
   if (!options_.deform.track.prior_turn || prior_bias_) return;
   constexpr float opaque = 0.95F;
   PriorBias in_masks;
@@ -299,7 +299,7 @@ void Trainer::turn_priors() {
 
 void Trainer::set_prior_bias(const Mat3<double>& bias) {
   prior_bias_ = bias;
-  for (View& view : capture_.train) view.prior_turn = without_bias(view.camera, bias);
+  for (View& view : capture_.train) view.prior_turn = inverse_of_bias(view.camera, bias);
 }
 
 void Trainer::let_bend(const std::vector<double>& misfits) {

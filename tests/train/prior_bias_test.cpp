@@ -1,5 +1,6 @@
 #include "train/prior_bias.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -7,8 +8,10 @@
 #include <cmath>
 
 #include "base/random.h"
+#include "files/safetensors.h"
 #include "math/rotation.h"
 #include "math/rotation_group.h"
+#include "support/refusal.h"
 #include "train/ball_body.h"
 #include "train/small_run.h"
 #include "train/tracker.h"
@@ -45,7 +48,7 @@ TEST(PriorBias, IsTheRotationOfMostPairs) {
   const std::optional<Mat3<double>> found = measured.rotation();
   ASSERT_TRUE(found);
   for (int c = 0; c < 3; ++c) EXPECT_LT(length((*found)[c] - bias[c]), 0.02);
-  const Mat3<double> back(without_bias(camera, bias));
+  const Mat3<double> back(inverse_of_bias(camera, bias));
   for (int i = 0; i < 20; ++i) {
     const Vec3<double> n = random_direction(random);
     EXPECT_LT(length(back * (transpose(to_camera) * bias * to_camera * n) - n), 1e-5);
@@ -121,7 +124,7 @@ TEST(PriorBias, OfMasksIsTurnedBackInTraining) {
   made.prior_noise = 0;
   write_synthetic_capture(made, folder);
   Capture capture = load_capture(folder, {});
-  for (View& view : capture.train) view.prior_turn = without_bias(view.camera, transpose(bias));
+  for (View& view : capture.train) view.prior_turn = inverse_of_bias(view.camera, transpose(bias));
   TrainOptions options = preset("cpu");
   options.iterations = 200;
   options.specular = Specular::none;
@@ -132,7 +135,7 @@ TEST(PriorBias, OfMasksIsTurnedBackInTraining) {
   const auto expect_turned = [&](const Trainer& trainer) {
     for (const View& view : trainer.capture().train) {
       ASSERT_TRUE(view.prior_turn);
-      const Mat3<float> expected = without_bias(view.camera, bias);
+      const Mat3<float> expected = inverse_of_bias(view.camera, bias);
       for (int c = 0; c < 3; ++c) EXPECT_LT(length((*view.prior_turn)[c] - expected[c]), 0.06);
     }
   };
@@ -157,6 +160,15 @@ TEST(PriorBias, OfMasksIsTurnedBackInTraining) {
     Trainer resumed(options, load_capture(folder, {}), folder / "run");
     resumed.resume();
     expect_turned(resumed);
+
+    const fs::path checkpoint = RunFolder{folder / "run"}.checkpoint();
+    for (const Tensor<double>& wrong : {Tensor<double>({3, 3}), Tensor<double>({9})}) {
+      Safetensors file = Safetensors::read(checkpoint);
+      file.add("prior_bias", wrong);
+      file.write(checkpoint);
+      EXPECT_THAT(refusal_of([&] { Trainer(options, load_capture(folder, {}), folder / "run").resume(); }),
+                  ::testing::HasSubstr("prior_bias"));
+    }
   }
 }
 
