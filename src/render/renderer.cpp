@@ -147,14 +147,15 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   pose_main(scene, request, keep_for_backward);
 
   // Draw them.
+  const bool draws_silhouette = request.silhouette && !scene.main.body.empty();
+  frame_.main.carried.place(device).resize({draws_silhouette ? frame_.main.count() : 0});
+  parallel_for(device, "render: carried surfels", frame_.main.carried.size(),
+               IsCarried{stored_row(frame_), scene.main.body.data(), frame_.main.carried.data()});
   raster::forward(frame_.main, request.camera, frame_.drawn_with, frame_.raster, raster_saved_.get());
   if (request.pseudo_normals) {
     surface::pseudo_normals(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                             frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
   }
-
-  frame_.silhouette.place(device).resize({0});
-  if (request.silhouette && !scene.main.body.empty()) draw_silhouette(scene, request);
 
   // Mirror the view at what was drawn.
   frame_.traced.pixel.place(device).resize({0});
@@ -169,40 +170,6 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   shade::forward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.specular_rays,
                  frame_.colour);
   return frame_;
-}
-
-void Renderer::draw_silhouette(const Scene& scene, const FrameRequest& request) {
-  const Device device = scene.device();
-  const int64_t count = frame_.main.count();
-  carried_.position = frame_.main.position;
-  carried_.scale = frame_.main.scale;
-  carried_.rotation = frame_.main.rotation;
-  carried_.opacity = frame_.main.opacity;
-  carried_.sh.place(device).reset({count, 1, 3});
-  carried_.tint.place(device).resize({count});
-  parallel_for(device, "render: carried surfels", count,
-               IsCarried{stored_row(frame_), scene.main.body.data(), carried_.tint.data()});
-  raster::forward(carried_, request.camera, frame_.drawn_with, carried_output_, carried_saved_.get());
-  frame_.silhouette.swap(carried_output_.tint);
-}
-
-void Renderer::backward_silhouette(const Scene& scene, const FrameRequest& request,
-                                   const FrameGradient& grad_frame) {
-  if (grad_frame.silhouette.empty() || frame_.main.count() == 0) return;
-  grad_carried_.tint = grad_frame.silhouette;
-  grad_carried_input_.wants_camera = false;
-  raster::backward(carried_, request.camera, frame_.drawn_with, *carried_saved_, grad_carried_,
-                   grad_carried_input_);
-  const PosedSurfels& from = grad_carried_input_.surfels;
-  PosedSurfels& to = grad_raster_input_.surfels;
-  const auto add = [&](const Tensor<float>& more, Tensor<float>& sum) {
-    parallel_for(scene.device(), "render: add gradients of silhouettes", more.size(),
-                 AddNumbers{more.data(), sum.data()});
-  };
-  add(from.position, to.position);
-  add(from.scale, to.scale);
-  add(from.rotation, to.rotation);
-  add(from.opacity, to.opacity);
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
@@ -236,6 +203,7 @@ void Renderer::begin_raster_gradient(const FrameGradient& grad_frame, bool faces
   grad_raster_.median_depth.place(device).reset(depths);
   grad_raster_.normal.place(device).reset(mirrors ? frame_.raster.normal.shape() : none);
   grad_raster_.alpha = grad_frame.alpha;
+  grad_raster_.silhouette = grad_frame.silhouette;
   grad_raster_.distortion = grad_frame.distortion;
   if (!grad_frame.normal.empty()) grad_raster_.normal = grad_frame.normal;
   if (!grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
@@ -260,8 +228,8 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   // With the geometry frozen only the tint's gradient is wanted (method §7.2).
   if (!trainable.main) {
     for (Tensor<float>* unused :
-         {&grad_raster_.colour, &grad_raster_.normal, &grad_raster_.depth, &grad_raster_.median_depth,
-          &grad_raster_.alpha, &grad_raster_.distortion}) {
+         {&grad_raster_.colour, &grad_raster_.silhouette, &grad_raster_.normal, &grad_raster_.depth,
+          &grad_raster_.median_depth, &grad_raster_.alpha, &grad_raster_.distortion}) {
       unused->resize({0});
     }
   }
@@ -277,7 +245,6 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   grad_raster_input_.wants_camera = trainable.camera;
   raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
                    grad_raster_, grad_raster_input_);
-  if (trainable.main) backward_silhouette(scene, request, grad_frame);
   parallel_for(scene.device(), "render: add gradients of positions", grad_frame.main_position.size(),
                AddNumbers{grad_frame.main_position.data(), grad_raster_input_.surfels.position.data()});
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;

@@ -52,8 +52,6 @@ class Renderer {
   void begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors);
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                          SceneGradient& gradient);
-  void draw_silhouette(const Scene& scene, const FrameRequest& request);
-  void backward_silhouette(const Scene& scene, const FrameRequest& request, const FrameGradient& grad_frame);
   bool reflects(const Scene& scene, const FrameRequest& request) const;
 
   RenderOptions options_;
@@ -64,12 +62,6 @@ class Renderer {
   nodes::SavedPtr nodes_saved_ = nodes::make_saved();
   lighting::SavedPtr lighting_saved_ = lighting::make_saved();
   raster::SavedPtr raster_saved_ = raster::make_saved();
-  // The carried surfels white, the others black.
-  PosedSurfels carried_;
-  raster::SavedPtr carried_saved_ = raster::make_saved();
-  raster::Output carried_output_;
-  raster::OutputGradient grad_carried_;
-  raster::InputGradient grad_carried_input_;
   trace::BvhPtr bvh_ = trace::make_bvh();
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;

@@ -75,6 +75,8 @@ struct BasicPosedSurfels {
   Tensor<T> opacity;   // M, in (0, 1)
   Tensor<T> sh;        // M×K×3, only the degrees in use: K = (active degree + 1)²
   Tensor<T> tint;      // M, in (0, 1); empty for the environment
+  Tensor<T> carried;   // M, 1 where a body carries the surfel, else 0; empty where nobody asks. A constant:
+                       // never differentiated by
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint.empty(); }
@@ -82,11 +84,11 @@ struct BasicPosedSurfels {
   Device device() const { return position.device(); }
   // The same set on a device.
   BasicPosedSurfels on(Device device) const {
-    return {position.on(device), scale.on(device), rotation.on(device),
-            opacity.on(device),  sh.on(device),    tint.on(device)};
+    return {position.on(device), scale.on(device), rotation.on(device), opacity.on(device),
+            sh.on(device),       tint.on(device),  carried.on(device)};
   }
 
-  // Zeros in the shapes of another set and on its device: how a gradient starts.
+  // Zeros in the shapes of another set and on its device: how a gradient starts. Without `carried`.
   template <class U>
   void reset_like(const BasicPosedSurfels<U>& other) {
     const Device device = other.device();
@@ -120,8 +122,8 @@ BasicSurfels<To> convert(const BasicSurfels<From>& s) {
 }
 template <class To, class From>
 BasicPosedSurfels<To> convert(const BasicPosedSurfels<From>& s) {
-  return {convert<To>(s.position), convert<To>(s.scale), convert<To>(s.rotation),
-          convert<To>(s.opacity),  convert<To>(s.sh),    convert<To>(s.tint)};
+  return {convert<To>(s.position), convert<To>(s.scale), convert<To>(s.rotation), convert<To>(s.opacity),
+          convert<To>(s.sh),       convert<To>(s.tint),  convert<To>(s.carried)};
 }
 
 }  // namespace traceflow

@@ -75,9 +75,9 @@ void evaluate_objective(const Frame& frame, const ViewImages& target, const Loss
     loss::distortion(frame.raster.distortion, options.distortion, gradient.distortion,
                      slot(LossMeans::distortion, options.distortion));
   }
-  gradient.silhouette.place(device).reset(frame.silhouette.shape());
-  if (!frame.silhouette.empty()) {
-    loss::silhouette(frame.silhouette, target.coverage, options.silhouette, gradient.silhouette,
+  gradient.silhouette.place(device).reset(frame.raster.silhouette.shape());
+  if (!frame.raster.silhouette.empty()) {
+    loss::silhouette(frame.raster.silhouette, target.coverage, options.silhouette, gradient.silhouette,
                      slot(LossMeans::silhouette, options.silhouette));
   }
   if (perceptual != nullptr) {

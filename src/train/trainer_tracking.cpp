@@ -233,7 +233,8 @@ std::optional<double> Trainer::silhouette_misfit(const View& view) {
   request.time = view.time;
   request.deform_main = request.specular = false;
   request.silhouette = true;
-  const Tensor<float> silhouette = renderer_.forward(scene_, request, false).silhouette.on(Device::cpu);
+  const Tensor<float> silhouette =
+      renderer_.forward(scene_, request, false).raster.silhouette.on(Device::cpu);
   double off = 0, area = 0;
   for (int64_t i = 0; i < images->coverage.size(); ++i) {
     off += std::abs(silhouette[i] - images->coverage[i]);

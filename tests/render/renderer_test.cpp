@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/parallel.h"
@@ -15,6 +16,12 @@ namespace {
 void expect_equal(const Tensor<float>& a, const Tensor<float>& b, const char* name) {
   ASSERT_EQ(a.size(), b.size()) << name;
   for (int64_t i = 0; i < a.size(); ++i) ASSERT_EQ(a[i], b[i]) << name << " " << i;
+}
+
+void expect_near(const Tensor<float>& a, const Tensor<float>& b, float tolerance, const char* name) {
+  ASSERT_EQ(a.size(), b.size()) << name;
+  for (int64_t i = 0; i < a.size(); ++i)
+    ASSERT_NEAR(a[i], b[i], tolerance * (1 + std::abs(b[i]))) << name << " " << i;
 }
 
 TEST(Renderer, CullingChangesNoPixel) {
@@ -249,6 +256,53 @@ TEST(Renderer, LightThatChangesIsSeenAndLearned) {
   renderer.forward(f.scene, f.request, true);
   renderer.backward(f.scene, f.request, frozen, by_frame, gradient);
   for (const float by : gradient.lighting.brightness.values()) EXPECT_EQ(by, 0);
+}
+
+// The silhouette is what the tint shows where bodies' surfels are white and the others black.
+TEST(Renderer, TheSilhouetteIsWhatBodiesCover) {
+  Fixture f;
+  f.scene.main.body.reset({f.scene.main.count()});
+  for (int64_t i = 0; i < f.scene.main.count(); ++i) {
+    f.scene.main.body[i] = static_cast<int32_t>(i % 3) - 1;
+    f.scene.main.tint_logit[i] = f.scene.main.body[i] >= 0 ? 100.0F : -100.0F;
+  }
+  f.scene.main_field.reset();
+  Renderer renderer(RenderOptions{});
+  EXPECT_TRUE(renderer.forward(f.scene, f.request).raster.silhouette.empty()) << "nobody asked";
+  f.request.silhouette = f.request.cull = true;
+  const Frame& frame = renderer.forward(f.scene, f.request);
+  ASSERT_LT(frame.main.count(), f.scene.main.count()) << "the view leaves something out";
+  const Tensor<float> silhouette = frame.raster.silhouette;
+  expect_near(silhouette, frame.raster.tint, 1e-6F, "silhouette");
+  EXPECT_GT(*std::ranges::max_element(silhouette.values()), 0.5F);
+  f.request.silhouette = false;
+  EXPECT_TRUE(renderer.forward(f.scene, f.request).raster.silhouette.empty());
+}
+
+// Where everything is carried, the silhouette is the picture's alpha, and so are their gradients.
+TEST(Renderer, TheGradientOfASilhouetteOfAllIsThatOfAlpha) {
+  Fixture f;
+  f.request.silhouette = true;
+  f.scene.main.body.reset({f.scene.main.count()});
+  Renderer renderer(RenderOptions{});
+  const auto gradient_of = [&](Tensor<float> FrameGradient::*layer) {
+    const Frame& frame = renderer.forward(f.scene, f.request, true);
+    FrameGradient grad_frame;
+    grad_frame.colour.reset(frame.colour.shape());
+    Random random(4);
+    (grad_frame.*layer).reset(frame.raster.alpha.shape());
+    for (float& v : (grad_frame.*layer).values()) v = static_cast<float>(random.normal());
+    SceneGradient gradient;
+    gradient.reset(f.scene);
+    renderer.backward(f.scene, f.request, Trainable{}, grad_frame, gradient);
+    return gradient;
+  };
+  const SceneGradient found = gradient_of(&FrameGradient::silhouette);
+  const SceneGradient expected = gradient_of(&FrameGradient::alpha);
+  EXPECT_GT(*std::ranges::max_element(expected.main.position.values()), 0.1F);
+  expect_near(found.main.position, expected.main.position, 1e-4F, "position");
+  expect_near(found.main.log_scale, expected.main.log_scale, 1e-4F, "scale");
+  expect_near(found.main.opacity_logit, expected.main.opacity_logit, 1e-4F, "opacity");
 }
 
 TEST(Renderer, DensityControlIsToldNormsOfWhatWasDrawn) {

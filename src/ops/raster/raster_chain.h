@@ -91,7 +91,7 @@ struct Chain {
     SurfelFormsGradient<double> g = surfel_forms_backward(frame, camera, forms, forms_gradient(i, sums));
 
     Vec3<double> grad_centre(0, 0, sums.z_centre);
-    if (splats[i].rho_screen_1 == 0) {
+    if (splats[i].has_low_pass()) {
       grad_centre += project_backward(camera, centre, Vec2<double>(2 * sums.centre_x, 2 * sums.centre_y));
     }
     g.from_camera += grad_centre * camera.camera_from_world;

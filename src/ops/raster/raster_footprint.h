@@ -41,7 +41,7 @@ TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y) {
   f.nv = std::fma(s.v_x, f.x, std::fma(s.v_y, f.y, s.v_1));
   f.dx = f.x - s.centre_x;
   f.dy = f.y - s.centre_y;
-  const float rho_screen = std::fma(2.0F, std::fma(f.dx, f.dx, f.dy * f.dy), s.rho_screen_1);
+  const float rho_screen = 2.0F * std::fma(f.dx, f.dx, f.dy * f.dy);
   const float rho_plane = std::fma(f.nu, f.nu, f.nv * f.nv) * (f.inverse_w * f.inverse_w);
   f.on_plane = f.w > 0.0F && f.w <= s.w_max && rho_plane <= lower(rho_screen, s.rho_max);
   const float rho = f.on_plane ? rho_plane : rho_screen;
@@ -76,7 +76,7 @@ TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float
   if (inside(clamp(on_side_y, low_x, high_x), side_y)) return true;
   const float dx = clamp(s.centre_x, low_x, high_x) - s.centre_x;
   const float dy = clamp(s.centre_y, low_y, high_y) - s.centre_y;
-  return std::fma(2.0F, std::fma(dx, dx, dy * dy), s.rho_screen_1) <= rho;
+  return 2.0F * std::fma(dx, dx, dy * dy) <= rho;
 }
 
 }  // namespace traceflow::raster

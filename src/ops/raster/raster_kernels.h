@@ -23,13 +23,13 @@ inline constexpr int pixels_per_tile = tile_edge * tile_edge;
 // that single precision suffices; the forms are those of math/surfel_projection.h.
 struct alignas(16) Splat {
   float anchor_x, anchor_y;  // pixels
-  float centre_x, centre_y;  // the projected centre
-  float u_x, u_y, u_1;       // u·w = u_x x + u_y y + u_1
+  float centre_x,
+      centre_y;         // the projected centre; far_away where there is no low-pass, which then never wins
+  float u_x, u_y, u_1;  // u·w = u_x x + u_y y + u_1
   float v_x, v_y, v_1;
   float w_x, w_y, w_1;
-  float w_max;         // hits in front of the near plane have 0 < w ≤ w_max
-  float rho_screen_1;  // 0, or so much that the low-pass never wins
-  float rho_max;       // ρ where α reaches alpha_min
+  float w_max;    // hits in front of the near plane have 0 < w ≤ w_max
+  float rho_max;  // ρ where α reaches alpha_min
   float log2_opacity;
   float z_plane, inverse_z_plane;    // of a hit in the plane: z = z_plane / w
   float z_centre, inverse_z_centre;  // of a hit by the low-pass
@@ -40,6 +40,10 @@ struct alignas(16) Splat {
   // points of its quadratic form along vertical lines: y - ellipse_y = slope_y (x - ellipse_x).
   float ellipse_x, ellipse_y;
   float slope_x, slope_y;
+  float carried;  // what it adds to the silhouette
+
+  static constexpr float far_away = 1e15F;
+  TRACEFLOW_HD bool has_low_pass() const { return centre_x < far_away; }
 };
 static_assert(sizeof(Splat) == 128);
 
@@ -92,6 +96,7 @@ struct Saved {
   int width = 0, height = 0;
   int tile_columns = 0, tile_rows = 0;
   int64_t count = 0;
+  bool has_silhouette = false;
 
   Tensor<Splat> splats;          // by surfel; unspecified where the bounds are empty
   Tensor<Bounds> bounds;         // by surfel

@@ -198,9 +198,8 @@ class Prepare {
     const Vec2<double> anchor =
         anchor_near(p.in_front ? p.pixel : Vec2<double>(camera_.width / 2.0, camera_.height / 2.0));
     store_forms(surfel_forms(frame, camera_), anchor, splat);
-    splat.centre_x = static_cast<float>(p.has_low_pass ? p.pixel.x - anchor.x : 0);
-    splat.centre_y = static_cast<float>(p.has_low_pass ? p.pixel.y - anchor.y : 0);
-    splat.rho_screen_1 = p.has_low_pass ? 0 : 1e30F;
+    splat.centre_x = p.has_low_pass ? static_cast<float>(p.pixel.x - anchor.x) : Splat::far_away;
+    splat.centre_y = p.has_low_pass ? static_cast<float>(p.pixel.y - anchor.y) : Splat::far_away;
     splat.rho_max = static_cast<float>(p.rho_max);
     splat.log2_opacity = static_cast<float>(p.log_opacity / std::numbers::ln2);
     splat.z_centre = static_cast<float>(p.centre.z);
@@ -245,6 +244,7 @@ class Prepare {
     store3(splat.colour, finite ? colour : Vec3<float>(std::numeric_limits<float>::quiet_NaN()));
     store3(splat.normal, normal * (dot(normal, from_camera) > 0 ? -1.0 : 1.0));
     splat.tint = surfels_.tint != nullptr ? surfels_.tint[i] : 0;
+    splat.carried = surfels_.carried != nullptr ? surfels_.carried[i] : 0;
   }
 
   TRACEFLOW_HD static void store_ellipse(const Vec2<double>& centre, Splat& s) {

@@ -31,7 +31,7 @@ struct Prepared {
   Vector2 pixel;      // the projected centre, where has_low_pass
   Vector3 direction;  // unit, from the camera to the centre
   Vector3 colour;
-  double opacity, tint;
+  double opacity, tint, carried;
 };
 
 // A surfel met by a pixel's ray.
@@ -125,6 +125,7 @@ class Scene {
     p.colour = sh_colour<double>(sh_degree(), s.sh.row(i), p.direction);
     p.opacity = s.opacity[i];
     p.tint = s.has_tint() ? s.tint[i] : 0;
+    p.carried = s.carried.empty() ? 0 : s.carried[i];
     return p;
   }
 
@@ -176,13 +177,14 @@ class Scene {
   std::vector<Prepared> prepared_;
 };
 
-void resize(BasicOutput<double>& output, const Camera<double>& camera) {
+void resize(const Surfels& surfels, const Camera<double>& camera, BasicOutput<double>& output) {
   const Shape plane{camera.height, camera.width};
   const Shape vectors{camera.height, camera.width, 3};
   for (auto* tensor :
        {&output.alpha, &output.tint, &output.depth, &output.median_depth, &output.distortion}) {
     tensor->reset(plane);
   }
+  output.silhouette.reset(surfels.carried.empty() ? Shape{0} : plane);
   output.colour.reset(vectors);
   output.normal.reset(vectors);
 }
@@ -196,6 +198,7 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
     colour += b.weight * p.colour;
     normal += b.weight * p.normal;
     output.tint[index] += b.weight * p.tint;
+    if (!output.silhouette.empty()) output.silhouette[index] += b.weight * p.carried;
     for (const Blended& nearer :
          std::span(pixel.blended.data(), static_cast<size_t>(&b - pixel.blended.data()))) {
       output.distortion[index] += b.weight * nearer.weight * (b.m - nearer.m) * (b.m - nearer.m);
@@ -211,13 +214,14 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
 // dL/doutput at one pixel; an absent tensor means zero.
 struct PixelGradient {
   Vector3 colour{0.0}, normal{0.0};
-  double alpha = 0, tint = 0, depth = 0, median_depth = 0, distortion = 0;
+  double alpha = 0, tint = 0, silhouette = 0, depth = 0, median_depth = 0, distortion = 0;
 
   PixelGradient(const BasicOutputGradient<double>& g, int64_t index) {
     if (!g.colour.empty()) colour = load3<double>(&g.colour[3 * index]);
     if (!g.normal.empty()) normal = load3<double>(&g.normal[3 * index]);
     if (!g.alpha.empty()) alpha = g.alpha[index];
     if (!g.tint.empty()) tint = g.tint[index];
+    if (!g.silhouette.empty()) silhouette = g.silhouette[index];
     if (!g.depth.empty()) depth = g.depth[index];
     if (!g.median_depth.empty()) median_depth = g.median_depth[index];
     if (!g.distortion.empty()) distortion = g.distortion[index];
@@ -270,7 +274,7 @@ class Backward {
     const double from_depth = g.depth * (b.hit.z - pixel.depth()) / pixel.alpha();
     const double from_distortion = b.m * b.m * pixel.alpha() + pixel.m2_sum - 2 * b.m * pixel.m_sum;
     return dot(g.colour, p.colour - Vector3(options_.background)) + dot(g.normal, p.normal) +
-           g.tint * p.tint + g.alpha + from_depth + g.distortion * from_distortion;
+           g.tint * p.tint + g.silhouette * p.carried + g.alpha + from_depth + g.distortion * from_distortion;
   }
 
   double depth_gradient(const Pixel& pixel, const Blended& b, const PixelGradient& g) const {
@@ -354,7 +358,7 @@ void for_each_pixel(const Camera<double>& camera, F&& f) {
 void forward_reference(const BasicPosedSurfels<double>& surfels, const Camera<double>& camera,
                        const Options& options, BasicOutput<double>& output) {
   options.validate();
-  resize(output, camera);
+  resize(surfels, camera, output);
   const Scene scene(surfels, camera, options);
   for_each_pixel(camera, [&](const Vector2& position, int64_t index) {
     write_pixel(scene, scene.blend(position), options, index, output);

@@ -23,8 +23,13 @@ template <class T>
 BasicPosedSurfels<T> random_gradient_like(const BasicPosedSurfels<T>& posed, uint64_t seed = 23) {
   Random random(seed);
   const auto fill = [&](const Tensor<T>& like) { return random_tensor<T>(like.shape(), random, -1, 1); };
-  return {fill(posed.position), fill(posed.scale), fill(posed.rotation),
-          fill(posed.opacity),  fill(posed.sh),    fill(posed.tint)};
+  return {fill(posed.position),
+          fill(posed.scale),
+          fill(posed.rotation),
+          fill(posed.opacity),
+          fill(posed.sh),
+          fill(posed.tint),
+          {}};
 }
 
 // f(name, tensor) for every group of posed surfels.

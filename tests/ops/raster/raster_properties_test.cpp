@@ -126,6 +126,8 @@ TEST_P(Orders, do_not_depend_on_the_order_of_the_surfels) {
   shuffle(scene.surfels, [&](size_t group, const float* row, int64_t i, int64_t size) {
     std::copy_n(row, size, to[group]->row(i));
   });
+  for (int64_t i = 0; i < n; ++i)
+    shuffled.surfels.carried[i] = scene.surfels.carried[order[static_cast<size_t>(i)]];
   Result a;
   Result b;
   run(scene, options(), a);
@@ -248,14 +250,14 @@ TEST_P(Orders, survive_hostile_surfels_which_leave_the_others_alone) {
   std::vector<float> poison{nan, infinity, -infinity};
   TestScene<float> hostile = clean;
   int64_t extra = 0;
-  for_each_group(hostile.surfels, [&](const char*, Tensor<float>& t) { extra += t.row_size(); });
+  for_each_input(hostile.surfels, [&](const char*, Tensor<float>& t) { extra += t.row_size(); });
   extra *= static_cast<int64_t>(poison.size());
   const int64_t n = clean.surfels.count();
   std::vector<const Tensor<float>*> from;
-  for_each_group(clean.surfels, [&](const char*, const Tensor<float>& t) { from.push_back(&t); });
+  for_each_input(clean.surfels, [&](const char*, const Tensor<float>& t) { from.push_back(&t); });
   size_t group = 0;
   int64_t at = n;
-  for_each_group(hostile.surfels, [&](const char*, Tensor<float>& t) {
+  for_each_input(hostile.surfels, [&](const char*, Tensor<float>& t) {
     const Tensor<float>& source = *from[group++];
     const Shape shape = source.shape();
     t = shape.rank() == 1   ? Tensor<float>({n + extra})

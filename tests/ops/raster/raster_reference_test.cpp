@@ -20,6 +20,7 @@ double loss(const TestScene<double>& scene, const Options& options,
   const auto factors = outputs_of(weights);
   double sum = 0;
   for (size_t i = 0; i < values.size(); ++i) {
+    if (values[i]->empty()) continue;
     for (int64_t j = 0; j < factors[i]->size(); ++j) sum += (*values[i])[j] * (*factors[i])[j];
   }
   return sum;
@@ -92,7 +93,7 @@ std::vector<GradientCase> gradient_cases() {
   dense.opacity_max = 1.3;
   dense.sh_degree = 1;
   SceneOptions bare;
-  bare.has_tint = false;
+  bare.has_tint = bare.says_carried = false;
   bare.sh_degree = 0;
   SceneOptions near;  // centres on both sides of the near plane, surfels that reach behind the camera
   near.depth_min = -0.5;

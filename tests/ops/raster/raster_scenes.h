@@ -20,6 +20,7 @@ struct SceneOptions {
   double spread = 0.5;  // centres reach this far from the axis, in tangents of the view angle
   double opacity_min = 0.2, opacity_max = 0.9;
   bool has_tint = true;
+  bool says_carried = true;
   bool rotated_camera = true;
 };
 
@@ -57,6 +58,7 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
   s.opacity = Tensor<double>({o.count});
   s.sh = Tensor<double>({o.count, k, 3});
   if (o.has_tint) s.tint = Tensor<double>({o.count});
+  if (o.says_carried) s.carried = Tensor<double>({o.count});
   for (int64_t i = 0; i < o.count; ++i) {
     const double z = random.uniform(o.depth_min, o.depth_max);
     const Vec3<double> in_camera(z * random.uniform(-o.spread, o.spread),
@@ -69,6 +71,7 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
     s.opacity[i] = random.uniform(o.opacity_min, o.opacity_max);
     for (int64_t c = 0; c < 3 * k; ++c) s.sh.row(i)[c] = (c < 3 ? 0.8 : 0.2) * random.normal();
     if (o.has_tint) s.tint[i] = random.uniform();
+    if (o.says_carried) s.carried[i] = i % 3 == 0 ? 1 : 0;
   }
   return scene;
 }
@@ -118,15 +121,16 @@ TestScene<To> convert_scene(const TestScene<From>& scene) {
 // The outputs by their place, for loops over all of them.
 template <class Output>
 auto outputs_of(Output& o) {
-  return std::array{&o.colour, &o.alpha, &o.tint, &o.normal, &o.depth, &o.median_depth, &o.distortion};
+  return std::array{&o.colour, &o.alpha,        &o.tint,       &o.normal,
+                    &o.depth,  &o.median_depth, &o.distortion, &o.silhouette};
 }
-inline constexpr std::array output_names{"colour", "alpha",        "tint",      "normal",
-                                         "depth",  "median_depth", "distortion"};
+inline constexpr std::array output_names{"colour", "alpha",        "tint",       "normal",
+                                         "depth",  "median_depth", "distortion", "silhouette"};
 
 // A linear loss Σ g·output with random g for the outputs named by `mask` (bit i: output i), absent for the
 // others.
 template <class T>
-BasicOutputGradient<T> random_output_gradient(uint64_t seed, int width, int height, unsigned mask = 0x7f) {
+BasicOutputGradient<T> random_output_gradient(uint64_t seed, int width, int height, unsigned mask = 0xff) {
   Random random(seed);
   BasicOutputGradient<T> g;
   const auto tensors = outputs_of(g);
@@ -139,7 +143,7 @@ BasicOutputGradient<T> random_output_gradient(uint64_t seed, int width, int heig
   return g;
 }
 
-// The groups of a surfel's values (or of their gradients) by name.
+// The groups of a surfel's values that have gradients (or these gradients) by name.
 template <class Surfels, class F>
 void for_each_group(Surfels& s, F&& f) {
   f("position", s.position);
@@ -148,6 +152,12 @@ void for_each_group(Surfels& s, F&& f) {
   f("opacity", s.opacity);
   f("sh", s.sh);
   f("tint", s.tint);
+}
+// And the others.
+template <class Surfels, class F>
+void for_each_input(Surfels& s, F&& f) {
+  for_each_group(s, f);
+  f("carried", s.carried);
 }
 
 }  // namespace traceflow::raster

@@ -209,6 +209,7 @@ TEST(Trace, TheOrderOfTheSurfelsDoesNotMatter) {
                             permuted(s.rotation, order),
                             permuted(s.opacity, order),
                             permuted(s.sh, order),
+                            {},
                             {}},
                            scene.origins,
                            scene.directions};

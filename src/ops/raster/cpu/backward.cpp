@@ -20,6 +20,7 @@ struct BlockState {
   alignas(64) float colour[3][pixels_per_block];
   alignas(64) float normal[3][pixels_per_block];
   alignas(64) float tint[pixels_per_block];
+  alignas(64) float silhouette[pixels_per_block];
   alignas(64) float z[pixels_per_block];         // dL/d(Σ w z)
   alignas(64) float constant[pixels_per_block];  // the part of dL/dw that all hits share
   alignas(64) float median[pixels_per_block];
@@ -42,6 +43,7 @@ HWY_INLINE void load_pixel(const OutputGradient& g, const Vec3<float>& backgroun
     state.normal[c][i] = value(g.normal, 3 * pixel + c);
   }
   state.tint[i] = value(g.tint, pixel);
+  state.silhouette[i] = value(g.silhouette, pixel);
   state.median[i] = value(g.median_depth, pixel);
   state.distortion[i] = value(g.distortion, pixel);
   // The expected depth is Σ w z / Σ w; the background shines with 1 - Σ w.
@@ -68,7 +70,7 @@ HWY_INLINE void load_block(const OutputGradient& g, const Vec3<float>& backgroun
 
 // Which outputs a gradient is asked by: what nobody asks is left out of the loops.
 enum class Asked {
-  colour,    // colour, tint and alpha
+  colour,    // colour, tint, silhouette and alpha
   geometry,  // and normal and expected depth
   all        // and median depth and distortion
 };
@@ -116,6 +118,7 @@ struct Sums {
     own = hn::MulAdd(set(s.colour[1]), load(state.colour[1]), own);
     own = hn::MulAdd(set(s.colour[2]), load(state.colour[2]), own);
     own = hn::MulAdd(set(s.tint), load(state.tint), own);
+    own = hn::MulAdd(set(s.carried), load(state.silhouette), own);
     if constexpr (asked != Asked::colour) {
       own = hn::MulAdd(set(s.normal[0]), load(state.normal[0]), own);
       own = hn::MulAdd(set(s.normal[1]), load(state.normal[1]), own);

@@ -116,7 +116,7 @@ HWY_INLINE void evaluate(D d, const Splat* const* splats, const PixelCentres<D>*
     f.dx = hn::Sub(f.x, set(s.centre_x));
     f.dy = hn::Sub(f.y, set(s.centre_y));
     const auto distance2 = hn::MulAdd(f.dx, f.dx, hn::Mul(f.dy, f.dy));
-    rho_screen[i] = hn::MulAdd(set(2.0F), distance2, set(s.rho_screen_1));
+    rho_screen[i] = hn::Add(distance2, distance2);
   }
   for (size_t i = 0; i < count; ++i) {
     const Splat& s = *splats[i];
@@ -182,7 +182,7 @@ HWY_INLINE uint32_t reached_blocks(const Splat& s, int tile_x, int tile_y) {
     const auto dx = hn::Sub(clamp(set(s.centre_x), low_x, high_x), set(s.centre_x));
     const auto dy = hn::Sub(clamp(set(s.centre_y), low_y, high_y), set(s.centre_y));
     const auto distance2 = hn::MulAdd(dx, dx, hn::Mul(dy, dy));
-    const auto disk = hn::Le(hn::MulAdd(set(2.0F), distance2, set(s.rho_screen_1)), rho);
+    const auto disk = hn::Le(hn::Add(distance2, distance2), rho);
     uint8_t bits[8] = {};
     hn::StoreMaskBits(d, hn::Or(ellipse, disk), bits);
     reached |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << b;

@@ -151,7 +151,7 @@ TEST_P(RasterOnDevice, AgreesWithTheCpu) {
   o.count = 150;
   o.scale_min = 0.03;
   o.scale_max = 0.4;
-  expect_same_gradients(scene_of(1, 45, 37, o), options(), 0x7f);
+  expect_same_gradients(scene_of(1, 45, 37, o), options(), 0xff);
 }
 
 TEST_P(RasterOnDevice, AgreesWithTheCpuForFewerOutputs) {
@@ -168,7 +168,7 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuWhereSurfelsReachBehindTheCamera) {
   o.depth_min = -1;
   o.depth_max = 3;
   o.scale_max = 1.5;
-  expect_same_gradients(scene_of(4, 40, 30, o), options(), 0x7f);
+  expect_same_gradients(scene_of(4, 40, 30, o), options(), 0xff);
 }
 
 // More surfels in a tile than a batch holds, and pixels that end before the list does.
@@ -180,13 +180,13 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuInLongLists) {
   o.opacity_min = 0.02;
   o.opacity_max = 0.95;
   o.spread = 0.2;
-  expect_same_gradients(scene_of(5, 20, 18, o), options(), 0x7f);
+  expect_same_gradients(scene_of(5, 20, 18, o), options(), 0xff);
 }
 
 // Surfels of one tile and of all of them in the same warp, in more than one warp, of which the last is not
 // full.
 TEST_P(RasterOnDevice, AgreesWithTheCpuForSurfelsOfManySizes) {
-  expect_same_gradients(convert_scene<float>(scene_of_sizes(10, 48)), options(), 0x7f);
+  expect_same_gradients(convert_scene<float>(scene_of_sizes(10, 48)), options(), 0xff);
 }
 
 TEST_P(RasterOnDevice, HostileSurfelsAreNotDrawn) {
@@ -205,7 +205,7 @@ TEST_P(RasterOnDevice, HostileSurfelsAreNotDrawn) {
   s.opacity[30] = 0;
   s.sh.row(35)[1] = nan;
   s.tint[40] = infinity;
-  expect_same_gradients(scene, options(), 0x7f);
+  expect_same_gradients(scene, options(), 0xff);
 }
 
 TEST_P(RasterOnDevice, NothingIsTheBackground) {
