@@ -110,9 +110,11 @@ void light(const Lighting& lighting, const Tensor<int32_t>& body, float time, Su
 }
 
 void resist(const Lighting& lighting, const Stiffness& weights, Lighting& gradient) {
-  parallel_for(lighting.device(), "lighting: resist", lighting.brightness.size(),
-               ResistAtPoint{size_of(lighting.brightness.shape()), lighting.times(), weights,
-                             lighting.brightness.data(), gradient.brightness.data()});
+  const GridSize size = size_of(lighting.brightness.shape());
+  parallel_for(
+      lighting.device(), "lighting: resist", lighting.times() * size.z * size.y,
+      ResistAlongRow{size, lighting.times(), weights, lighting.brightness.data(), gradient.brightness.data()},
+      64);
   parallel_for(lighting.device(), "lighting: resist on bodies", lighting.body_brightness.size(),
                ResistOnBody{lighting.times(), weights, lighting.body_brightness.data(),
                             gradient.body_brightness.data()});

@@ -7,7 +7,7 @@ namespace traceflow {
 template void cuda::for_each_index(const char*, int64_t, const lighting::LightSurfel&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::LightBack&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::CollectAtPoint&);
-template void cuda::for_each_index(const char*, int64_t, const lighting::ResistAtPoint&);
+template void cuda::for_each_index(const char*, int64_t, const lighting::ResistAlongRow&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::ResistOnBody&);
 template void cuda::sum_each_index<lighting::BodyPull>(const char*, int64_t,
                                                        const lighting::BodyPullOfSurfel&,

@@ -234,29 +234,35 @@ struct AddBodyPull {
   }
 };
 
-struct ResistAtPoint {
+// A row of points along x: places are divided out once for all of them.
+struct ResistAlongRow {
   GridSize size;
   int64_t keys;
   Stiffness weights;
   const float* brightness;
   float* gradient;
 
-  // i: a point at a time.
+  // i: a row at a time.
   TRACEFLOW_HD void operator()(int64_t i) const {
-    const int64_t point = i % size.points(), key = i / size.points();
-    const int64_t column = point % size.x, row = point / size.x % size.y, layer = point / size.x / size.y;
-    if (column == 0 || row == 0 || layer == 0 || column + 1 == size.x || row + 1 == size.y ||
-        layer + 1 == size.z) {
-      gradient[i] = 0;
+    const int64_t row = i % size.y, layer = i / size.y % size.z, key = i / size.y / size.z;
+    const int64_t begin = i * size.x, end = begin + size.x;
+    if (row == 0 || layer == 0 || row + 1 == size.y || layer + 1 == size.z) {
+      for (int64_t at = begin; at < end; ++at) gradient[at] = 0;
       return;
     }
-    const double here = brightness[i];
-    double sum = weights.size * here;
-    if (key > 0) sum += weights.haste * (here - brightness[i - size.points()]);
-    if (key + 1 < keys) sum += weights.haste * (here - brightness[i + size.points()]);
-    for (const int64_t step : {size.at(1, 0, 0), size.at(0, 1, 0), size.at(0, 0, 1)})
-      sum += weights.roughness * (2 * here - brightness[i - step] - brightness[i + step]);
-    gradient[i] += static_cast<float>(sum);
+    gradient[begin] = gradient[end - 1] = 0;
+    // At the first and at the last time a point is its own neighbour, which adds nothing.
+    const int64_t before = key > 0 ? size.points() : 0, after = key + 1 < keys ? size.points() : 0;
+    const int64_t across = size.at(0, 1, 0), up = size.at(0, 0, 1);
+    for (int64_t at = begin + 1; at + 1 < end; ++at) {
+      const double here = brightness[at];
+      double sum = weights.size * here;
+      sum += weights.haste * (here - brightness[at - before]);
+      sum += weights.haste * (here - brightness[at + after]);
+      for (const int64_t step : {int64_t{1}, across, up})
+        sum += weights.roughness * (2 * here - brightness[at - step] - brightness[at + step]);
+      gradient[at] += static_cast<float>(sum);
+    }
   }
 };
 
