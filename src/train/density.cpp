@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "base/parallel.h"
+#include "math/activation.h"
 #include "train/density_kernels.h"
 
 namespace traceflow {
@@ -39,7 +40,7 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
         &seen = on_host(seen_, fetched[3]);
   const auto mean_signal = [&](int64_t i) { return seen[i] > 0 ? sum[i] / seen[i] : 0; };
   const int64_t count = surfels.count();
-  const float faint = std::log(options_.prune_opacity / (1 - options_.prune_opacity));
+  const float faint = logit(options_.prune_opacity);
   const SceneSize& size = limits.size;
   const float widest = limits.prunes_large ? std::min(options_.prune_above * size.extent,
                                                       options_.prune_above_cloud * size.cloud)
@@ -102,10 +103,15 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
   }
 
   RowEdit edit;
+  std::vector<int64_t> sharing;  // rows of the cloned and of their clones
   for (size_t i = 0; i < fate.size(); ++i) {
+    if (fate[i] == Fate::clone) sharing.push_back(edit.count());
     if (fate[i] == Fate::keep || fate[i] == Fate::clone) edit.keep(static_cast<int64_t>(i));
   }
-  change.cloned = each(Fate::clone, [&](int64_t i) { edit.add(i); });
+  change.cloned = each(Fate::clone, [&](int64_t i) {
+    sharing.push_back(edit.count());
+    edit.add(i);
+  });
   const int64_t first_child = edit.count();
   change.split = each(Fate::split, [&](int64_t i) {
     edit.add(i);
@@ -119,9 +125,14 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
   Tensor<float> sum({edit.count()}, device), seen({edit.count()}, device);
   const int64_t children = edit.count() - first_child;
   const Tensor<float> drawn = drawn_normal(2 * children, random).on(device);
+  const Tensor<int64_t> rows = tensor_of(sharing).on(device);
   parallel_for(device, "density: scatter children", children,
                ScatterChild{first_child, drawn.data(), edited.position.data(), edited.log_scale.data(),
                             edited.rotation.data()});
+  if (options_.clones_share_opacity) {
+    parallel_for(device, "density: share opacities", rows.size(),
+                 ShareOpacity{rows.data(), logit(options_.prune_opacity), edited.opacity_logit.data()});
+  }
   surfels = std::move(edited);
   moments = std::move(edited_moments);
   sum_ = std::move(sum);
@@ -161,7 +172,7 @@ void DensityControl::shorten_needles(Surfels& surfels, float cloud) const {
 }
 
 void DensityControl::reset_opacity(Surfels& surfels, SurfelMoments& moments) const {
-  const float ceiling = std::log(options_.opacity_reset / (1 - options_.opacity_reset));
+  const float ceiling = logit(options_.opacity_reset);
   parallel_for(surfels.device(), "density: lower opacity", surfels.count(),
                LowerTo{ceiling, surfels.opacity_logit.data()});
   moments.opacity_logit.first.zero();

@@ -43,6 +43,23 @@ struct ScatterChild {
   }
 };
 
+// Gives a surfel and its clone the opacity 1 − √(1 − o), o being the surfel's: where both lie on each other
+// they cover what it did (Rota Bulò et al., Revising Densification in Gaussian Splatting, 2024).
+struct ShareOpacity {
+  const int64_t* rows;
+  float faint;  // under this none is made fainter
+  float* opacity_logit;
+
+  TRACEFLOW_HD void operator()(int64_t k) const {
+    float& logit = opacity_logit[rows[k]];
+    // 1 − o = 1/(1 + eˣ); with r its root, the logit of 1 − r is log((1 − r)/r).
+    const double root = 1 / std::sqrt(1 + std::exp(double{logit}));
+    const auto shared = static_cast<float>(std::log((1 - root) / root));
+    const float least = logit < faint ? logit : faint;
+    logit = shared < least ? least : shared;
+  }
+};
+
 // Shortens a surfel that is longer than `longest` and than `aspect` times its width to the larger of the two.
 // All are logarithms.
 struct ShortenNeedle {

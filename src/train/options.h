@@ -137,6 +137,7 @@ struct DensityOptions {
   int until = 30000;
   float gradient_threshold = 2e-4F;
   float clone_below = 0.01F;
+  bool clones_share_opacity = false;
   float growth = 1;
   float prune_opacity = 0.05F;
   float prune_above = 0.1F;
@@ -156,6 +157,8 @@ struct DensityOptions {
             "Mean centre gradient above which a surfel multiplies.");
     v.field("clone_below", clone_below, "extents",
             "Largest scale up to which it is cloned; above, it is split.");
+    v.field("clones_share_opacity", clones_share_opacity, "",
+            "A cloned surfel and its clone become so faint that together they cover what the surfel did.");
     v.field("growth", growth, "",
             "At most this share of the set multiplies at a time, the strongest signals first.");
     v.field("prune_opacity", prune_opacity, "", "Surfels fainter than this go.");

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "math/activation.h"
+
 namespace traceflow {
 namespace {
 
@@ -65,6 +67,23 @@ TEST(Density, ClonesSmallSurfelsWithAStrongSignal) {
   EXPECT_EQ(set.surfels.position(10, 0), 3);
   EXPECT_EQ(set.surfels.position(11, 0), 7);
   EXPECT_EQ(set.surfels.tint_logit[11], 7);
+}
+
+TEST(Density, ACloneAndItsOriginalCoverWhatTheOriginalDid) {
+  Set set(4, 0.001F, 0.5F);
+  set.surfels.opacity_logit[1] = logit(0.9F);
+  set.surfels.opacity_logit[2] = logit(0.06F);
+  DensityOptions o = options();
+  o.clones_share_opacity = true;
+  DensityControl control("main", o, 4);
+  signal(control, 4, {1, 2});
+  Random random(1);
+  ASSERT_EQ(control.update(set.surfels, set.moments, {size, 1000}, random).cloned, 2);
+  const auto opacity = [&](int64_t i) { return sigmoid(double{set.surfels.opacity_logit[i]}); };
+  EXPECT_NEAR(1 - (1 - opacity(1)) * (1 - opacity(4)), 0.9, 1e-5);
+  EXPECT_EQ(opacity(1), opacity(4));
+  for (const int64_t i : {2, 5}) EXPECT_NEAR(opacity(i), o.prune_opacity, 1e-5) << "else it would be pruned";
+  for (const int64_t i : {0, 3}) EXPECT_NEAR(opacity(i), 0.5, 1e-5) << i;
 }
 
 TEST(Density, PrunesWhatIsWideForTheCamerasOrForTheCloud) {

@@ -55,6 +55,7 @@ Edited edited(Device device) {
   });
   DensityOptions options;
   options.longest_needle = 0.05F;
+  options.clones_share_opacity = true;
   DensityControl density("main", options, count, device);
   const Tensor<float> signal = random_tensor<float>({count}, random, 0, 4e-4);
   Tensor<uint8_t> touched({count});
