@@ -149,8 +149,10 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   // Draw them.
   const bool draws_silhouette = request.silhouette && !scene.main.body.empty();
   frame_.main.carried.place(device).resize({draws_silhouette ? frame_.main.count() : 0});
-  parallel_for(device, "render: carried surfels", frame_.main.carried.size(),
-               IsCarried{stored_row(frame_), scene.main.body.data(), frame_.main.carried.data()});
+  if (draws_silhouette) {
+    parallel_for(device, "render: carried surfels", frame_.main.carried.size(),
+                 IsCarried{stored_row(frame_), scene.main.body.data(), frame_.main.carried.data()});
+  }
   raster::forward(frame_.main, request.camera, frame_.drawn_with, frame_.raster, raster_saved_.get());
   if (request.pseudo_normals) {
     surface::pseudo_normals(request.camera, frame_.raster.depth, frame_.raster.median_depth,
