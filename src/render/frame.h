@@ -40,13 +40,12 @@ struct MirroredRays {
 
 // A picture with all its layers, on the device of the scene that it shows.
 struct Frame {
-  Camera<float> camera;        // what it is seen by
-  raster::Options drawn_with;  // how it was rasterised
-  PosedSurfels main;           // what was rasterised
-  Tensor<int32_t> subset;      // which stored main surfels these are; empty means all
-  PosedSurfels environment;    // what was traced
-  raster::Output
-      raster;  // diffuse colour, alpha, tint, silhouette when asked for, normal, depths, distortion
+  Camera<float> camera;         // what it is seen by
+  raster::Options drawn_with;   // how it was rasterised
+  PosedSurfels main;            // what was rasterised
+  Tensor<int32_t> subset;       // which stored main surfels these are; empty means all
+  PosedSurfels environment;     // what was traced
+  raster::Output raster;        // the rasterised layers; the silhouette when asked for
   Tensor<float> pseudo_normal;  // H×W×3 when asked for
   surface::TracedPixels traced;
   MirroredRays mirrored;

@@ -75,8 +75,8 @@ struct BasicPosedSurfels {
   Tensor<T> opacity;   // M, in (0, 1)
   Tensor<T> sh;        // M×K×3, only the degrees in use: K = (active degree + 1)²
   Tensor<T> tint;      // M, in (0, 1); empty for the environment
-  Tensor<T> carried;   // M, 1 where a body carries the surfel, else 0; empty where nobody asks. A constant:
-                       // never differentiated by
+  Tensor<T> carried;   // M, 1 where a body carries the surfel, else 0; empty where no silhouette is drawn.
+                       // Has no gradient
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint.empty(); }

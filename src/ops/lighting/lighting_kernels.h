@@ -234,7 +234,7 @@ struct AddBodyPull {
   }
 };
 
-// A row of points along x: places are divided out once for all of them.
+// A row of points along x, so that indices are divided once a row and not at each point.
 struct ResistAlongRow {
   GridSize size;
   int64_t keys;
