@@ -84,6 +84,10 @@ Json to_json(const events::FollowingDecided& e) {
           {"silhouettes", e.silhouettes}};
 }
 
+Json to_json(const events::BodiesParted& e) {
+  return {{"event", "bodies_parted"}, {"iteration", e.iteration}, {"added", e.added}, {"bodies", e.bodies}};
+}
+
 Json to_json(const events::BendingDecided& e) {
   Json json = {{"event", "bending_decided"},
                {"iteration", e.iteration},

@@ -81,6 +81,13 @@ struct FollowingDecided {
   double silhouettes = 0;  // mean misfit at rest, a share of the masks' area
 };
 
+// Parts of bodies have become bodies of their own (train/body_parts.h).
+struct BodiesParted {
+  int64_t iteration = 0;
+  int64_t added = 0;
+  int64_t bodies = 0;  // from now on
+};
+
 // Whether a body bends has been decided (train/options.h, BendOptions).
 struct BendingDecided {
   int64_t iteration = 0;
@@ -156,8 +163,8 @@ struct Finished {
   std::string reason;  // one line where the ending is not `completed`
 };
 
-using Event = std::variant<Started, Step, DensityChanged, FollowingDecided, BendingDecided, PriorsTurned,
-                           PhaseEntered, Evaluated, Warning, Paused, Saved, Measured, Finished>;
+using Event = std::variant<Started, Step, DensityChanged, FollowingDecided, BodiesParted, BendingDecided,
+                           PriorsTurned, PhaseEntered, Evaluated, Warning, Paused, Saved, Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
 // Hands every event to every listener, in the order in which they were added.

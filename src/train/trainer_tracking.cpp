@@ -175,12 +175,14 @@ void Trainer::part_bodies(int64_t key) {
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const Tracker tracker = make_tracker();
-  if (tracker.part_bodies(main, initial_main_count_, motion, key, scene_.extent) == 0) return;
+  const int64_t added = tracker.part_bodies(main, initial_main_count_, motion, key, scene_.extent);
+  if (added == 0) return;
   scene_.main.body = main.body.on(device_);
   scene_.main_motion = motion.on(device_);
   optimiser_.begin(*scene_.main_motion);
   // What was learned is of the bodies as they were.
   texture_trust_ = {};
+  stream_.emit(events::BodiesParted{iteration_, added, motion.bodies()});
 }
 
 Surfels Trainer::new_surface(int64_t key) const {

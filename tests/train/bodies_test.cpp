@@ -77,9 +77,9 @@ TEST(Bodies, ThereAreNoneWithoutMasksOrWhereTheNetworkMovesSurfels) {
 
 TEST(Tracker, FollowsBodiesFromTimeToTime) { expect_to_be_followed(load_capture(tumbling(), {})); }
 
-// The capture with masks of training views changed: by f(its place in time, mask).
+// A copy of the capture with masks of training views changed: by f(its place in time, mask).
 template <class F>
-Capture with_masks(const std::string& name, F&& change) {
+fs::path with_masks(const std::string& name, F&& change) {
   const fs::path folder = fs::path(::testing::TempDir()) / (name + std::to_string(::getpid()));
   fs::copy(tumbling(), folder, fs::copy_options::recursive);
   const Capture whole = load_capture(tumbling(), {});
@@ -89,19 +89,20 @@ Capture with_masks(const std::string& name, F&& change) {
     for (uint8_t& pixel : mask.values()) pixel = pixel != 0 ? 255 : 0;
     write_png(folder / "mask/1x" / (whole.train[k].id + ".png.png"), mask);
   }
-  return load_capture(folder, {});
+  return folder;
 }
 
 TEST(Tracker, FollowsBodiesPastMasksThatAreBlankOrWhole) {
-  expect_to_be_followed(with_masks("blank_masks", [](size_t k, Tensor<uint8_t>& mask) {
+  const fs::path folder = with_masks("blank_masks", [](size_t k, Tensor<uint8_t>& mask) {
     if (k == 0 || k == 3 || k == 4) mask.fill(0);
     if (k == 6) mask.fill(1);
-  }));
+  });
+  expect_to_be_followed(load_capture(folder, {}));
 }
 
-// In the first masks the two things hang together.
-TEST(Tracker, PartsABodyWhoseThingsMoveApart) {
-  expect_to_be_followed(with_masks("joined_masks", [](size_t k, Tensor<uint8_t>& mask) {
+// In the first mask the two things hang together.
+fs::path with_things_joined(const std::string& name) {
+  return with_masks(name, [](size_t k, Tensor<uint8_t>& mask) {
     if (k > 0) return;
     const std::vector<std::vector<int64_t>> parts = mask_parts(mask);
     ASSERT_GE(parts.size(), 2U);
@@ -109,7 +110,70 @@ TEST(Tracker, PartsABodyWhoseThingsMoveApart) {
     for (int64_t x = std::min(a % width, b % width); x <= std::max(a % width, b % width); ++x) {
       for (int64_t y = std::min(a, b) / width - 1; y <= std::max(a, b) / width + 1; ++y) mask(y, x) = 1;
     }
-  }));
+  });
+}
+
+TEST(Tracker, PartsABodyWhoseThingsMoveApart) {
+  expect_to_be_followed(load_capture(with_things_joined("joined_masks"), {}));
+}
+
+// The photographs vanish in the very iteration in which a body is parted.
+TEST(Tracker, ABodyWhosePartingFailsIsPartedAgain) {
+  const fs::path folder = with_things_joined("fleeting_masks"), gone = folder.string() + "_gone",
+                 run = folder.string() + "_run";
+  TrainOptions options = preset("cpu");
+  options.iterations = 400;
+  options.specular = Specular::none;
+  options.initial.max_points = options.density.max_surfels = 4000;
+  options.capture.cache_mebibytes = 0;
+  int64_t parted = 0;
+  {
+    Trainer trainer(options, load_capture(folder, options.capture), run);
+    trainer.stream().listen([&](const events::Event& event) {
+      if (!std::holds_alternative<events::BodiesParted>(event)) return;
+      parted = trainer.iteration();
+      fs::rename(folder, gone);
+    });
+    const events::Finished end = trainer.run(never);
+    EXPECT_EQ(end.ending, events::Ending::no_input);
+    ASSERT_GT(parted, 0);
+    EXPECT_EQ(end.iteration, parted);
+    EXPECT_EQ(trainer.scene().main_motion->bodies(), 1);
+  }
+  fs::rename(gone, folder);
+  Trainer resumed(options, load_capture(folder, options.capture), run);
+  resumed.resume();
+  Trainer whole(options, load_capture(folder, options.capture), folder.string() + "_whole");
+  for (Trainer* trainer : {&resumed, &whole}) {
+    while (trainer->iteration() < parted + 3) trainer->step();
+    EXPECT_EQ(trainer->scene().main_motion->bodies(), 2);
+  }
+  EXPECT_EQ(scene_bytes(resumed.scene()), scene_bytes(whole.scene()));
+}
+
+// A ball that mirrors does not go on to turn as it did before: nothing tells its turns.
+TEST(Tracker, ABallThatMirrorsDoesNotTurnOn) {
+  const Tumbling at;
+  const TrainOptions options = preset("cpu");
+  Motion motion = *at.scene.main_motion;
+  const auto turn_of = [&](int64_t body, int64_t from, int64_t to) {
+    return length(quaternion_log(quaternion_product(
+        unit_quaternion(load4<double>(&motion.rotation(body, to, 0))),
+        quaternion_conjugate(unit_quaternion(load4<double>(&motion.rotation(body, from, 0)))))));
+  };
+  TextureTrust trust = TextureTrust::of(motion.bodies());
+  for (int64_t body = 0; body < motion.bodies(); ++body) {
+    trust.stiffness(body, 2) = 1e6;  // no picture has told its turns so far
+    trust.mirror_image(body, 0) = 1;
+    const Vec4<double> turned = quaternion_exp(Vec3<double>(0.1, 0.2, 0.1));
+    for (int c = 0; c < 4; ++c) motion.rotation(body, 1, c) = static_cast<float>(turned[c]);
+  }
+  Tracker(options.deform.track, options.render, at.capture)
+      .follow(at.scene.main, motion, 2, at.scene.extent, trust);
+  for (int64_t body = 0; body < motion.bodies(); ++body) {
+    EXPECT_GT(turn_of(body, 0, 1), 0.2);
+    EXPECT_LT(turn_of(body, 1, 2), 0.02) << body;
+  }
 }
 
 // Poses from the truth carry each true point where it truly is, before the first iteration and after the
@@ -317,7 +381,7 @@ TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
 // Masks that were found and that no body can show: after the first time, a bar at one side of the picture or
 // the other.
 TEST(Tracker, LetsBodiesGoThatDoNotShowWhatTheMasksShow) {
-  Capture capture = with_masks("column_masks", [](size_t k, Tensor<uint8_t>& mask) {
+  const fs::path masked = with_masks("column_masks", [](size_t k, Tensor<uint8_t>& mask) {
     if (k == 0) return;
     const int64_t area =
         std::count_if(mask.values().begin(), mask.values().end(), [](uint8_t m) { return m != 0; });
@@ -325,6 +389,7 @@ TEST(Tracker, LetsBodiesGoThatDoNotShowWhatTheMasksShow) {
     mask.fill(0);
     for (int64_t i = 0; i < mask.size(); ++i) mask[i] = i % mask.dim(1) % step == 0 ? 1 : 0;
   });
+  Capture capture = load_capture(masked, {});
   capture.masks_are_found = true;
   const TrainOptions options = little_following();
   const fs::path folder = fs::path(::testing::TempDir()) / ("let_go_" + std::to_string(::getpid()));

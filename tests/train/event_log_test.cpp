@@ -84,6 +84,7 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
     log(full);
     log(events::DensityChanged{8, "main", 1, 2, 5, 3, 4, true, false, 96});
     log(events::FollowingDecided{9, true, 0.5});
+    log(events::BodiesParted{9, 1, 3});
     log(events::BendingDecided{9, 1, true, 1.5, 0.25});
     log(events::PriorsTurned{9, 3.5});
     log(events::PhaseEntered{9, "joint"});
@@ -94,7 +95,7 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
     log(events::Finished{events::Ending::interrupted, 10, 4, 22, {96, 20}, "SIGTERM"});
   }
   const std::vector<json> written = lines(path);
-  ASSERT_EQ(written.size(), 12U);
+  ASSERT_EQ(written.size(), 13U);
   EXPECT_EQ(written[0], json::parse(R"({"event":"started","capture":"plate","run":"runs/plate","iteration":0,
       "iterations":10,"device":"cpu","threads":2,"seed":42,"surfels":{"main":100,"environment":20},
       "forecast_bytes":5242880,"version":"1.2.3","machine":{"processor":"chip","threads":4,"memory_bytes":8192,
@@ -108,19 +109,20 @@ TEST(EventLog, WritesOneLineOfJsonForEveryKindOfEvent) {
       "pruned_transparent":3,"pruned_large":4,"opacity_reset":true,"at_cap":false,"count":96})"));
   EXPECT_EQ(written[3],
             json::parse(R"({"event":"following_decided","iteration":9,"follows":true,"silhouettes":0.5})"));
-  EXPECT_EQ(written[4], json::parse(R"({"event":"bending_decided","iteration":9,"body":1,"bends":true,
+  EXPECT_EQ(written[4], json::parse(R"({"event":"bodies_parted","iteration":9,"added":1,"bodies":3})"));
+  EXPECT_EQ(written[5], json::parse(R"({"event":"bending_decided","iteration":9,"body":1,"bends":true,
       "silhouettes":1.5,"photographs":0.25})"));
-  EXPECT_EQ(written[5], json::parse(R"({"event":"priors_turned","iteration":9,"degrees":3.5})"));
-  EXPECT_EQ(written[6], json::parse(R"({"event":"phase_entered","iteration":9,"phase":"joint"})"));
-  EXPECT_EQ(written[7],
+  EXPECT_EQ(written[6], json::parse(R"({"event":"priors_turned","iteration":9,"degrees":3.5})"));
+  EXPECT_EQ(written[7], json::parse(R"({"event":"phase_entered","iteration":9,"phase":"joint"})"));
+  EXPECT_EQ(written[8],
             json::parse(R"({"event":"evaluated","iteration":9,"split":"test","views":5,"psnr":20.25,
       "ssim":0.75,"seconds":1.5})"));
-  EXPECT_EQ(written[8]["text"], "a \"quoted\"\nline");
-  EXPECT_EQ(written[9], json::parse(R"({"event":"saved","iteration":10,"path":"runs/plate/state.safetensors",
+  EXPECT_EQ(written[9]["text"], "a \"quoted\"\nline");
+  EXPECT_EQ(written[10], json::parse(R"({"event":"saved","iteration":10,"path":"runs/plate/state.safetensors",
       "seconds":0.5})"));
-  EXPECT_EQ(written[10], json::parse(R"({"event":"measured","iteration":10,"phase":"joint","iterations":3,
+  EXPECT_EQ(written[11], json::parse(R"({"event":"measured","iteration":10,"phase":"joint","iterations":3,
       "steps":[{"name":"raster","calls":6,"seconds":0.25},{"name":"trace","calls":3,"seconds":0.5}]})"));
-  EXPECT_EQ(written[11],
+  EXPECT_EQ(written[12],
             json::parse(R"({"event":"finished","ending":"interrupted","iteration":10,"seconds":4.0,
       "psnr":22.0,"surfels":{"main":96,"environment":20},"reason":"SIGTERM"})"));
 }

@@ -268,6 +268,7 @@ export type TrainingEvent =
       follows: boolean;
       silhouettes: number; // mean misfit at rest, a share of the masks' area
     }
+  | { event: 'bodies_parted'; iteration: number; added: number; bodies: number }
   | {
       event: 'bending_decided';
       iteration: number;

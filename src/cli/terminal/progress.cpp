@@ -141,6 +141,7 @@ void Progress::show(const events::Step& e) {
 // Growth shows in the status line's counts; what limits it comes as a warning.
 void Progress::show(const events::DensityChanged&) {}
 void Progress::show(const events::FollowingDecided&) {}
+void Progress::show(const events::BodiesParted&) {}
 void Progress::show(const events::BendingDecided&) {}
 void Progress::show(const events::PriorsTurned&) {}
 

@@ -28,6 +28,7 @@ class Progress {
   void show(const events::Step& e);
   void show(const events::DensityChanged& e);
   void show(const events::FollowingDecided& e);
+  void show(const events::BodiesParted& e);
   void show(const events::BendingDecided& e);
   void show(const events::PriorsTurned& e);
   void show(const events::PhaseEntered& e);
