@@ -195,7 +195,7 @@ struct TrackOptions {
   float colour = 0.3F;
   float tracks = 0.3F;
   bool new_surface = true;
-  bool prior_turn = false;
+  bool prior_turn = true;
   bool true_poses = false;
 
   template <class Visitor>
