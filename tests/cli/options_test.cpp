@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 #include "base/error.h"
@@ -192,6 +194,41 @@ TEST(OptionPage, DocsHoldWhatTheProgramPrints) {
   std::ostringstream text;
   text << file.rdbuf();
   EXPECT_EQ(text.str(), option_page()) << "run: build/release/traceflow --help-options > docs/options.md";
+}
+
+// The number of a section that a text begins with, such as 3.2; empty where it begins with none.
+std::string section_at(std::string_view text) {
+  std::string number(text.substr(0, text.find_first_not_of("0123456789.")));
+  while (number.ends_with('.')) number.pop_back();
+  return number;
+}
+
+// Code and messages cite sections of docs/method.md as `method §3.2`.
+TEST(MethodPage, HasEverySectionThatIsCited) {
+  constexpr std::string_view sign = "§";
+  const std::filesystem::path folder = TRACEFLOW_SOURCE_FOLDER;
+  std::set<std::string> sections;
+  std::ifstream page(folder / "docs/method.md");
+  for (std::string line; std::getline(page, line);) {
+    if (line.starts_with("#") || line.starts_with("**"))
+      sections.insert(section_at(line.substr(line.find_first_not_of("#* "))));
+  }
+  size_t cited = 0;
+  for (const char* const part : {"src", "tests", "bench"}) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / part)) {
+      std::ifstream file(entry.path());
+      std::ostringstream bytes;
+      bytes << file.rdbuf();
+      const std::string text = bytes.str();
+      for (size_t at = text.find(sign); at != std::string::npos; at = text.find(sign, at + 1)) {
+        const std::string number = section_at(std::string_view(text).substr(at + sign.size()));
+        if (number.empty()) continue;
+        EXPECT_TRUE(sections.contains(number)) << entry.path() << " cites section " << number;
+        ++cited;
+      }
+    }
+  }
+  EXPECT_GT(cited, 100U);
 }
 
 }  // namespace
