@@ -48,7 +48,7 @@ void lead(int stream, const char* path) {
     const rlimit limit{static_cast<rlim_t>(world.file_bytes), static_cast<rlim_t>(world.file_bytes)};
     if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) ::_exit(99);
   }
-  for (const int number : {SIGHUP, SIGPIPE, SIGXFSZ}) ::signal(number, SIG_DFL);
+  for (const int number : {SIGHUP, SIGINT, SIGPIPE, SIGXFSZ}) ::signal(number, SIG_DFL);
   if (world.hangup_ignored) ::signal(SIGHUP, SIG_IGN);
   lead(STDOUT_FILENO, output);
   lead(STDERR_FILENO, error);
