@@ -65,7 +65,6 @@ TrainOptions cpu_preset() {
   o.density.every = 600;
   o.density.from = 600;
   o.density.until = 45000;
-  o.density.clones_share_opacity = true;
   o.density.growth = 0.2F;
   o.density.prune_above = 10;
   o.density.prune_above_cloud = 0.5F;
