@@ -129,7 +129,7 @@ TEST(Tracker, ABallThatMirrorsDoesNotTurnOn) {
   };
   TextureTrust trust = TextureTrust::of(motion.bodies());
   for (int64_t body = 0; body < motion.bodies(); ++body) {
-    trust.stiffness(body, 2) = 1e6;  // no picture has told its turns so far
+    trust.stiffness(body, 2) = 1e6;  // that many pictures, none of which told its turns
     trust.mirror_image(body, 0) = 1;
     const Vec4<double> turned = quaternion_exp(Vec3<double>(0.1, 0.2, 0.1));
     for (int c = 0; c < 4; ++c) motion.rotation(body, 1, c) = static_cast<float>(turned[c]);
