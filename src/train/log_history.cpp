@@ -42,6 +42,13 @@ double number_in(const Json& json, const char* key) {
   return found != json.end() && found->is_number() ? found->get<double>() : 0;
 }
 
+// Of an iteration that has begun, with the number of those done before it.
+bool is_told_first(const std::string& kind) {
+  static const std::set<std::string> kinds{"phase_entered", "following_decided", "bodies_parted",
+                                           "priors_turned", "bending_decided"};
+  return kinds.contains(kind);
+}
+
 // Events so far, of which a later line may take some back.
 class History {
  public:
@@ -64,11 +71,11 @@ class History {
   }
 
  private:
-  // To when `done` iterations were done. A phase that begins there is told again.
+  // To when `done` iterations were done. What the next one began with is told again.
   void go_back_to(int64_t done) {
     if (done <= 0) events_.clear();
     std::erase_if(events_, [&](const LoggedEvent& e) {
-      return e.iteration > done || e.kind == "finished" || (e.kind == "phase_entered" && e.iteration == done);
+      return e.iteration > done || e.kind == "finished" || (e.iteration == done && is_told_first(e.kind));
     });
     last_step_ = done;
   }

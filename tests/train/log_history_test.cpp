@@ -54,6 +54,16 @@ TEST(LogHistory, AResumedRunGoesBackToItsCheckpoint) {
             "step 3, step 4, finished 0");
 }
 
+// An iteration that fails after its parting is begun again, and parts them again.
+TEST(LogHistory, WhatAnIterationBeganWithIsToldOnce) {
+  const std::string began = log_line(events::FollowingDecided{2, true, 0.5}) +
+                            log_line(events::BodiesParted{2, 1, 3}) + log_line(events::PriorsTurned{2, 4}) +
+                            log_line(events::BendingDecided{2, 0, true, 1.5, std::nullopt});
+  EXPECT_EQ(told(read(start_line(0) + step_line(2) + began + start_line(2) + began + step_line(3))),
+            "started 0, step 2, started 2, following_decided 2, bodies_parted 2, priors_turned 2, "
+            "bending_decided 2, step 3");
+}
+
 TEST(LogHistory, ARunBegunAnewDropsWhatCameBefore) {
   EXPECT_EQ(told(read(start_line(0) + log_line(events::Warning{0, "w"}) + step_line(1) + start_line(0) +
                       log_line(events::Warning{0, "w"}) + step_line(1))),
