@@ -23,8 +23,10 @@ namespace {
 constexpr int few_steps = 3;
 constexpr double little_blur = 0.35;
 
-// Silhouettes that are off by more, as a share of the area of masks that were found, are of no bodies.
+// Silhouettes that are off by more, as a share of the area of masks that were found, are of no bodies, unless
+// the photographs say that they move as bodies do.
 constexpr double most_misfit = 1.0 / 3;
+constexpr double most_of_standing = 0.8;  // of the error of colours while they stand
 
 double mean_of(const std::vector<double>& values) {
   if (values.empty()) return 0;
@@ -41,6 +43,16 @@ std::vector<const View*> some_views(const Capture& capture) {
   std::vector<const View*> some;
   for (size_t k = 0; k < all.size(); k += step) some.push_back(all[k]);
   return some;
+}
+
+Motion standing_from(int64_t key, Motion motion) {
+  for (int64_t b = 0; b < motion.bodies(); ++b) {
+    for (int64_t later = key + 1; later < motion.keys(); ++later) {
+      std::copy_n(&motion.rotation(b, key, 0), 4, &motion.rotation(b, later, 0));
+      std::copy_n(&motion.shift(b, key, 0), 3, &motion.shift(b, later, 0));
+    }
+  }
+  return motion;
 }
 
 }  // namespace
@@ -81,10 +93,14 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
 void Trainer::settle() {
   const std::vector<double> misfits = silhouette_misfits();
   if (capture_.masks_are_found && mean_of(misfits) > most_misfit) {
-    warn(
-        fmt::format("the bodies' silhouettes are off by {:.0f}% of the masks' area: a field moves what moves",
-                    100 * mean_of(misfits)));
-    let_everything_go();
+    const double photographs = photographs_over_standing();
+    if (photographs > most_of_standing) {
+      warn(fmt::format(
+          "the bodies' silhouettes are off by {:.0f}% of the masks' area, and their colours by {:.0f}% of "
+          "what they would be off by if they stood still: a field moves what moves",
+          100 * mean_of(misfits), 100 * photographs));
+      let_everything_go();
+    }
   }
   let_stand();
   if (!carries_) return;
@@ -159,13 +175,7 @@ void Trainer::follow(int64_t key) {
   }
   tracker.follow(main, motion, key, scene_.extent, texture_trust_);
   // What is behind stands where this one does until it is reached.
-  for (int64_t b = 0; b < motion.bodies(); ++b) {
-    for (int64_t later = key + 1; later < motion.keys(); ++later) {
-      std::copy_n(&motion.rotation(b, key, 0), 4, &motion.rotation(b, later, 0));
-      std::copy_n(&motion.shift(b, key, 0), 3, &motion.shift(b, later, 0));
-    }
-  }
-  scene_.main_motion = motion.on(device_);
+  scene_.main_motion = standing_from(key, motion).on(device_);
 }
 
 void Trainer::part_bodies(int64_t key) {
@@ -268,6 +278,42 @@ std::vector<double> Trainer::silhouette_misfits() {
     if (const std::optional<double> misfit = silhouette_misfit(*view)) misfits.push_back(*misfit);
   }
   return misfits;
+}
+
+double Trainer::photographs_over_standing() {
+  struct Drawn {
+    Tensor<float> colour, silhouette;
+  };
+  const auto draw = [&](const View& view) {
+    FrameRequest request;
+    request.camera = view.camera;
+    request.time = view.time;
+    request.sh_degree_main = schedule_.sh_degree_main(iteration_);
+    request.deform_main = request.specular = false;
+    request.silhouette = true;
+    const Frame& frame = renderer_.forward(scene_, request, false);
+    return Drawn{frame.colour.on(Device::cpu), frame.raster.silhouette.on(Device::cpu)};
+  };
+  const std::vector<const View*> views = some_views(capture_);
+  std::vector<Drawn> followed, standing;
+  for (const View* view : views) followed.push_back(draw(*view));
+  const Motion motion = scene_.main_motion->on(Device::cpu);
+  scene_.main_motion = standing_from(0, motion).on(device_);
+  for (const View* view : views) standing.push_back(draw(*view));
+  scene_.main_motion = motion.on(device_);
+  double off = 0, off_standing = 0;
+  for (size_t k = 0; k < views.size(); ++k) {
+    const std::shared_ptr<const ViewImages> images = load_images(capture_, *views[k]);
+    for (int64_t i = 0; i < followed[k].silhouette.size(); ++i) {
+      if (!images->known.empty() && images->known[i] == 0) continue;
+      const double share = std::max(followed[k].silhouette[i], standing[k].silhouette[i]);
+      for (int64_t c = 3 * i; c < 3 * i + 3; ++c) {
+        off += share * std::abs(followed[k].colour[c] - images->colour[c]);
+        off_standing += share * std::abs(standing[k].colour[c] - images->colour[c]);
+      }
+    }
+  }
+  return off_standing > 0 ? off / off_standing : 1;
 }
 
 void Trainer::turn_priors() {
