@@ -139,9 +139,9 @@ class Trainer {
   std::optional<double> silhouette_misfit(const View& view);
   // In some views, in the order of time.
   std::vector<double> silhouette_misfits();
-  // How far the bodies' colours are off in some views, over what they would be off by if the bodies stood
-  // still, both where bodies are seen in either way.
-  double photographs_over_standing();
+  // What the colours are off by in some views, over what they are off by while the bodies stand where they
+  // began; both where bodies are seen, moving or standing.
+  double colour_error_over_standing();
   const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();

@@ -23,10 +23,9 @@ namespace {
 constexpr int few_steps = 3;
 constexpr double little_blur = 0.35;
 
-// Silhouettes that are off by more, as a share of the area of masks that were found, are of no bodies, unless
-// the photographs say that they move as bodies do.
-constexpr double most_misfit = 1.0 / 3;
-constexpr double most_of_standing = 0.8;  // of the error of colours while they stand
+// Bodies are let go where their silhouettes are off by more, as a share of the area of masks that were found,
+// and their colours too, as a share of what they are off by while the bodies stand still.
+constexpr double most_misfit = 1.0 / 3, most_colour_error = 0.8;
 
 double mean_of(const std::vector<double>& values) {
   if (values.empty()) return 0;
@@ -93,12 +92,12 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
 void Trainer::settle() {
   const std::vector<double> misfits = silhouette_misfits();
   if (capture_.masks_are_found && mean_of(misfits) > most_misfit) {
-    const double photographs = photographs_over_standing();
-    if (photographs > most_of_standing) {
+    const double colours = colour_error_over_standing();
+    if (colours > most_colour_error) {
       warn(fmt::format(
           "the bodies' silhouettes are off by {:.0f}% of the masks' area, and their colours by {:.0f}% of "
           "what they would be off by if they stood still: a field moves what moves",
-          100 * mean_of(misfits), 100 * photographs));
+          100 * mean_of(misfits), 100 * colours));
       let_everything_go();
     }
   }
@@ -280,7 +279,7 @@ std::vector<double> Trainer::silhouette_misfits() {
   return misfits;
 }
 
-double Trainer::photographs_over_standing() {
+double Trainer::colour_error_over_standing() {
   struct Drawn {
     Tensor<float> colour, silhouette;
   };
