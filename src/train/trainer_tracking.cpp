@@ -44,6 +44,15 @@ std::vector<const View*> some_views(const Capture& capture) {
   return some;
 }
 
+// With bodies where they are at its time, without the field and reflections.
+FrameRequest request_without_field(const View& view) {
+  FrameRequest request;
+  request.camera = view.camera;
+  request.time = view.time;
+  request.deform_main = request.specular = false;
+  return request;
+}
+
 Motion standing_from(int64_t key, Motion motion) {
   for (int64_t b = 0; b < motion.bodies(); ++b) {
     for (int64_t later = key + 1; later < motion.keys(); ++later) {
@@ -239,10 +248,7 @@ void Trainer::begin_anew(const Tensor<int32_t>& carried, Surfels main) {
 std::optional<double> Trainer::silhouette_misfit(const View& view) {
   const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
   if (images->coverage.empty()) return std::nullopt;
-  FrameRequest request;
-  request.camera = view.camera;
-  request.time = view.time;
-  request.deform_main = request.specular = false;
+  FrameRequest request = request_without_field(view);
   request.silhouette = true;
   const Tensor<float> silhouette =
       renderer_.forward(scene_, request, false).raster.silhouette.on(Device::cpu);
@@ -284,11 +290,8 @@ double Trainer::colour_error_over_standing() {
     Tensor<float> colour, silhouette;
   };
   const auto draw = [&](const View& view) {
-    FrameRequest request;
-    request.camera = view.camera;
-    request.time = view.time;
+    FrameRequest request = request_without_field(view);
     request.sh_degree_main = schedule_.sh_degree_main(iteration_);
-    request.deform_main = request.specular = false;
     request.silhouette = true;
     const Frame& frame = renderer_.forward(scene_, request, false);
     return Drawn{frame.colour.on(Device::cpu), frame.raster.silhouette.on(Device::cpu)};
@@ -323,10 +326,7 @@ void Trainer::turn_priors() {
   for (const View* view : some_views(capture_)) {
     const std::shared_ptr<const ViewImages> images = load_images(capture_, *view);
     if (images->mask.empty() || images->normal_prior.empty()) continue;
-    FrameRequest request;
-    request.camera = view->camera;
-    request.time = view->time;
-    request.deform_main = request.specular = false;
+    FrameRequest request = request_without_field(*view);
     request.pseudo_normals = true;
     const Frame& frame = renderer_.forward(scene_, request, false);
     const Tensor<float> alpha = frame.raster.alpha.on(Device::cpu),
@@ -406,11 +406,8 @@ void Trainer::let_stand() {
     const View& view = capture_.train[k];
     const std::shared_ptr<const ViewImages> images = load_images(capture_, view);
     if (images->mask.empty()) continue;
-    FrameRequest request;
-    request.camera = view.camera;
-    request.time = view.time;
+    FrameRequest request = request_without_field(view);
     request.sh_degree_main = schedule_.sh_degree_main(iteration_);
-    request.deform_main = request.specular = false;
     const Frame& frame = renderer_.forward(scene_, request, false);
     unrest.look(main, view, *images, frame.colour.on(Device::cpu), frame.raster.alpha.on(Device::cpu),
                 frame.raster.depth.on(Device::cpu));
