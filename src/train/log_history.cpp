@@ -42,7 +42,7 @@ double number_in(const Json& json, const char* key) {
   return found != json.end() && found->is_number() ? found->get<double>() : 0;
 }
 
-// Of an iteration that has begun, with the number of those done before it.
+// Whether an iteration tells this event as it begins, with the number of iterations done before it.
 bool is_told_first(const std::string& kind) {
   static const std::set<std::string> kinds{"phase_entered", "following_decided", "bodies_parted",
                                            "priors_turned", "bending_decided"};

@@ -44,7 +44,7 @@ std::vector<const View*> some_views(const Capture& capture) {
   return some;
 }
 
-// With bodies where they are at its time, without the field and reflections.
+// The bodies at the view's time, without the field and without reflections.
 FrameRequest request_without_field(const View& view) {
   FrameRequest request;
   request.camera = view.camera;
