@@ -257,6 +257,7 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
     options.specular = Specular::none;
     options.initial.max_points = options.density.max_surfels = 2000;
     options.density.from = options.iterations;
+    options.loss.normal_prior = 2;  // with which the points say another distance than the first picture
     TrackOptions& track = options.deform.track;
     track.map_each = 1;
     track.again = 0;
@@ -280,6 +281,7 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
     std::vector<double> by_points = tracker.distances_by_points(main, motion, scene.extent);
     for (double& ratio : by_points) ratio = 1 / ratio;
     by_points = ratios_of_what_moves(by_points, eyes, motion);
+    EXPECT_GT(std::abs(by_points[0] - 1), 1e-3);
     for (size_t b = 0; b < ratios.size(); ++b) ratios[b] *= by_points[b];
     const auto lit = [&] {
       const auto& middle = trainer.scene().lighting->middle.values();
