@@ -61,7 +61,7 @@ void static_iteration(benchmark::State& state) {
                       .camera = false};
   for (auto _ : state) {
     const Frame& frame = renderer.forward(s.scene, s.request, true);
-    evaluate_objective(frame, s.target, s.options.loss, false, grad_frame, means);
+    evaluate_objective(frame, s.target, s.options.loss, NormalLosses::none, grad_frame, means);
     benchmark::DoNotOptimize(means.read());
     gradient.reset(s.scene);
     renderer.backward(s.scene, s.request, trainable, grad_frame, gradient);

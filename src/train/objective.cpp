@@ -43,16 +43,17 @@ LossTerms LossMeans::read() const {
 }
 
 void evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
-                        bool normal_losses, FrameGradient& gradient, LossMeans& means,
+                        NormalLosses normals, FrameGradient& gradient, LossMeans& means,
                         const lpips::Network* perceptual) {
   const Device device = frame.colour.device();
-  const bool consistency = normal_losses && options.normal > 0;
-  const bool prior = normal_losses && options.normal_prior > 0 && !target.normal_prior.empty();
-  const Shape none{0}, colours = frame.colour.shape(), normals = frame.raster.normal.shape();
+  const bool consistency = normals != NormalLosses::none && options.normal > 0;
+  const bool prior =
+      normals != NormalLosses::none && options.normal_prior > 0 && !target.normal_prior.empty();
+  const Shape none{0}, colours = frame.colour.shape(), shape = frame.raster.normal.shape();
   means.begin(device);
   gradient.colour.place(device).reset(colours);
-  gradient.normal.place(device).reset(consistency || prior ? normals : none);
-  gradient.pseudo_normal.place(device).reset(consistency ? normals : none);
+  gradient.normal.place(device).reset(consistency || prior ? shape : none);
+  gradient.pseudo_normal.place(device).reset(consistency ? shape : none);
   gradient.distortion.place(device).reset(options.distortion > 0 ? frame.raster.distortion.shape() : none);
 
   const auto slot = [&](LossMeans::Term term, double weight) { return means.add(term, weight); };
@@ -68,7 +69,10 @@ void evaluate_objective(const Frame& frame, const ViewImages& target, const Loss
                              gradient.pseudo_normal, slot(LossMeans::normal, options.normal));
   }
   if (prior) {
-    loss::normal_prior(frame.raster.normal, target.normal_prior, options.normal_prior, gradient.normal,
+    const Tensor<uint8_t> nowhere;
+    const Tensor<uint8_t>& mask = normals == NormalLosses::more_in_mask ? target.mask : nowhere;
+    loss::normal_prior(frame.raster.normal, target.normal_prior, mask, options.normal_prior_in_mask,
+                       options.normal_prior, gradient.normal,
                        slot(LossMeans::normal_prior, options.normal_prior));
   }
   if (options.distortion > 0) {

@@ -56,10 +56,14 @@ class LossMeans {
   std::array<std::optional<double>, term_count> weight_;
 };
 
-// Compares a frame with its photograph and sets dL/dframe. normal_losses: the terms on normals count in this
-// iteration; perceptual: the network of LPIPS where that counts.
+// How the terms on normals count in an iteration (method §7.4): not at all; with priors that count the same
+// everywhere; or with priors that count loss.normal_prior_in_mask times as much in the mask.
+enum class NormalLosses { none, even, more_in_mask };
+
+// Compares a frame with its photograph and sets dL/dframe. perceptual: the network of LPIPS where that
+// counts.
 void evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
-                        bool normal_losses, FrameGradient& gradient, LossMeans& means,
+                        NormalLosses normals, FrameGradient& gradient, LossMeans& means,
                         const lpips::Network* perceptual = nullptr);
 
 // The network of LPIPS where the options give it a weight. Throws InputError where its file cannot be used or

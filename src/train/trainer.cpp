@@ -162,6 +162,12 @@ FrameRequest Trainer::request_for(const View& view) {
   return request;
 }
 
+NormalLosses Trainer::normal_losses(const Trainable& trainable, const Tracking& now) const {
+  if (!trainable.main || !schedule_.uses_normal_losses(iteration_)) return NormalLosses::none;
+  // A body that takes on the priors' bias while it is followed is followed, and parted from others, worse.
+  return now.goes_on && !bodies_stand_ ? NormalLosses::even : NormalLosses::more_in_mask;
+}
+
 const View& Trainer::draw_view() {
   const Tracking now = tracking(iteration_);
   if (now.goes_on) return draw_tracked_view(now);
@@ -211,8 +217,8 @@ LossTerms Trainer::step() {
   take_unknown(frame.colour, target);
   grad_frame_.main_position.place(device_).resize({0});
   grad_rest_.place(device_).resize({0});
-  evaluate_objective(frame, target, options_.loss, schedule_.uses_normal_losses(iteration_) && trainable.main,
-                     grad_frame_, means_, schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
+  evaluate_objective(frame, target, options_.loss, normal_losses(trainable, now), grad_frame_, means_,
+                     schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   leave_unknown(target, grad_frame_.colour);
   if (review_) review_(frame, target, grad_frame_);
   if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0) add_rigidity(frame);

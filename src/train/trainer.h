@@ -146,6 +146,7 @@ class Trainer {
   // The next view among those whose times the schedule has reached.
   const View& draw_view();
   FrameRequest request_for(const View& view);
+  NormalLosses normal_losses(const Trainable& trainable, const Tracking& now) const;
   // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
   void add_rigidity(const Frame& frame);
   // Everything of a step that follows a loss that is a number.

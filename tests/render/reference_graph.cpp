@@ -120,8 +120,8 @@ class Graph {
     total += w.ssim * loss::ssim_loss_reference(colour_, s_.target, w.ssim, grad_colour_);
     total += w.normal * loss::normal_consistency_reference(raster_.normal, pseudo_, w.normal, grad_.normal,
                                                            grad_pseudo_);
-    total +=
-        w.normal_prior * loss::normal_prior_reference(raster_.normal, s_.prior, w.normal_prior, grad_.normal);
+    total += w.normal_prior *
+             loss::normal_prior_reference(raster_.normal, s_.prior, {}, 1, w.normal_prior, grad_.normal);
     const auto pixels = static_cast<double>(raster_.distortion.size());
     grad_.distortion.reset(raster_.distortion.shape());
     grad_.distortion.fill(w.distortion / pixels);

@@ -22,9 +22,10 @@ inline double normal_consistency(const Tensor<float>& normal, const Tensor<float
   });
 }
 inline double normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, double weight,
-                           Tensor<float>& grad_normal) {
-  return value_of(normal.device(),
-                  [&](const MeanSlot& slot) { normal_prior(normal, prior, weight, grad_normal, slot); });
+                           Tensor<float>& grad_normal, const Tensor<uint8_t>& mask = {}, double in_mask = 1) {
+  return value_of(normal.device(), [&](const MeanSlot& slot) {
+    normal_prior(normal, prior, mask, in_mask, weight, grad_normal, slot);
+  });
 }
 inline double distortion(const Tensor<float>& map, double weight, Tensor<float>& grad_map) {
   return value_of(map.device(), [&](const MeanSlot& slot) { distortion(map, weight, grad_map, slot); });

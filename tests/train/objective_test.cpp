@@ -37,9 +37,10 @@ struct Fixture {
   lpips::Network network = lpips::network_of(narrow_lpips_weights(2));
 };
 
-LossTerms evaluate(const Fixture& f, FrameGradient& gradient, const lpips::Network* network = nullptr) {
+LossTerms evaluate(const Fixture& f, FrameGradient& gradient, const lpips::Network* network = nullptr,
+                   NormalLosses normals = NormalLosses::more_in_mask) {
   LossMeans means;
-  evaluate_objective(f.frame, f.target, f.options, true, gradient, means, network);
+  evaluate_objective(f.frame, f.target, f.options, normals, gradient, means, network);
   return means.read();
 }
 
@@ -54,6 +55,28 @@ TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
               (1 - o.ssim) * t.l1 + o.ssim * t.ssim + o.normal * t.normal + o.normal_prior * t.normal_prior +
                   o.distortion * t.distortion + o.lpips * t.lpips,
               1e-12);
+}
+
+TEST(Objective, NormalPriorsCountMoreInMasks) {
+  Fixture f;
+  FrameGradient in_mask, even, none, no_mask;
+  f.options.normal = 0;
+  f.options.normal_prior_in_mask = 7;
+  const double anywhere = evaluate(f, no_mask).normal_prior;
+  f.target.mask.resize({20, 24});
+  for (int64_t y = 0; y < 10; ++y) f.target.mask(y, 7) = 1;
+  const double both = evaluate(f, in_mask).normal_prior;
+  EXPECT_EQ(evaluate(f, even, nullptr, NormalLosses::even).normal_prior, anywhere);
+  EXPECT_GT(both, anywhere);
+  for (int64_t i = 0; i < f.target.mask.size(); ++i) {
+    const double more = f.target.mask[i] != 0 ? 7 : 1;
+    for (int64_t c = 3 * i; c < 3 * i + 3; ++c) {
+      EXPECT_NEAR(in_mask.normal[c], more * even.normal[c], 1e-6);
+      EXPECT_EQ(no_mask.normal[c], even.normal[c]);
+    }
+  }
+  EXPECT_EQ(evaluate(f, none, nullptr, NormalLosses::none).normal_prior, 0);
+  EXPECT_TRUE(none.normal.empty());
 }
 
 // What is not known has the render's colours, which are no error and no measure.

@@ -109,6 +109,33 @@ TEST(PriorBias, OfAViewKeepsTheTrackerFromTheSurroundings) {
   EXPECT_GT(turned, 0.01);
 }
 
+// Where a run in which priors in masks count more parts from one in which they do not.
+TEST(PriorBias, PriorsInMasksCountMoreOnceBodiesAreFollowedOrStand) {
+  const Tumbling at;
+  TrainOptions options = preset("cpu");
+  options.iterations = 120;
+  options.specular = Specular::none;
+  options.initial.max_points = options.density.max_surfels = 2000;
+  options.deform.track.map_each = 1;
+  const int warm_up = options.iterations / 8, times = static_cast<int>(at.capture.train.size());
+  for (const bool stands : {false, true}) {
+    options.deform.track.still = 10;
+    options.deform.track.true_poses = !stands;
+    options.loss.normal_prior_in_mask = 1;
+    Trainer even(options, at.capture, fs::path(::testing::TempDir()) / "even");
+    options.loss.normal_prior_in_mask = 7;
+    Trainer more(options, at.capture, fs::path(::testing::TempDir()) / "more");
+    LossTerms a, b;
+    while (a.normal_prior == b.normal_prior && even.iteration() < options.iterations / 2) {
+      a = even.step();
+      b = more.step();
+    }
+    EXPECT_EQ(a.l1, b.l1);
+    EXPECT_GT(b.normal_prior, a.normal_prior);
+    EXPECT_EQ(even.iteration() - 1, stands ? warm_up : warm_up + times - 1);
+  }
+}
+
 // Priors of things that are turned by 8 degrees are turned back when the film has been followed, in a run
 // that goes on from its checkpoint too.
 TEST(PriorBias, OfMasksIsTurnedBackInTraining) {

@@ -257,7 +257,9 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
     options.specular = Specular::none;
     options.initial.max_points = options.density.max_surfels = 2000;
     options.density.from = options.iterations;
-    options.loss.normal_prior = 2;  // with which the points say another distance than the first picture
+    // With these the points say another distance than the first picture.
+    options.loss.normal_prior = 2;
+    options.loss.normal_prior_in_mask = 1;
     TrackOptions& track = options.deform.track;
     track.map_each = 1;
     track.again = 0;

@@ -151,14 +151,17 @@ struct NormalConsistency {
 template <class T>
 struct NormalPrior {
   const T *normal, *prior;
+  const uint8_t* mask;  // or null
+  T in_mask;
 
   TRACEFLOW_HD bool compared(const Vec3<T>& n, const Vec3<T>& p) const {
     return !is_zero(p) && dot(n, n) != T(0);
   }
+  TRACEFLOW_HD T factor(int64_t i) const { return mask != nullptr && mask[i] != 0 ? in_mask : T(1); }
   TRACEFLOW_HD CountedSum operator()(int64_t i) const {
     const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(prior + 3 * i);
     if (!compared(n, p)) return {};
-    return {1 - static_cast<double>(dot(n, p) / std::sqrt(dot(n, n))), 1};
+    return {factor(i) * (1 - static_cast<double>(dot(n, p) / std::sqrt(dot(n, n)))), 1};
   }
 };
 
@@ -173,7 +176,7 @@ struct NormalPriorBackward {
   TRACEFLOW_HD void operator()(int64_t i) const {
     const Vec3<T> n = load3<T>(forward.normal + 3 * i), p = load3<T>(forward.prior + 3 * i);
     if (!forward.compared(n, p)) return;
-    const T scale = static_cast<T>(weight / mean->count);
+    const T scale = forward.factor(i) * static_cast<T>(weight / mean->count);
     const T inv_length = T(1) / std::sqrt(dot(n, n));
     const Vec3<T> unit = n * inv_length;
     const Vec3<T> gradient = -scale * inv_length * (p - dot(unit, p) * unit);

@@ -101,10 +101,11 @@ double normal_consistency_reference(const Tensor<double>& normal, const Tensor<d
   return mean.value;
 }
 
-double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>& prior, double weight,
+double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>& prior,
+                              const Tensor<uint8_t>& mask, double in_mask, double weight,
                               Tensor<double>& grad_normal) {
   Mean mean{};
-  mean_normal_prior(normal, prior, weight, grad_normal, &mean);
+  mean_normal_prior(normal, prior, mask, in_mask, weight, grad_normal, &mean);
   return mean.value;
 }
 

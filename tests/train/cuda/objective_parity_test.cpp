@@ -17,7 +17,7 @@ struct Outcome {
   FrameGradient gradient;
 };
 
-Outcome evaluate(Device device, bool normal_losses) {
+Outcome evaluate(Device device, NormalLosses normals) {
   Random random(1);
   const Shape shape{20, 24, 3};
   Frame frame;
@@ -29,21 +29,24 @@ Outcome evaluate(Device device, bool normal_losses) {
   frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1).on(device);
   target.colour = noise(0);
   target.normal_prior = noise(-1);
+  target.mask.resize({20, 24});
+  for (int64_t i = 0; i < target.mask.size(); i += 3) target.mask[i] = 1;
+  target.mask = target.mask.on(device);
   LossOptions options;
   options.distortion = 3;
+  options.normal_prior_in_mask = 7;
   options.lpips = 0.7F;
   const lpips::Network perceptual = lpips::network_of(narrow_lpips_weights(2)).on(device);
   Outcome o;
   LossMeans means;
-  evaluate_objective(frame, target, options, normal_losses, o.gradient, means, &perceptual);
+  evaluate_objective(frame, target, options, normals, o.gradient, means, &perceptual);
   o.terms = means.read();
   return o;
 }
 
 TEST_F(TrainOnDevice, TheObjectiveAgreesWithTheCpu) {
-  for (const bool normal_losses : {false, true}) {
-    const Outcome expected = evaluate(Device::cpu, normal_losses),
-                  found = evaluate(Device::cuda, normal_losses);
+  for (const NormalLosses normals : {NormalLosses::none, NormalLosses::even, NormalLosses::more_in_mask}) {
+    const Outcome expected = evaluate(Device::cpu, normals), found = evaluate(Device::cuda, normals);
     for (double LossTerms::*term :
          {&LossTerms::total, &LossTerms::l1, &LossTerms::ssim, &LossTerms::normal, &LossTerms::normal_prior,
           &LossTerms::distortion, &LossTerms::lpips, &LossTerms::rigidity}) {
@@ -52,8 +55,8 @@ TEST_F(TrainOnDevice, TheObjectiveAgreesWithTheCpu) {
     EXPECT_NEAR(found.terms.psnr.value(), expected.terms.psnr.value(), 1e-5);
     expect_close_on_host(found.gradient.colour, expected.gradient.colour, 1e-5, "colour");
     expect_close_on_host(found.gradient.distortion, expected.gradient.distortion, 1e-6, "distortion");
-    EXPECT_EQ(found.gradient.normal.empty(), !normal_losses);
-    if (!normal_losses) continue;
+    EXPECT_EQ(found.gradient.normal.empty(), normals == NormalLosses::none);
+    if (normals == NormalLosses::none) continue;
     expect_close_on_host(found.gradient.normal, expected.gradient.normal, 1e-5, "normal");
     expect_close_on_host(found.gradient.pseudo_normal, expected.gradient.pseudo_normal, 1e-5, "pseudo");
   }

@@ -61,6 +61,7 @@ std::vector<Result> run(const Pictures& p, Device device) {
   with(1, [&](auto& g) { return ssim_loss(image, target, 70, g[0]); });
   with(2, [&](auto& g) { return normal_consistency(normal, unit, 0.05, g[0], g[1]); });
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0]); });
+  with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0], p.known.on(device), 0.3); });
   with(1, [&](auto& g) { return distortion(image, 3, g[0]); });
   with(0, [&](auto&) { return squared_error(image, target); });
   with(0, [&](auto&) { return squared_error(image, target, p.known.on(device)); });
