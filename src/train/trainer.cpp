@@ -164,7 +164,7 @@ FrameRequest Trainer::request_for(const View& view) {
 
 NormalLosses Trainer::normal_losses(const Trainable& trainable, const Tracking& now) const {
   if (!trainable.main || !schedule_.uses_normal_losses(iteration_)) return NormalLosses::none;
-  // A body that takes on the priors' bias while it is followed is followed, and parted from others, worse.
+  // With more of them while bodies are followed, their depth errors were twice as large.
   return now.goes_on && !bodies_stand_ ? NormalLosses::even : NormalLosses::more_in_mask;
 }
 
