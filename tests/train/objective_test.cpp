@@ -63,7 +63,7 @@ TEST(Objective, NormalPriorsCountMoreInMasks) {
   f.options.normal = 0;
   f.options.normal_prior_in_mask = 7;
   const double anywhere = evaluate(f, no_mask).normal_prior;
-  f.target.mask.resize({20, 24});
+  f.target.mask.reset({20, 24});
   for (int64_t y = 0; y < 10; ++y) f.target.mask(y, 7) = 1;
   const double both = evaluate(f, in_mask).normal_prior;
   EXPECT_EQ(evaluate(f, even, nullptr, NormalLosses::even).normal_prior, anywhere);

@@ -29,7 +29,7 @@ Outcome evaluate(Device device, NormalLosses normals) {
   frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1).on(device);
   target.colour = noise(0);
   target.normal_prior = noise(-1);
-  target.mask.resize({20, 24});
+  target.mask.reset({20, 24});
   for (int64_t i = 0; i < target.mask.size(); i += 3) target.mask[i] = 1;
   target.mask = target.mask.on(device);
   LossOptions options;
