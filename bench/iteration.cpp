@@ -99,7 +99,7 @@ void iteration_on_device(benchmark::State& state) {
     request.pseudo_normals = request.probes = request.cull = true;
     request.probe_seed = k;
     const Frame& frame = renderer.forward(s.scene, request, true);
-    evaluate_objective(frame, s.target, s.options.loss, NormalLosses::more_in_mask, grad_frame, means);
+    evaluate_objective(frame, s.target, s.options.loss, NormalLosses::more_on_mirrors, grad_frame, means);
     benchmark::DoNotOptimize(means.read());
     gradient.reset(s.scene);
     renderer.backward(s.scene, request, trainable, grad_frame, gradient);

@@ -69,9 +69,9 @@ void evaluate_objective(const Frame& frame, const ViewImages& target, const Loss
                              gradient.pseudo_normal, slot(LossMeans::normal, options.normal));
   }
   if (prior) {
-    const Tensor<uint8_t> nowhere;
-    const Tensor<uint8_t>& mask = normals == NormalLosses::more_in_mask ? target.mask : nowhere;
-    loss::normal_prior(frame.raster.normal, target.normal_prior, mask, options.normal_prior_in_mask,
+    const Tensor<float> nowhere;
+    const Tensor<float>& tint = normals == NormalLosses::more_on_mirrors ? frame.raster.tint : nowhere;
+    loss::normal_prior(frame.raster.normal, target.normal_prior, tint, options.normal_prior_on_mirrors,
                        options.normal_prior, gradient.normal,
                        slot(LossMeans::normal_prior, options.normal_prior));
   }

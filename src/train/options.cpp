@@ -50,7 +50,7 @@ TrainOptions cpu_preset() {
   o.render.select.probe_share = 0.05F;
   o.loss.normal = 0.1F;
   o.loss.normal_prior = 0.3F;
-  o.loss.normal_prior_in_mask = 7;
+  o.loss.normal_prior_on_mirrors = 7;
   o.loss.rigidity = 0.05F;
   o.rates.position = 1.5e-3F;
   o.rates.position_end = 1.5e-5F;
@@ -136,7 +136,7 @@ void LossOptions::validate() const {
   check_share(ssim, "loss.ssim");
   check_not_negative(normal, "loss.normal");
   check_not_negative(normal_prior, "loss.normal_prior");
-  check_not_negative(normal_prior_in_mask, "loss.normal_prior_in_mask");
+  check_not_negative(normal_prior_on_mirrors, "loss.normal_prior_on_mirrors");
   check_not_negative(distortion, "loss.distortion");
   check_not_negative(rigidity, "loss.rigidity");
   // Its square is divided by, in single precision.

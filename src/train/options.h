@@ -100,7 +100,7 @@ struct LossOptions {
   float ssim = 0.2F;
   float normal = 0.05F;
   float normal_prior = 0.05F;
-  float normal_prior_in_mask = 1;
+  float normal_prior_on_mirrors = 1;
   float distortion = 0;
   float rigidity = 0;
   float rigidity_strain = 0.2F;
@@ -115,8 +115,10 @@ struct LossOptions {
     v.field("normal", normal, "", "Normal consistency L_norm (method §7.4).");
     v.field("normal_prior", normal_prior, "",
             "Agreement with the capture's normal priors, L_tc-norm (method §7.4).");
-    v.field("normal_prior_in_mask", normal_prior_in_mask, "",
-            "How many times as much that counts in masks; while bodies are followed 1 (not in the paper).");
+    v.field(
+        "normal_prior_on_mirrors", normal_prior_on_mirrors, "",
+        "How many times as much normal priors count where the tint is 1; while bodies are followed 1 (not in "
+        "the paper).");
     v.field("distortion", distortion, "", "Depth distortion (method §7.4).");
     v.field("rigidity", rigidity, "",
             "Neighbouring main surfels keep their distances while the field moves them (not in the paper).");

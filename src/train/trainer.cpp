@@ -165,7 +165,9 @@ FrameRequest Trainer::request_for(const View& view) {
 NormalLosses Trainer::normal_losses(const Trainable& trainable, const Tracking& now) const {
   if (!trainable.main || !schedule_.uses_normal_losses(iteration_)) return NormalLosses::none;
   // With more of them while bodies are followed, their depth errors were twice as large.
-  return now.goes_on && !bodies_stand_ ? NormalLosses::even : NormalLosses::more_in_mask;
+  const bool follows = now.goes_on && !bodies_stand_;
+  const bool mirrors = schedule_.phase(iteration_) != Phase::diffuse;
+  return mirrors && !follows ? NormalLosses::more_on_mirrors : NormalLosses::even;
 }
 
 const View& Trainer::draw_view() {

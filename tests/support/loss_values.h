@@ -22,9 +22,10 @@ inline double normal_consistency(const Tensor<float>& normal, const Tensor<float
   });
 }
 inline double normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, double weight,
-                           Tensor<float>& grad_normal, const Tensor<uint8_t>& mask = {}, double in_mask = 1) {
+                           Tensor<float>& grad_normal, const Tensor<float>& tint = {},
+                           double on_mirrors = 1) {
   return value_of(normal.device(), [&](const MeanSlot& slot) {
-    normal_prior(normal, prior, mask, in_mask, weight, grad_normal, slot);
+    normal_prior(normal, prior, tint, on_mirrors, weight, grad_normal, slot);
   });
 }
 inline double distortion(const Tensor<float>& map, double weight, Tensor<float>& grad_map) {

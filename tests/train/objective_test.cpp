@@ -25,6 +25,7 @@ struct Fixture {
     frame.colour = random_tensor<float>(shape, random, 0, 1);
     frame.raster.normal = random_tensor<float>(shape, random, -1, 1);
     frame.pseudo_normal = random_tensor<float>(shape, random, -1, 1);
+    frame.raster.tint = random_tensor<float>({20, 24}, random, 0, 1);
     frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1);
     target.colour = random_tensor<float>(shape, random, 0, 1);
     target.normal_prior = random_tensor<float>(shape, random, -1, 1);
@@ -38,7 +39,7 @@ struct Fixture {
 };
 
 LossTerms evaluate(const Fixture& f, FrameGradient& gradient, const lpips::Network* network = nullptr,
-                   NormalLosses normals = NormalLosses::more_in_mask) {
+                   NormalLosses normals = NormalLosses::more_on_mirrors) {
   LossMeans means;
   evaluate_objective(f.frame, f.target, f.options, normals, gradient, means, network);
   return means.read();
@@ -57,23 +58,17 @@ TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
               1e-12);
 }
 
-TEST(Objective, NormalPriorsCountMoreInMasks) {
+TEST(Objective, NormalPriorsCountMoreOnMirrors) {
   Fixture f;
-  FrameGradient in_mask, even, none, no_mask;
+  FrameGradient on_mirrors, even, none;
   f.options.normal = 0;
-  f.options.normal_prior_in_mask = 7;
-  const double anywhere = evaluate(f, no_mask).normal_prior;
-  f.target.mask.reset({20, 24});
-  for (int64_t y = 0; y < 10; ++y) f.target.mask(y, 7) = 1;
-  const double both = evaluate(f, in_mask).normal_prior;
-  EXPECT_EQ(evaluate(f, even, nullptr, NormalLosses::even).normal_prior, anywhere);
-  EXPECT_GT(both, anywhere);
-  for (int64_t i = 0; i < f.target.mask.size(); ++i) {
-    const double more = f.target.mask[i] != 0 ? 7 : 1;
-    for (int64_t c = 3 * i; c < 3 * i + 3; ++c) {
-      EXPECT_NEAR(in_mask.normal[c], more * even.normal[c], 1e-6);
-      EXPECT_EQ(no_mask.normal[c], even.normal[c]);
-    }
+  f.options.normal_prior_on_mirrors = 7;
+  EXPECT_GT(evaluate(f, on_mirrors).normal_prior,
+            evaluate(f, even, nullptr, NormalLosses::even).normal_prior);
+  for (int64_t i = 0; i < f.frame.raster.tint.size(); ++i) {
+    const double more = 1 + 6 * f.frame.raster.tint[i];
+    for (int64_t c = 3 * i; c < 3 * i + 3; ++c)
+      EXPECT_NEAR(on_mirrors.normal[c], more * even.normal[c], 1e-6);
   }
   EXPECT_EQ(evaluate(f, none, nullptr, NormalLosses::none).normal_prior, 0);
   EXPECT_TRUE(none.normal.empty());

@@ -259,7 +259,6 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
     options.density.from = options.iterations;
     // With these the points say another distance than the first picture.
     options.loss.normal_prior = 2;
-    options.loss.normal_prior_in_mask = 1;
     TrackOptions& track = options.deform.track;
     track.map_each = 1;
     track.again = 0;

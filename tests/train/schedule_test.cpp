@@ -215,7 +215,8 @@ TEST(Options, NonsenseIsRefusedByName) {
   expect_refused("environment_density.prune_above_cloud",
                  [](TrainOptions& o) { o.environment_density.prune_above_cloud = -1; });
   expect_refused("loss.rigidity_strain", [](TrainOptions& o) { o.loss.rigidity_strain = 1e-12F; });
-  expect_refused("loss.normal_prior_in_mask", [](TrainOptions& o) { o.loss.normal_prior_in_mask = -1; });
+  expect_refused("loss.normal_prior_on_mirrors",
+                 [](TrainOptions& o) { o.loss.normal_prior_on_mirrors = -1; });
   expect_refused("memory_budget", [](TrainOptions& o) { o.memory_budget = int64_t{1} << 43; });
 }
 

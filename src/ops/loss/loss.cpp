@@ -63,9 +63,9 @@ void normal_consistency(const Tensor<float>& normal, const Tensor<float>& pseudo
   mean_normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo, value.on(normal.device()));
 }
 
-void normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, const Tensor<uint8_t>& mask,
-                  double in_mask, double weight, Tensor<float>& grad_normal, const MeanSlot& value) {
-  mean_normal_prior(normal, prior, mask, in_mask, weight, grad_normal, value.on(normal.device()));
+void normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, const Tensor<float>& tint,
+                  double on_mirrors, double weight, Tensor<float>& grad_normal, const MeanSlot& value) {
+  mean_normal_prior(normal, prior, tint, on_mirrors, weight, grad_normal, value.on(normal.device()));
 }
 
 void distortion(const Tensor<float>& distortion_map, double weight, Tensor<float>& grad_distortion,

@@ -35,11 +35,11 @@ double normal_consistency_reference(const Tensor<double>& normal, const Tensor<d
 
 // L_tc-norm = mean w (1 − n̂·N_e) over pixels that have a prior (N_e not zero) and a blended normal (method
 // §7.4); n̂ the blended normal normalised; divides by the number of such pixels. prior: H×W×3, world axes,
-// unit or zero. w: `in_mask` where the mask (H×W; empty: nowhere) is not zero, 1 elsewhere.
-void normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, const Tensor<uint8_t>& mask,
-                  double in_mask, double weight, Tensor<float>& grad_normal, const MeanSlot& value);
+// unit or zero. w = 1 + (on_mirrors − 1) tint, a constant to the gradient; tint: H×W in [0, 1], empty: 0.
+void normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, const Tensor<float>& tint,
+                  double on_mirrors, double weight, Tensor<float>& grad_normal, const MeanSlot& value);
 double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>& prior,
-                              const Tensor<uint8_t>& mask, double in_mask, double weight,
+                              const Tensor<double>& tint, double on_mirrors, double weight,
                               Tensor<double>& grad_normal);
 
 // mean of the distortion map (method §3.5).

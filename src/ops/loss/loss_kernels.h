@@ -151,13 +151,13 @@ struct NormalConsistency {
 template <class T>
 struct NormalPrior {
   const T *normal, *prior;
-  const uint8_t* mask;  // or null
-  T in_mask;
+  const T* tint;  // or null
+  T more;         // on a mirror
 
   TRACEFLOW_HD bool compared(const Vec3<T>& n, const Vec3<T>& p) const {
     return !is_zero(p) && dot(n, n) != T(0);
   }
-  TRACEFLOW_HD T factor(int64_t i) const { return mask != nullptr && mask[i] != 0 ? in_mask : T(1); }
+  TRACEFLOW_HD T factor(int64_t i) const { return tint != nullptr ? 1 + more * tint[i] : T(1); }
   TRACEFLOW_HD CountedSum operator()(int64_t i) const {
     const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(prior + 3 * i);
     if (!compared(n, p)) return {};

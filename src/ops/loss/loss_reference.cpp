@@ -102,10 +102,10 @@ double normal_consistency_reference(const Tensor<double>& normal, const Tensor<d
 }
 
 double normal_prior_reference(const Tensor<double>& normal, const Tensor<double>& prior,
-                              const Tensor<uint8_t>& mask, double in_mask, double weight,
+                              const Tensor<double>& tint, double on_mirrors, double weight,
                               Tensor<double>& grad_normal) {
   Mean mean{};
-  mean_normal_prior(normal, prior, mask, in_mask, weight, grad_normal, &mean);
+  mean_normal_prior(normal, prior, tint, on_mirrors, weight, grad_normal, &mean);
   return mean.value;
 }
 

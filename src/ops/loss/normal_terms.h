@@ -21,15 +21,14 @@ void mean_normal_consistency(const Tensor<T>& normal, const Tensor<T>& pseudo, d
 }
 
 template <class T>
-void mean_normal_prior(const Tensor<T>& normal, const Tensor<T>& prior, const Tensor<uint8_t>& mask,
-                       double in_mask, double weight, Tensor<T>& grad_normal, Mean* mean) {
+void mean_normal_prior(const Tensor<T>& normal, const Tensor<T>& prior, const Tensor<T>& tint,
+                       double on_mirrors, double weight, Tensor<T>& grad_normal, Mean* mean) {
   check_is_image(normal);
   check_same_shape(normal, prior, grad_normal);
   const int64_t pixels = normal.size() / 3;
-  require(mask.empty() || mask.size() == pixels, "a mask has a number for each pixel",
-          mask.shape().to_string());
-  const NormalPrior<T> forward{normal.data(), prior.data(), mask.empty() ? nullptr : mask.data(),
-                               static_cast<T>(in_mask)};
+  require(tint.empty() || tint.size() == pixels, "each pixel has a tint", tint.shape().to_string());
+  const NormalPrior<T> forward{normal.data(), prior.data(), tint.empty() ? nullptr : tint.data(),
+                               static_cast<T>(on_mirrors - 1)};
   ordered_sum<CountedSum>(normal.device(), "loss: normal prior", pixels, forward, MeanOverCounted{mean},
                           block_pixels);
   parallel_for(normal.device(), "loss: normal prior backward", pixels,

@@ -31,12 +31,6 @@ struct Normals {
   }
 };
 
-Tensor<uint8_t> every_third(int64_t height, int64_t width) {
-  Tensor<uint8_t> mask({height, width});
-  for (int64_t i = 0; i < mask.size(); i += 3) mask[i] = 1;
-  return mask;
-}
-
 TEST(L1, IsTheMeanDistance) {
   Tensor<float> image({2, 1, 3}), target({2, 1, 3}), gradient({2, 1, 3});
   for (int64_t i = 0; i < 6; ++i) image[i] = static_cast<float>(i);
@@ -114,30 +108,32 @@ TEST(NormalPrior, IsOneMinusTheMeanCosine) {
   prior[7] = 1;   // no normal
   EXPECT_NEAR(normal_prior(normal, prior, 1, gradient), 0.4, 1e-7);
   for (int64_t i = 3; i < 9; ++i) EXPECT_EQ(gradient[i], 0);
-  Tensor<uint8_t> mask({1, 3});
-  EXPECT_NEAR(normal_prior(normal, prior, 1, gradient, mask, 7), 0.4, 1e-7);
-  mask[0] = 1;
-  EXPECT_NEAR(normal_prior(normal, prior, 1, gradient, mask, 7), 2.8, 1e-6);
+  Tensor<float> tint({1, 3});
+  EXPECT_NEAR(normal_prior(normal, prior, 1, gradient, tint, 7), 0.4, 1e-7);
+  tint[0] = 0.5F;
+  EXPECT_NEAR(normal_prior(normal, prior, 1, gradient, tint, 7), 1.6, 1e-6);
 }
 
 TEST(NormalPrior, FastAgreesWithReference) {
   const Normals n(40, 50);
-  for (const Tensor<uint8_t>& mask : {Tensor<uint8_t>(), every_third(40, 50)}) {
+  Random random(7);
+  for (const Tensor<double>& tint : {Tensor<double>(), random_tensor<double>({40, 50}, random, 0, 1)}) {
     Tensor<float> fast(n.unit.shape());
     Tensor<double> plain(n.unit.shape());
     const double value =
-        normal_prior(convert<float>(n.blended), convert<float>(n.unit), 0.05, fast, mask, 0.3);
-    EXPECT_NEAR(value, normal_prior_reference(n.blended, n.unit, mask, 0.3, 0.05, plain), 1e-6);
+        normal_prior(convert<float>(n.blended), convert<float>(n.unit), 0.05, fast, convert<float>(tint), 7);
+    EXPECT_NEAR(value, normal_prior_reference(n.blended, n.unit, tint, 7, 0.05, plain), 1e-6);
     expect_close(fast, plain, 1e-5, "normal");
   }
 }
 
 TEST(NormalPrior, GradientAgreesWithCentralDifferences) {
   Normals n(5, 6);
-  const Tensor<uint8_t> mask = every_third(5, 6);
+  Random random(7);
+  const Tensor<double> tint = random_tensor<double>({5, 6}, random, 0, 1);
   Tensor<double> gradient(n.unit.shape()), unused(n.unit.shape());
-  normal_prior_reference(n.blended, n.unit, mask, 0.3, 0.05, gradient);
-  const auto value = [&] { return 0.05 * normal_prior_reference(n.blended, n.unit, mask, 0.3, 1, unused); };
+  normal_prior_reference(n.blended, n.unit, tint, 7, 0.05, gradient);
+  const auto value = [&] { return 0.05 * normal_prior_reference(n.blended, n.unit, tint, 7, 1, unused); };
   auto differences = central_differences(n.blended, value);
   for (int64_t i = 0; i < 30; ++i) {  // a missing normal is a discontinuity
     if (i % 7 == 5) std::fill_n(differences.data() + 3 * i, 3, 0.0);
@@ -222,7 +218,7 @@ TEST(Losses, RefuseShapesThatDoNotFit) {
   EXPECT_THROW(l1(image, image, 1, other), InternalError);
   EXPECT_THROW(normal_consistency(image, image, 1, image, other), InternalError);
   EXPECT_THROW(normal_prior(image, other, 1, image), InternalError);
-  EXPECT_THROW(normal_prior(image, image, 1, image, Tensor<uint8_t>({1, 1}), 0.3), InternalError);
+  EXPECT_THROW(normal_prior(image, image, 1, image, Tensor<float>({1, 1}), 7), InternalError);
 }
 
 TEST(Losses, SameBytesAtAnyThreadCount) {

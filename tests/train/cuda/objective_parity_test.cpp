@@ -26,15 +26,13 @@ Outcome evaluate(Device device, NormalLosses normals) {
   frame.colour = noise(0);
   frame.raster.normal = noise(-1);
   frame.pseudo_normal = noise(-1);
+  frame.raster.tint = random_tensor<float>({20, 24}, random, 0, 1).on(device);
   frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1).on(device);
   target.colour = noise(0);
   target.normal_prior = noise(-1);
-  target.mask.reset({20, 24});
-  for (int64_t i = 0; i < target.mask.size(); i += 3) target.mask[i] = 1;
-  target.mask = target.mask.on(device);
   LossOptions options;
   options.distortion = 3;
-  options.normal_prior_in_mask = 7;
+  options.normal_prior_on_mirrors = 7;
   options.lpips = 0.7F;
   const lpips::Network perceptual = lpips::network_of(narrow_lpips_weights(2)).on(device);
   Outcome o;
@@ -45,7 +43,7 @@ Outcome evaluate(Device device, NormalLosses normals) {
 }
 
 TEST_F(TrainOnDevice, TheObjectiveAgreesWithTheCpu) {
-  for (const NormalLosses normals : {NormalLosses::none, NormalLosses::even, NormalLosses::more_in_mask}) {
+  for (const NormalLosses normals : {NormalLosses::none, NormalLosses::even, NormalLosses::more_on_mirrors}) {
     const Outcome expected = evaluate(Device::cpu, normals), found = evaluate(Device::cuda, normals);
     for (double LossTerms::*term :
          {&LossTerms::total, &LossTerms::l1, &LossTerms::ssim, &LossTerms::normal, &LossTerms::normal_prior,

@@ -15,7 +15,7 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 
 // A picture of each kind: colours, and normals of which every seventh is missing.
 struct Pictures {
-  Tensor<float> image, target, normal, unit;
+  Tensor<float> image, target, normal, unit, tint;
   Tensor<uint8_t> known;  // one of three
 
   Pictures(int64_t height, int64_t width, uint64_t seed = 1) {
@@ -25,6 +25,7 @@ struct Pictures {
     target = random_tensor<float>(shape, random, 0, 1);
     normal = random_tensor<float>(shape, random, -0.5, 0.5);
     unit = random_tensor<float>(shape, random, -1, 1);
+    tint = random_tensor<float>({height, width}, random, 0, 1);
     known.resize({height, width});
     for (int64_t i = 0; i < known.size(); ++i) known[i] = i % 3 == 0 ? 1 : 0;
     for (int64_t i = 3; i < height * width; i += 7) std::fill_n(unit.data() + 3 * i, 3, 0.0F);
@@ -61,7 +62,7 @@ std::vector<Result> run(const Pictures& p, Device device) {
   with(1, [&](auto& g) { return ssim_loss(image, target, 70, g[0]); });
   with(2, [&](auto& g) { return normal_consistency(normal, unit, 0.05, g[0], g[1]); });
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0]); });
-  with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0], p.known.on(device), 0.3); });
+  with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0], p.tint.on(device), 7); });
   with(1, [&](auto& g) { return distortion(image, 3, g[0]); });
   with(0, [&](auto&) { return squared_error(image, target); });
   with(0, [&](auto&) { return squared_error(image, target, p.known.on(device)); });
