@@ -57,7 +57,7 @@ class LossMeans {
 };
 
 // How the terms on normals count in an iteration (method §7.4): not at all; with priors that count the same
-// everywhere; or with priors that count loss.normal_prior_on_mirrors times as much where the tint is 1.
+// everywhere; or with priors that count more by the tint, loss.normal_prior_on_mirrors times where it is 1.
 enum class NormalLosses { none, even, more_on_mirrors };
 
 // Compares a frame with its photograph and sets dL/dframe. perceptual: the network of LPIPS where that

@@ -115,10 +115,9 @@ struct LossOptions {
     v.field("normal", normal, "", "Normal consistency L_norm (method §7.4).");
     v.field("normal_prior", normal_prior, "",
             "Agreement with the capture's normal priors, L_tc-norm (method §7.4).");
-    v.field(
-        "normal_prior_on_mirrors", normal_prior_on_mirrors, "",
-        "How many times as much normal priors count where the tint is 1; while bodies are followed 1 (not in "
-        "the paper).");
+    v.field("normal_prior_on_mirrors", normal_prior_on_mirrors, "",
+            "Factor on normal priors where the tint is 1; it is 1 where the tint is 0 and while bodies are "
+            "followed (not in the paper).");
     v.field("distortion", distortion, "", "Depth distortion (method §7.4).");
     v.field("rigidity", rigidity, "",
             "Neighbouring main surfels keep their distances while the field moves them (not in the paper).");
