@@ -94,7 +94,7 @@ struct SceneGradient {
   Field environment_field;
   EnvironmentMap environment_map;
   CameraGradient<float> camera;
-  Tensor<float> main_signal;  // N, norm of the screen-space centre gradient (method §3.6); 0 where not drawn
+  Tensor<float> main_signal;  // N, norm of the screen-space centre gradient (method §3.7); 0 where not drawn
   Tensor<uint8_t> main_visible;         // N
   Tensor<float> environment_signal;     // N, trace::BasicInputGradient::position_gradient
   Tensor<uint8_t> environment_visible;  // N, 1 where the signal is not zero

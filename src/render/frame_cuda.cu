@@ -2,6 +2,7 @@
 #include "primitives/list_where.h"
 #include "primitives/sum_kernels.h"
 #include "render/frame_kernels.h"
+#include "render/samples_kernels.h"
 
 namespace traceflow {
 
@@ -12,5 +13,11 @@ template void cuda::for_each_index(const char*, int64_t, const IsCarried&);
 template void cuda::for_each_index(const char*, int64_t, const FlagNonZero&);
 template void cuda::for_each_index(const char*, int64_t, const FollowReach&);
 template void cuda::for_each_index(const char*, int64_t, const FlagWhere<CanShow>&);
+template void cuda::for_each_index(const char*, int64_t, const AverageSamples&);
+template void cuda::for_each_index(const char*, int64_t, const AverageSamplesBackward&);
+template void cuda::for_each_index(const char*, int64_t, const AverageDepths&);
+template void cuda::for_each_index(const char*, int64_t, const AverageDepthsBackward&);
+template void cuda::for_each_index(const char*, int64_t, const AverageMedianDepths&);
+template void cuda::for_each_index(const char*, int64_t, const AverageMedianDepthsBackward&);
 
 }  // namespace traceflow

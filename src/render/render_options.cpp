@@ -12,6 +12,7 @@ void TracksOptions::validate() const {
 
 void RenderOptions::validate() const {
   check_option(depth_ratio >= 0 && depth_ratio <= 1, "render.depth_ratio", depth_ratio, "0 to 1");
+  check_option(samples >= 1 && samples <= 4, "render.samples", samples, "1 to 4");
   select.validate();
   tracks.validate();
   raster_options(1).validate();

@@ -25,6 +25,7 @@ struct RenderOptions {
   float near_plane = 0.01F;
   float far_plane = 100;
   bool low_pass = true;
+  int samples = 1;
   float alpha_min = 1.0F / 255;
   float alpha_max = 0.99F;
   float transmittance_min = 1e-4F;
@@ -43,6 +44,8 @@ struct RenderOptions {
     v.field("near_plane", near_plane, "extents", "Nearest camera depth that is drawn (method §3.4).");
     v.field("far_plane", far_plane, "extents", "Far end of the distortion's depth mapping (method §3.5).");
     v.field("low_pass", low_pass, "", "Screen-space low-pass of 2DGS (method §3.2).");
+    v.field("samples", samples, "samples",
+            "Samples of the main surfels along each side of a pixel (method §3.6).");
     v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
     v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
     v.field("transmittance_min", transmittance_min, "",

@@ -6,6 +6,7 @@
 #include "primitives/sums.h"
 #include "primitives/zeros.h"
 #include "render/frame_kernels.h"
+#include "render/samples.h"
 #include "render/visibility.h"
 
 namespace traceflow {
@@ -153,7 +154,7 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
     parallel_for(device, "render: carried surfels", frame_.main.carried.size(),
                  IsCarried{stored_row(frame_), scene.main.body.data(), frame_.main.carried.data()});
   }
-  raster::forward(frame_.main, request.camera, frame_.drawn_with, frame_.raster, raster_saved_.get());
+  draw(request);
   if (request.pseudo_normals) {
     surface::pseudo_normals(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                             frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
@@ -172,6 +173,16 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   shade::forward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.specular_rays,
                  frame_.colour);
   return frame_;
+}
+
+void Renderer::draw(const FrameRequest& request) {
+  if (options_.samples == 1) {
+    raster::forward(frame_.main, request.camera, frame_.drawn_with, frame_.raster, raster_saved_.get());
+    return;
+  }
+  raster::forward(frame_.main, samples::camera_of(request.camera, options_.samples), frame_.drawn_with,
+                  samples_, raster_saved_.get());
+  samples::average(samples_, options_.samples, frame_.raster);
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
@@ -245,8 +256,13 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
   // Rasterise.
   if (options_.depth_ratio == 0) grad_raster_.median_depth.resize({0});
   grad_raster_input_.wants_camera = trainable.camera;
-  raster::backward(frame_.main, request.camera, options_.raster_options(scene.extent), *raster_saved_,
-                   grad_raster_, grad_raster_input_);
+  const bool has_several = options_.samples > 1;
+  if (has_several) {
+    samples::average_backward(samples_, frame_.raster, options_.samples, grad_raster_, grad_samples_);
+  }
+  raster::backward(frame_.main, samples::camera_of(request.camera, options_.samples),
+                   options_.raster_options(scene.extent), *raster_saved_,
+                   has_several ? grad_samples_ : grad_raster_, grad_raster_input_);
   parallel_for(scene.device(), "render: add gradients of positions", grad_frame.main_position.size(),
                AddNumbers{grad_frame.main_position.data(), grad_raster_input_.surfels.position.data()});
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;

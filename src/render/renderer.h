@@ -46,6 +46,8 @@ class Renderer {
   void pose_main(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
   // With the tracer's BVH.
   void pose_environment(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
+  // The rasterised layers, at the means of a pixel's samples.
+  void draw(const FrameRequest& request);
   void forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
   // Starts the gradient of the rasterised layers; those that nothing asks for stay empty. faces, mirrors:
   // whether gradients of pseudo-normals and of mirrored rays will be added.
@@ -66,9 +68,10 @@ class Renderer {
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;
   reflection_map::Saved map_saved_;
-  Tensor<uint8_t> drawn_;  // which posed surfels were drawn
+  raster::Output samples_;  // where a pixel has several
+  Tensor<uint8_t> drawn_;   // which posed surfels were drawn
 
-  raster::OutputGradient grad_raster_;
+  raster::OutputGradient grad_raster_, grad_samples_;
   raster::InputGradient grad_raster_input_;
   trace::OutputGradient grad_trace_;
   trace::InputGradient grad_trace_input_;

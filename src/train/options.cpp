@@ -106,6 +106,7 @@ void ScheduleOptions::validate() const {
   check_not_negative(time_jitter, "schedule.time_jitter");
   check_share(first_times, "schedule.first_times");
   check_not_negative(all_times_from, "schedule.all_times_from");
+  check_not_negative(samples_from, "schedule.samples_from");
 }
 
 void RateOptions::validate() const {

@@ -25,6 +25,7 @@ struct ScheduleOptions {
   int time_jitter_until = 20000;
   float first_times = 1;
   int all_times_from = 0;
+  int samples_from = 42000;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -44,6 +45,8 @@ struct ScheduleOptions {
             "Share of the capture's duration, from its start, whose views are trained on at first.");
     v.field("all_times_from", all_times_from, "iteration",
             "The share has grown to the whole duration, in proportion to the iterations.");
+    v.field("samples_from", samples_from, "iteration",
+            "From where on pixels have the samples of render.samples, before it one.");
   }
   void validate() const;
 };

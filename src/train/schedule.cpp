@@ -58,6 +58,10 @@ bool Schedule::uses_lpips(int iteration) const {
   return options_.loss.lpips > 0 && iteration >= mark(options_.loss.lpips_from);
 }
 
+int Schedule::samples(int iteration) const {
+  return iteration >= mark(options_.schedule.samples_from) ? options_.render.samples : 1;
+}
+
 int Schedule::sh_degree(int iteration, int start, int limit) const {
   return std::clamp((iteration - start) / interval(options_.schedule.sh_every), 0, limit);
 }

@@ -21,6 +21,8 @@ class Schedule {
   bool deforms_environment(int iteration) const;
   bool uses_normal_losses(int iteration) const;
   bool uses_lpips(int iteration) const;
+  // Along each side of a pixel (RenderOptions).
+  int samples(int iteration) const;
   int sh_degree_main(int iteration) const;
   int sh_degree_environment(int iteration) const;
   // Standard deviation of the noise on the time (method §7.6), in frame intervals.

@@ -194,6 +194,7 @@ void Trainer::fade(std::span<const int64_t> rows) {
 
 LossTerms Trainer::step() {
   density_changes_.clear();
+  renderer_.options().samples = schedule_.samples(iteration_);
   const Tracking now = tracking(iteration_);
   const Surfels new_surface = follow_bodies(now);
   const View& view = draw_view();

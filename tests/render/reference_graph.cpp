@@ -1,5 +1,6 @@
 #include "render/reference_graph.h"
 
+#include <algorithm>
 #include <numeric>
 
 #include "ops/deform/deform.h"
@@ -19,6 +20,49 @@ std::vector<int32_t> all_pixels(const Camera<double>& camera) {
   return pixels;
 }
 
+Camera<double> camera_of_samples(Camera<double> camera, int n) {
+  camera.width *= n;
+  camera.height *= n;
+  camera.focal_x *= n;
+  camera.focal_y *= n;
+  camera.centre_x *= n;
+  camera.centre_y *= n;
+  return camera;
+}
+
+// The sums of weight · layer over the n×n samples of each pixel of an H×W(×C) picture; without weights, of
+// the layer alone.
+Tensor<double> sum_of_samples(const Tensor<double>& layer, const Tensor<double>* weight, int n) {
+  const bool has_channels = layer.shape().rank() == 3;
+  const int64_t h = layer.dim(0) / n, w = layer.dim(1) / n, channels = has_channels ? layer.dim(2) : 1;
+  Tensor<double> sums(has_channels ? Shape{h, w, channels} : Shape{h, w});
+  for (int64_t y = 0; y < h * n; ++y) {
+    for (int64_t x = 0; x < w * n; ++x) {
+      const int64_t sample = y * w * n + x, pixel = y / n * w + x / n;
+      for (int64_t c = 0; c < channels; ++c)
+        sums[pixel * channels + c] += layer[sample * channels + c] * (weight ? (*weight)[sample] : 1.0);
+    }
+  }
+  return sums;
+}
+
+// Each sample's share of its pixel's number: number / divisor of the pixel, times the sample's weight.
+Tensor<double> shared_among_samples(const Tensor<double>& numbers, const Tensor<double>* divisor,
+                                    const Tensor<double>* weight, int n) {
+  const bool has_channels = numbers.shape().rank() == 3;
+  const int64_t h = numbers.dim(0), w = numbers.dim(1), channels = has_channels ? numbers.dim(2) : 1;
+  Tensor<double> shares(has_channels ? Shape{h * n, w * n, channels} : Shape{h * n, w * n});
+  for (int64_t y = 0; y < h * n; ++y) {
+    for (int64_t x = 0; x < w * n; ++x) {
+      const int64_t sample = y * w * n + x, pixel = y / n * w + x / n;
+      const double by = (weight ? (*weight)[sample] : 1.0) / (divisor ? (*divisor)[pixel] : n * n);
+      for (int64_t c = 0; c < channels; ++c)
+        shares[sample * channels + c] = numbers[pixel * channels + c] * by;
+    }
+  }
+  return shares;
+}
+
 // One evaluation: every intermediate value, then the way back.
 class Graph {
  public:
@@ -27,7 +71,7 @@ class Graph {
   double forward() {
     deform::forward_reference(p_.main, s_.deform ? &p_.main_field : nullptr, s_.main_points, s_.time,
                               s_.sh_degree, main_);
-    raster::forward_reference(main_, p_.camera, s_.raster, raster_);
+    draw();
     surface::pseudo_normals(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha, s_.depth_ratio,
                             pseudo_);
     specular_.reset({0, 3});
@@ -54,7 +98,8 @@ class Graph {
                                      s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth,
                                      &g.camera);
     raster::BasicInputGradient<double> input;
-    raster::backward_reference(main_, p_.camera, s_.raster, grad_, input);
+    raster::backward_reference(main_, camera_of_samples(p_.camera, s_.samples), s_.raster,
+                               gradient_of_samples(), input);
     g.camera.camera_from_world += input.camera.camera_from_world;
     g.camera.position += input.camera.position;
     deform::backward_reference(p_.main, s_.deform ? &p_.main_field : nullptr, s_.main_points, s_.time,
@@ -69,6 +114,48 @@ class Graph {
   const Tensor<double>& directions() const { return directions_; }
 
  private:
+  void draw() {
+    const int n = s_.samples;
+    raster::forward_reference(main_, camera_of_samples(p_.camera, n), s_.raster, sampled_);
+    const auto mean = [&](const Tensor<double>& layer) {
+      Tensor<double> sums = sum_of_samples(layer, nullptr, n);
+      for (double& v : sums.values()) v /= n * n;
+      return sums;
+    };
+    raster_.colour = mean(sampled_.colour);
+    raster_.alpha = mean(sampled_.alpha);
+    raster_.tint = mean(sampled_.tint);
+    raster_.normal = mean(sampled_.normal);
+    raster_.distortion = mean(sampled_.distortion);
+    weights_ = sum_of_samples(sampled_.alpha, nullptr, n);
+    raster_.depth = sum_of_samples(sampled_.depth, &sampled_.alpha, n);
+    for (int64_t i = 0; i < raster_.depth.size(); ++i) raster_.depth[i] /= std::max(weights_[i], 1e-300);
+    has_median_ = sampled_.median_depth;
+    for (double& v : has_median_.values()) v = v > 0 ? 1 : 0;
+    medians_ = sum_of_samples(has_median_, nullptr, n);
+    for (double& v : medians_.values()) v = std::max(v, 1.0);
+    raster_.median_depth = sum_of_samples(sampled_.median_depth, nullptr, n);
+    for (int64_t i = 0; i < medians_.size(); ++i) raster_.median_depth[i] /= medians_[i];
+  }
+
+  raster::BasicOutputGradient<double> gradient_of_samples() const {
+    const int n = s_.samples;
+    raster::BasicOutputGradient<double> g;
+    g.colour = shared_among_samples(grad_.colour, nullptr, nullptr, n);
+    g.tint = shared_among_samples(grad_.tint, nullptr, nullptr, n);
+    g.normal = shared_among_samples(grad_.normal, nullptr, nullptr, n);
+    g.distortion = shared_among_samples(grad_.distortion, nullptr, nullptr, n);
+    g.depth = shared_among_samples(grad_.depth, &weights_, &sampled_.alpha, n);
+    g.median_depth = shared_among_samples(grad_.median_depth, &medians_, &has_median_, n);
+    // The mean depth changes with a sample's alpha by (its depth − the mean) / Σ alpha.
+    Tensor<double> by_mean = grad_.depth;
+    for (int64_t i = 0; i < by_mean.size(); ++i) by_mean[i] *= -raster_.depth[i];
+    const Tensor<double> own = shared_among_samples(grad_.depth, &weights_, &sampled_.depth, n);
+    g.alpha = shared_among_samples(by_mean, &weights_, nullptr, n);
+    for (int64_t i = 0; i < own.size(); ++i) g.alpha[i] += own[i];
+    return g;
+  }
+
   void forward_specular() {
     reflect();
     if (p_.map) {
@@ -133,7 +220,8 @@ class Graph {
   const Parameters& p_;
   const Setting& s_;
   BasicPosedSurfels<double> main_, environment_;
-  raster::BasicOutput<double> raster_;
+  raster::BasicOutput<double> sampled_, raster_;
+  Tensor<double> weights_, medians_, has_median_;
   trace::BasicOutput<double> trace_;
   std::vector<int32_t> pixels_;
   Tensor<double> pseudo_, origins_, directions_, moved_, specular_, colour_;

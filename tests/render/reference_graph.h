@@ -34,6 +34,7 @@ struct Weights {
 struct Setting {
   raster::Options raster;
   trace::Options trace;
+  int samples = 1;  // along each side of a pixel
   double depth_ratio = 0.3;
   double time = 0.4;
   int sh_degree = 2;

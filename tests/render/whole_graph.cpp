@@ -128,8 +128,10 @@ Case make_case(Graph graph) {
   c.request.sh_degree_main = 2;
   c.request.sh_degree_environment = 2;
   c.request.deform_main = c.request.deform_environment = graph != Graph::diffuse;
-  c.request.specular = graph == Graph::reflected || graph == Graph::reflected_map;
+  c.request.specular =
+      graph == Graph::reflected || graph == Graph::reflected_map || graph == Graph::several_samples;
   c.request.pseudo_normals = true;
+  c.options.samples = graph == Graph::several_samples ? 2 : 1;
   c.options.depth_ratio = 0.3F;
   c.options.sort = raster::SortOrder::centre;
   c.options.near_plane = 0.1F;
@@ -150,6 +152,7 @@ Case make_case(Graph graph) {
   c.parameters.camera = convert<double>(camera);
   c.setting.raster = c.options.raster_options(1);
   c.setting.trace = c.options.trace_options(1);
+  c.setting.samples = c.options.samples;
   c.setting.depth_ratio = 0.3F;
   c.setting.time = 0.4F;
   c.setting.deform = c.request.deform_main;

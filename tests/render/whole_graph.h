@@ -9,7 +9,7 @@
 // A small scene through every phase's graph, for the end-to-end gradient tests.
 namespace traceflow::whole_graph {
 
-enum class Graph { diffuse, diffuse_deformed, reflected, reflected_map };
+enum class Graph { diffuse, diffuse_deformed, reflected, reflected_map, several_samples };
 
 struct Case {
   Scene scene;

@@ -72,6 +72,16 @@ TEST(Schedule, ThePerceptualTermIsLateAndOffWithoutAWeight) {
   EXPECT_TRUE(Schedule(options).uses_lpips(450));
 }
 
+TEST(Schedule, PixelsHaveSeveralSamplesTowardsTheEnd) {
+  TrainOptions options = paper();
+  options.iterations = 600;
+  options.schedule.samples_from = 45000;
+  EXPECT_EQ(Schedule(options).samples(599), 1);
+  options.render.samples = 3;
+  EXPECT_EQ(Schedule(options).samples(449), 1);
+  EXPECT_EQ(Schedule(options).samples(450), 3);
+}
+
 TEST(Schedule, PhaseTwoFreezesTheMainSurfelsButTheirTint) {
   const Trainable t = Schedule(paper()).trainable(10000);
   EXPECT_FALSE(t.main);

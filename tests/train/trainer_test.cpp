@@ -375,6 +375,21 @@ TEST(Trainer, EveryAblationAndPeerOfTheMethodTrains) {
   }
 }
 
+TEST(Trainer, SamplesAreTakenFromTheirIterationOn) {
+  TrainOptions options = small_run(40);
+  options.schedule.samples_from = 30;
+  const auto losses = [&](int samples) {
+    options.render.samples = samples;
+    Trainer trainer = make_trainer(options, "samples");
+    std::vector<double> found;
+    while (trainer.iteration() <= 30) found.push_back(trainer.step().total);
+    return found;
+  };
+  const std::vector<double> one = losses(1), four = losses(2);
+  for (size_t i = 0; i < 30; ++i) EXPECT_EQ(one[i], four[i]) << i;
+  EXPECT_NE(one[30], four[30]);
+}
+
 TEST(Trainer, ThePerceptualTermIsToldFromWhereItStarts) {
   const TempFolder folder;
   testing::lpips_file(testing::narrow_lpips_weights(2)).write(folder / "weights");
@@ -490,6 +505,14 @@ TEST(Memory, AnEnvironmentMapCounts) {
   const NetworkOptions& network = options.deform.environment_network;
   EXPECT_GT(map - none, int64_t{3000} * 4 * network.width * network.depth) << "the field at every pixel";
   EXPECT_GT(large - map, int64_t{6} * 1024 * 1024 * 3 * 4 * 4) << "parameter, gradient and moments";
+}
+
+TEST(Memory, SamplesCountAsPixels) {
+  TrainOptions options = preset("paper");
+  options.specular = Specular::none;
+  const int64_t more_pixels = unlimited_forecast({options, Device::cpu, 4 * 3000, 1});
+  options.render.samples = 2;
+  EXPECT_EQ(unlimited_forecast({options, Device::cpu, 3000, 1}), more_pixels);
 }
 
 TEST(Memory, TheLargestViewOfEitherSplitCounts) {

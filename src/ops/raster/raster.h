@@ -74,7 +74,7 @@ struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
   CameraGradient<T> camera;
   bool wants_camera = true;  // false: the camera's gradient is left at zero
-  // M, the density-control signal (method §3.6): the norm of dL/d(projected centre) in normalised device
+  // M, the density-control signal (method §3.7): the norm of dL/d(projected centre) in normalised device
   // units (pixels times half the image size, as 2DGS), low-pass part included. The reference leaves it empty.
   Tensor<T> screen_gradient;
 };

@@ -1,0 +1,129 @@
+#include "render/samples.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "render/cloud.h"
+#include "support/gradients.h"
+
+namespace traceflow {
+namespace {
+
+using testing::random_tensor;
+
+constexpr int per_side = 3;
+
+std::vector<Tensor<float>*> layers_of(auto& o) {
+  return {&o.colour, &o.alpha, &o.tint, &o.silhouette, &o.normal, &o.depth, &o.median_depth, &o.distortion};
+}
+
+raster::Output random_layers(int64_t height, int64_t width, Random& random) {
+  raster::Output o;
+  for (Tensor<float>* layer : layers_of(o)) {
+    const bool vectors = layer == &o.colour || layer == &o.normal;
+    const Shape shape = vectors ? Shape{height, width, 3} : Shape{height, width};
+    *layer = random_tensor<float>(shape, random, 0.2, 1);
+  }
+  return o;
+}
+
+// A picture of several samples a pixel is the mean of pictures whose pixels lie between.
+TEST(Samples, AreTheMeanOfPicturesThatLieBetween) {
+  Fixture f;
+  f.request.specular = false;
+  RenderOptions options;
+  options.low_pass = false;  // it is as wide as a sample
+  Tensor<float> mean({f.request.camera.height, f.request.camera.width, 3});
+  for (int k = 0; k < per_side * per_side; ++k) {
+    FrameRequest moved = f.request;
+    moved.camera.centre_x += (1 - static_cast<float>(k % per_side)) / per_side;
+    moved.camera.centre_y += (1 - static_cast<float>(k / per_side)) / per_side;
+    const Tensor<float> colour = Renderer(options).forward(f.scene, moved).colour;
+    for (int64_t i = 0; i < mean.size(); ++i) mean[i] += colour[i] / (per_side * per_side);
+  }
+  options.samples = per_side;
+  Renderer renderer(options);
+  const Frame& frame = renderer.forward(f.scene, f.request);
+  ASSERT_EQ(frame.colour.shape(), mean.shape());
+  double error = 0, change = 0;
+  options.samples = 1;
+  const Tensor<float> one = Renderer(options).forward(f.scene, f.request).colour;
+  for (int64_t i = 0; i < mean.size(); ++i) {
+    error += std::abs(frame.colour[i] - mean[i]);
+    change += std::abs(one[i] - mean[i]);
+  }
+  EXPECT_LT(error, 1e-3 * change);
+}
+
+TEST(Samples, TheirGradientAgreesWithCentralDifferences) {
+  Random random(4);
+  raster::Output samples = random_layers(2 * per_side, 4 * per_side, random), picture;
+  samples.median_depth[5] = samples.median_depth[7] = 0;  // as where nothing is opaque
+  samples::average(samples, per_side, picture);
+  raster::OutputGradient by_picture, gradient;
+  const auto of_picture = layers_of(picture), weights = layers_of(by_picture);
+  for (size_t k = 0; k < weights.size(); ++k)
+    *weights[k] = random_tensor<float>(of_picture[k]->shape(), random, -1, 1);
+  samples::average_backward(samples, picture, per_side, by_picture, gradient);
+
+  const auto of_samples = layers_of(samples), found = layers_of(gradient);
+  const auto value = [&] {
+    samples::average(samples, per_side, picture);
+    double sum = 0;
+    for (size_t k = 0; k < weights.size(); ++k) {
+      for (int64_t i = 0; i < weights[k]->size(); ++i) sum += double{(*weights[k])[i]} * (*of_picture[k])[i];
+    }
+    return sum;
+  };
+  constexpr float step = 0.01F;
+  for (size_t k = 0; k < found.size(); ++k) {
+    ASSERT_EQ(found[k]->shape(), of_samples[k]->shape()) << k;
+    for (int64_t i = 0; i < found[k]->size(); ++i) {
+      float& number = (*of_samples[k])[i];
+      if (number == 0) continue;
+      const float before = number;
+      number = before + step;
+      const double above = value();
+      number = before - step;
+      const double below = value();
+      number = before;
+      EXPECT_NEAR((*found[k])[i], (above - below) / (2 * step), 2e-4) << k << " " << i;
+    }
+  }
+}
+
+TEST(Samples, WhatHasNoGradientGetsNone) {
+  Random random(5);
+  const raster::Output samples = random_layers(per_side, per_side, random);
+  raster::Output picture;
+  samples::average(samples, per_side, picture);
+  raster::OutputGradient by_picture, gradient;
+  by_picture.colour = random_tensor<float>(picture.colour.shape(), random, -1, 1);
+  samples::average_backward(samples, picture, per_side, by_picture, gradient);
+  for (const Tensor<float>* layer : layers_of(gradient)) EXPECT_EQ(layer->empty(), layer != &gradient.colour);
+}
+
+// Where nothing is drawn.
+TEST(Samples, OfNothingHaveNoDepth) {
+  raster::Output samples, picture;
+  for (Tensor<float>* layer : layers_of(samples)) {
+    const bool vectors = layer == &samples.colour || layer == &samples.normal;
+    layer->reset(vectors ? Shape{per_side, per_side, 3} : Shape{per_side, per_side});
+  }
+  samples::average(samples, per_side, picture);
+  raster::OutputGradient by_picture, gradient;
+  for (Tensor<float>* layer : {&by_picture.depth, &by_picture.median_depth}) {
+    layer->reset({1, 1});
+    layer->fill(1);
+  }
+  samples::average_backward(samples, picture, per_side, by_picture, gradient);
+  EXPECT_EQ(picture.depth[0], 0);
+  EXPECT_EQ(picture.median_depth[0], 0);
+  for (const Tensor<float>* layer : {&gradient.depth, &gradient.median_depth, &gradient.alpha}) {
+    for (const float v : layer->values()) EXPECT_EQ(v, 0);
+  }
+}
+
+}  // namespace
+}  // namespace traceflow
