@@ -62,6 +62,13 @@ int Schedule::samples(int iteration) const {
   return iteration >= mark(options_.schedule.samples_from) ? options_.render.samples : 1;
 }
 
+RenderOptions Schedule::render_for_tracking(int iteration) const {
+  RenderOptions render = options_.render;
+  render.samples = 1;
+  render.low_pass = render.low_pass && samples(iteration) == 1;
+  return render;
+}
+
 int Schedule::sh_degree(int iteration, int start, int limit) const {
   return std::clamp((iteration - start) / interval(options_.schedule.sh_every), 0, limit);
 }

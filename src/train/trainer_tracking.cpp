@@ -80,7 +80,9 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
   return now;
 }
 
-Tracker Trainer::make_tracker() const { return {options_.deform.track, options_.render, capture_}; }
+Tracker Trainer::make_tracker() const {
+  return {options_.deform.track, schedule_.render_for_tracking(iteration_), capture_};
+}
 
 Surfels Trainer::follow_bodies(const Tracking& now) {
   constexpr int64_t strays_every = 5;  // times

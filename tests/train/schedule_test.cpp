@@ -82,6 +82,19 @@ TEST(Schedule, PixelsHaveSeveralSamplesTowardsTheEnd) {
   EXPECT_EQ(Schedule(options).samples(450), 3);
 }
 
+TEST(Schedule, TheTrackerDrawsSurfelsAsWideAsTheyAreTrained) {
+  TrainOptions options = preset("cpu");
+  options.iterations = 600;
+  options.schedule.samples_from = 45000;
+  options.render.samples = 2;
+  const Schedule schedule(options);
+  EXPECT_TRUE(schedule.render_for_tracking(449).low_pass);
+  EXPECT_FALSE(schedule.render_for_tracking(450).low_pass);
+  EXPECT_EQ(schedule.render_for_tracking(450).samples, 1);
+  options.render.samples = 1;
+  EXPECT_TRUE(Schedule(options).render_for_tracking(450).low_pass);
+}
+
 TEST(Schedule, PhaseTwoFreezesTheMainSurfelsButTheirTint) {
   const Trainable t = Schedule(paper()).trainable(10000);
   EXPECT_FALSE(t.main);
