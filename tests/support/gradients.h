@@ -28,14 +28,14 @@ std::vector<T> list_of(const Tensor<T>& tensor) {
 }
 
 // d value() / d input[i] for every i; value reads `input`.
-template <class F>
-Tensor<double> central_differences(Tensor<double>& input, F&& value, double step = 1e-5) {
+template <class T, class F>
+Tensor<double> central_differences(Tensor<T>& input, F&& value, double step = 1e-5) {
   Tensor<double> gradient(input.shape());
   for (int64_t i = 0; i < input.size(); ++i) {
-    const double kept = input[i];
-    input[i] = kept + step;
+    const T kept = input[i];
+    input[i] = static_cast<T>(kept + step);
     const double above = value();
-    input[i] = kept - step;
+    input[i] = static_cast<T>(kept - step);
     const double below = value();
     input[i] = kept;
     gradient[i] = (above - below) / (2 * step);
