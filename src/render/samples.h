@@ -3,7 +3,7 @@
 #include "math/camera.h"
 #include "ops/raster/raster.h"
 
-// Several samples a pixel: the surfels are drawn for a picture n times as wide and as high, whose layers are
+// Supersampling (method §3.6): the surfels are drawn for a picture n times as wide and as high, whose layers are
 // averaged.
 namespace traceflow::samples {
 

@@ -4,7 +4,7 @@
 
 #include "math/types.h"
 
-// One pixel and its samples, n along each side: sample rows of the picture lie n times as wide and as high.
+// One pixel and its n×n samples, which are pixels of a picture n times as wide and as high.
 namespace traceflow {
 
 struct SamplesOf {
