@@ -3,8 +3,8 @@
 #include "math/camera.h"
 #include "ops/raster/raster.h"
 
-// Supersampling (method §3.6): the surfels are drawn for a picture n times as wide and as high, whose layers are
-// averaged.
+// Supersampling (method §3.6): the surfels are drawn for a picture n times as wide and as high, whose layers
+// are averaged.
 namespace traceflow::samples {
 
 // The camera of that picture.
