@@ -26,6 +26,9 @@ struct FrameRequest {
   // Skip main surfels that lie outside the view by more than the scene's reach. Training does; a picture does
   // not need to.
   bool cull = false;
+  // Most samples along a pixel's side. Fewer than the photographs had (render/samples.h) are faster, and
+  // small surfels look larger.
+  int most_samples = 4;
   // The scene and the renderer's options are, unchanged, those of the last forward(), which nothing checks:
   // what is posed already as asked for here, and the tracer's BVH, are used again. The same picture, sooner.
   // Culling and a forward() for a backward() pose anew.
@@ -47,13 +50,15 @@ struct Frame {
   PosedSurfels environment;     // what was traced
   raster::Output raster;        // the rasterised layers; the silhouette when asked for
   Tensor<float> pseudo_normal;  // H×W×3 when asked for
-  surface::TracedPixels traced;
+  int samples = 1;              // along each side of a pixel (method §3.6)
+  surface::TracedPixels
+      traced;  // of the picture of the samples, which has so many times the rows and columns
   MirroredRays mirrored;
   Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
   Tensor<float> colour;         // H×W×3, the final image (method §6)
   Tensor<float> reach;          // one number: the largest distance by which the field moved a surfel of it
 
-  // The specular colours as an image on the CPU: H×W×3, black where nothing was traced.
+  // The specular colours as an image on the CPU: H×W×3, means over the traced samples, black where none was.
   Tensor<float> specular_image() const;
 };
 

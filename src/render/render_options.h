@@ -44,8 +44,7 @@ struct RenderOptions {
     v.field("near_plane", near_plane, "extents", "Nearest camera depth that is drawn (method §3.4).");
     v.field("far_plane", far_plane, "extents", "Far end of the distortion's depth mapping (method §3.5).");
     v.field("low_pass", low_pass, "", "Screen-space low-pass of 2DGS (method §3.2).");
-    v.field("samples", samples, "samples",
-            "Samples of the main surfels along each side of a pixel (method §3.6).");
+    v.field("samples", samples, "samples", "Samples along each side of a pixel (method §3.6).");
     v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
     v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
     v.field("transmittance_min", transmittance_min, "",

@@ -34,11 +34,16 @@ void find_reach(const Surfels& stored, Frame& frame) {
 }  // namespace
 
 Tensor<float> Frame::specular_image() const {
-  const Tensor<int32_t> pixel = traced.pixel.on(Device::cpu);
+  const Tensor<int32_t> sample = traced.pixel.on(Device::cpu);
   const Tensor<float> rays = specular_rays.on(Device::cpu);
+  const int64_t width = colour.dim(1), row = samples * width;
   Tensor<float> image(colour.shape());
-  for (int64_t k = 0; k < pixel.size(); ++k) {
-    store3(image.data() + 3 * int64_t{pixel[k]}, load3<float>(rays.row(k)));
+  std::vector<float> count(static_cast<size_t>(colour.dim(0) * width), 0.0F);
+  for (int64_t k = 0; k < sample.size(); ++k) {
+    const int64_t pixel = sample[k] / row / samples * width + sample[k] % row / samples;
+    float* mean = image.data() + 3 * pixel;
+    const float share = 1 / ++count[static_cast<size_t>(pixel)];
+    store3(mean, load3<float>(mean) + share * (load3<float>(rays.row(k)) - load3<float>(mean)));
   }
   return image;
 }
@@ -139,6 +144,9 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   const Device device = scene.device();
   frame_.camera = request.camera;
   frame_.drawn_with = options_.raster_options(scene.extent);
+  frame_.samples = keep_for_backward ? options_.samples
+                                     : samples::samples_for(request.camera, options_.samples, scene.focal,
+                                                            request.most_samples);
 
   // Choose the surfels that can show, and pose them.
   if (!request.reuse_pose) {
@@ -170,28 +178,28 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   if (reflects(scene, request)) {
     forward_specular(scene, request, keep_for_backward);
   }
-  shade::forward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.specular_rays,
-                 frame_.colour);
+  shade::forward(drawn().colour, drawn().tint, frame_.traced.pixel, frame_.specular_rays,
+                 has_several() ? sample_colour_ : frame_.colour);
+  if (has_several()) samples::average(sample_colour_, frame_.samples, frame_.colour);
   return frame_;
 }
 
 void Renderer::draw(const FrameRequest& request) {
-  if (options_.samples == 1) {
-    raster::forward(frame_.main, request.camera, frame_.drawn_with, frame_.raster, raster_saved_.get());
-    return;
-  }
-  raster::forward(frame_.main, samples::camera_of(request.camera, options_.samples), frame_.drawn_with,
-                  samples_, raster_saved_.get());
-  samples::average(samples_, options_.samples, frame_.raster);
+  raster::forward(frame_.main, camera_of_samples(request), frame_.drawn_with,
+                  has_several() ? samples_ : frame_.raster, raster_saved_.get());
+  if (has_several()) samples::average(samples_, frame_.samples, frame_.raster);
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
   MirroredRays& rays = frame_.mirrored;
-  surface::select_pixels(frame_.raster.alpha, frame_.raster.tint, frame_.raster.normal, options_.select,
-                         request.probes, request.probe_seed, frame_.traced);
-  surface::reflection_rays(request.camera, frame_.traced.pixel, frame_.raster.depth,
-                           frame_.raster.median_depth, frame_.raster.normal, options_.depth_ratio,
-                           rays.origins, rays.directions);
+  // As many probes in a picture whatever the samples.
+  surface::SelectOptions select = options_.select;
+  select.probe_share /= static_cast<float>(frame_.samples * frame_.samples);
+  surface::select_pixels(drawn().alpha, drawn().tint, drawn().normal, select, request.probes,
+                         request.probe_seed, frame_.traced);
+  surface::reflection_rays(camera_of_samples(request), frame_.traced.pixel, drawn().depth,
+                           drawn().median_depth, drawn().normal, options_.depth_ratio, rays.origins,
+                           rays.directions);
   if (scene.specular == Specular::environment_map) {
     reflection_map::forward(*scene.environment_map, rays.directions, request.time, request.deform_environment,
                             options_.precision, frame_.specular_rays, map_saved_);
@@ -206,63 +214,64 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
   rays.distance.swap(trace_output_.distance);
 }
 
-void Renderer::begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors) {
-  const Shape none{0};
-  const Shape image = frame_.raster.alpha.shape();
-  const Shape depths = faces || mirrors ? image : none;
+void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGradient& grad_frame,
+                                     bool with_geometry, CameraGradient<float>* grad_camera) {
+  const Shape none{0}, image = frame_.raster.alpha.shape();
   const Device device = frame_.raster.alpha.device();
-  grad_raster_.tint.place(device).reset(image);
-  grad_raster_.depth.place(device).reset(depths);
-  grad_raster_.median_depth.place(device).reset(depths);
-  grad_raster_.normal.place(device).reset(mirrors ? frame_.raster.normal.shape() : none);
-  grad_raster_.alpha = grad_frame.alpha;
-  grad_raster_.silhouette = grad_frame.silhouette;
-  grad_raster_.distortion = grad_frame.distortion;
-  if (!grad_frame.normal.empty()) grad_raster_.normal = grad_frame.normal;
-  if (!grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
+  const bool faces = with_geometry && !grad_frame.pseudo_normal.empty();
+  for (Tensor<float>* depth : {&grad_raster_.depth, &grad_raster_.median_depth})
+    depth->place(device).reset(faces ? image : none);
+  const Tensor<float> nothing(none, device);
+  const auto wanted = [&](const Tensor<float>& layer) -> const Tensor<float>& {
+    return with_geometry ? layer : nothing;
+  };
+  grad_raster_.alpha = wanted(grad_frame.alpha);
+  grad_raster_.silhouette = wanted(grad_frame.silhouette);
+  grad_raster_.distortion = wanted(grad_frame.distortion);
+  grad_raster_.normal = wanted(grad_frame.normal);
+  if (with_geometry && !grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
+  if (faces) {
+    surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
+                                     frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,
+                                     grad_raster_.depth, grad_raster_.median_depth, grad_camera);
+  }
+  if (has_several()) {
+    for (Tensor<float>* shaded : {&grad_raster_.colour, &grad_raster_.tint})
+      shaded->place(device).resize(none);
+    samples::average_backward(samples_, frame_.raster, frame_.samples, grad_raster_, grad_samples_);
+  }
+  raster::OutputGradient& grad = grad_drawn();
+  grad.tint.place(device).reset(drawn().tint.shape());
+  if (!with_geometry || frame_.traced.pixel.empty()) return;
+  // Mirrored rays will add to these.
+  if (grad.normal.empty()) grad.normal.place(device).reset(drawn().normal.shape());
+  for (Tensor<float>* depth : {&grad.depth, &grad.median_depth})
+    if (depth->empty()) depth->place(device).reset(drawn().depth.shape());
 }
 
 void Renderer::backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                         const FrameGradient& grad_frame, SceneGradient& gradient) {
   const Field* field = field_if(scene.main_field, request.deform_main);
-  const bool faces = trainable.main && !grad_frame.pseudo_normal.empty();
-  begin_raster_gradient(grad_frame, faces, trainable.main && !frame_.traced.pixel.empty());
+  begin_raster_gradient(request, grad_frame, trainable.main, trainable.camera ? &gradient.camera : nullptr);
+  raster::OutputGradient& grad = grad_drawn();
 
   // Shade.
-  shade::backward(frame_.raster.colour, frame_.raster.tint, frame_.traced.pixel, frame_.traced.weight,
-                  frame_.specular_rays, grad_frame.colour, grad_raster_.colour, grad_raster_.tint,
-                  grad_trace_.colour);
+  if (has_several()) samples::average_backward(grad_frame.colour, frame_.samples, grad_sample_colour_);
+  shade::backward(drawn().colour, drawn().tint, frame_.traced.pixel, frame_.traced.weight,
+                  frame_.specular_rays, has_several() ? grad_sample_colour_ : grad_frame.colour, grad.colour,
+                  grad.tint, grad_trace_.colour);
   // Trace and reflect.
   if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, gradient);
   if (frame_.main.count() == 0 || !(trainable.main || trainable.tint || trainable.main_field ||
                                     trainable.main_motion || trainable.main_nodes))
     return;
 
-  // With the geometry frozen only the tint's gradient is wanted (method §7.2).
-  if (!trainable.main) {
-    for (Tensor<float>* unused :
-         {&grad_raster_.colour, &grad_raster_.silhouette, &grad_raster_.normal, &grad_raster_.depth,
-          &grad_raster_.median_depth, &grad_raster_.alpha, &grad_raster_.distortion}) {
-      unused->resize({0});
-    }
-  }
-  // Surface.
-  if (faces) {
-    surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
-                                     frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,
-                                     grad_raster_.depth, grad_raster_.median_depth,
-                                     trainable.camera ? &gradient.camera : nullptr);
-  }
-  // Rasterise.
-  if (options_.depth_ratio == 0) grad_raster_.median_depth.resize({0});
+  // Rasterise. With the geometry frozen only the tint's gradient is wanted (method §7.2).
+  if (!trainable.main) grad.colour.resize({0});
+  if (options_.depth_ratio == 0) grad.median_depth.resize({0});
   grad_raster_input_.wants_camera = trainable.camera;
-  const bool has_several = options_.samples > 1;
-  if (has_several) {
-    samples::average_backward(samples_, frame_.raster, options_.samples, grad_raster_, grad_samples_);
-  }
-  raster::backward(frame_.main, samples::camera_of(request.camera, options_.samples),
-                   options_.raster_options(scene.extent), *raster_saved_,
-                   has_several ? grad_samples_ : grad_raster_, grad_raster_input_);
+  raster::backward(frame_.main, camera_of_samples(request), options_.raster_options(scene.extent),
+                   *raster_saved_, grad, grad_raster_input_);
   parallel_for(scene.device(), "render: add gradients of positions", grad_frame.main_position.size(),
                AddNumbers{grad_frame.main_position.data(), grad_raster_input_.surfels.position.data()});
   gradient.camera.camera_from_world += grad_raster_input_.camera.camera_from_world;
@@ -312,10 +321,11 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
     }
   }
   if (!trainable.main) return;
-  surface::reflection_rays_backward(
-      request.camera, frame_.traced.pixel, frame_.raster.depth, frame_.raster.median_depth,
-      frame_.raster.normal, options_.depth_ratio, *grad_origins, *grad_directions, grad_raster_.depth,
-      grad_raster_.median_depth, grad_raster_.normal, trainable.camera ? &gradient.camera : nullptr);
+  raster::OutputGradient& grad = grad_drawn();
+  surface::reflection_rays_backward(camera_of_samples(request), frame_.traced.pixel, drawn().depth,
+                                    drawn().median_depth, drawn().normal, options_.depth_ratio, *grad_origins,
+                                    *grad_directions, grad.depth, grad.median_depth, grad.normal,
+                                    trainable.camera ? &gradient.camera : nullptr);
 }
 
 }  // namespace traceflow

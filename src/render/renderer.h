@@ -7,6 +7,7 @@
 #include "render/frame.h"
 #include "render/reflection_map.h"
 #include "render/render_options.h"
+#include "render/samples.h"
 
 namespace traceflow {
 
@@ -46,12 +47,20 @@ class Renderer {
   void pose_main(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
   // With the tracer's BVH.
   void pose_environment(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
-  // The rasterised layers, at the means of a pixel's samples.
+  // The rasterised layers, at the samples and averaged over a pixel's.
   void draw(const FrameRequest& request);
+  bool has_several() const { return frame_.samples > 1; }  // samples in a pixel
+  Camera<float> camera_of_samples(const FrameRequest& request) const {
+    return samples::camera_of(request.camera, frame_.samples);
+  }
+  // The layers at the samples, which are the pixels where each has one, and their gradient.
+  const raster::Output& drawn() const { return has_several() ? samples_ : frame_.raster; }
+  raster::OutputGradient& grad_drawn() { return has_several() ? grad_samples_ : grad_raster_; }
   void forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
-  // Starts the gradient of the rasterised layers; those that nothing asks for stay empty. faces, mirrors:
-  // whether gradients of pseudo-normals and of mirrored rays will be added.
-  void begin_raster_gradient(const FrameGradient& grad_frame, bool faces, bool mirrors);
+  // Starts the gradient of the rasterised layers at the samples with those of the frame's layers, but for its
+  // colour. Where geometry does not train, that of the tint alone, and others stay empty.
+  void begin_raster_gradient(const FrameRequest& request, const FrameGradient& grad_frame, bool with_geometry,
+                             CameraGradient<float>* grad_camera);
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                          SceneGradient& gradient);
   bool reflects(const Scene& scene, const FrameRequest& request) const;
@@ -68,8 +77,10 @@ class Renderer {
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;
   reflection_map::Saved map_saved_;
-  raster::Output samples_;  // where a pixel has several
-  Tensor<uint8_t> drawn_;   // which posed surfels were drawn
+  raster::Output samples_;       // where a pixel has several
+  Tensor<float> sample_colour_;  // these shaded, and its gradient
+  Tensor<float> grad_sample_colour_;
+  Tensor<uint8_t> drawn_;  // which posed surfels were drawn
 
   raster::OutputGradient grad_raster_, grad_samples_;
   raster::InputGradient grad_raster_input_;

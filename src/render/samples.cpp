@@ -1,5 +1,8 @@
 #include "render/samples.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "base/parallel.h"
 #include "render/samples_kernels.h"
 
@@ -25,18 +28,6 @@ Shape shape_of_picture(const Shape& samples, int per_side) {
 int64_t channels(const Tensor<float>& layer) { return layer.shape().rank() == 3 ? layer.dim(2) : 1; }
 int64_t pixels(const Tensor<float>& layer) { return layer.dim(0) * layer.dim(1); }
 
-void average_layer(const Tensor<float>& samples, int per_side, Tensor<float>& picture) {
-  const Device device = samples.device();
-  if (samples.empty()) {
-    picture.place(device).resize({0});
-    return;
-  }
-  picture.place(device).resize(shape_of_picture(samples.shape(), per_side));
-  parallel_for(
-      device, what, pixels(picture),
-      AverageSamples{samples_of(picture, per_side), channels(picture), samples.data(), picture.data()});
-}
-
 // device: where the samples are, since a gradient that is empty may be anywhere.
 void spread_layer(Device device, const Tensor<float>& picture, int per_side, Tensor<float>& samples) {
   if (picture.empty()) {
@@ -51,6 +42,30 @@ void spread_layer(Device device, const Tensor<float>& picture, int per_side, Ten
 
 }  // namespace
 
+void average(const Tensor<float>& samples, int per_side, Tensor<float>& picture) {
+  const Device device = samples.device();
+  if (samples.empty()) {
+    picture.place(device).resize({0});
+    return;
+  }
+  picture.place(device).resize(shape_of_picture(samples.shape(), per_side));
+  parallel_for(
+      device, what, pixels(picture),
+      AverageSamples{samples_of(picture, per_side), channels(picture), samples.data(), picture.data()});
+}
+
+void average_backward(const Tensor<float>& grad_picture, int per_side, Tensor<float>& grad_samples) {
+  spread_layer(grad_picture.device(), grad_picture, per_side, grad_samples);
+}
+
+int samples_for(const Camera<float>& camera, int per_side, float focal, int most) {
+  constexpr float enough = 0.1F;
+  if (focal <= 0) return std::min(per_side, most);
+  const float wanted = static_cast<float>(per_side) * focal / std::min(camera.focal_x, camera.focal_y);
+  const float rounded = std::ceil(wanted * (1 - enough));
+  return rounded < static_cast<float>(most) ? std::max(1, static_cast<int>(rounded)) : most;
+}
+
 Camera<float> camera_of(const Camera<float>& camera, int per_side) {
   const auto n = static_cast<float>(per_side);
   Camera<float> fine = camera;
@@ -61,12 +76,12 @@ Camera<float> camera_of(const Camera<float>& camera, int per_side) {
 }
 
 void average(const raster::Output& samples, int per_side, raster::Output& picture) {
-  average_layer(samples.colour, per_side, picture.colour);
-  average_layer(samples.alpha, per_side, picture.alpha);
-  average_layer(samples.tint, per_side, picture.tint);
-  average_layer(samples.silhouette, per_side, picture.silhouette);
-  average_layer(samples.normal, per_side, picture.normal);
-  average_layer(samples.distortion, per_side, picture.distortion);
+  average(samples.colour, per_side, picture.colour);
+  average(samples.alpha, per_side, picture.alpha);
+  average(samples.tint, per_side, picture.tint);
+  average(samples.silhouette, per_side, picture.silhouette);
+  average(samples.normal, per_side, picture.normal);
+  average(samples.distortion, per_side, picture.distortion);
   const Device device = samples.alpha.device();
   const SamplesOf of = samples_of(picture.alpha, per_side);
   picture.depth.place(device).resize(picture.alpha.shape());

@@ -226,6 +226,7 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
   scene.specular = specular_from(json["specular"]);
   scene.normalisation = {json["centre"].vector(), json["scale"].number(smallest, largest)};
   scene.extent = static_cast<float>(json["extent"].number(smallest, largest));
+  if (json.has("focal")) scene.focal = static_cast<float>(json["focal"].number(0, largest));
   scene.main_reach[0] = static_cast<float>(json["main_reach"].number(0, largest));
   scene.main = get_surfels("scene/main/", file);
   if (json["environment"].yes()) scene.environment = get_surfels("scene/environment/", file);
@@ -254,6 +255,7 @@ void put_scene(const Scene& scene, Safetensors& file) {
   json["centre"] = std::array<double, 3>{centre.x, centre.y, centre.z};
   json["scale"] = scene.normalisation.scale;
   json["extent"] = scene.extent;
+  json["focal"] = scene.focal;
   json["main_reach"] = scene.main_reach.on(Device::cpu)[0];
   json["environment"] = scene.environment.count() > 0;
   json["map"] = scene.environment_map.has_value();

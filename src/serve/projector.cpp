@@ -177,7 +177,8 @@ Tensor<uint8_t> Projector::picture(const Look& look, const FrameRequest& request
 
 void Projector::answer(const Job& job, const FrameJob& frame, const Stage& stage) {
   const Clock::time_point start = Clock::now();
-  const FrameRequest request = request_for(frame.look, stage, frame.coarseness.divisor);
+  FrameRequest request = request_for(frame.look, stage, frame.coarseness.divisor);
+  if (!frame.coarseness.final) request.most_samples = 1;
   check_memory_for(request, stage);
   const std::string bytes =
       jpeg_bytes(picture(frame.look, request, stage, painters_[job.guest]), frame.coarseness.quality);

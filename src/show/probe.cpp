@@ -57,7 +57,7 @@ std::optional<ProbeResult> probe(Renderer& renderer, const Scene& scene, const F
   result.colour = vector(frame.colour);
   result.diffuse = vector(frame.raster.colour);
   if (!frame.traced.pixel.empty()) {
-    result.specular = vector(frame.specular_rays);
+    result.specular = vector(frame.specular_image());
     result.mirrored = mirrored_of(frame.mirrored);
   }
   return result;

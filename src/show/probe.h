@@ -8,7 +8,7 @@ namespace traceflow::show {
 
 // What the ray through a pixel meets. Lengths in scene units, world axes.
 struct ProbeResult {
-  // The ray as the surface mirrors it.
+  // The ray as the surface mirrors it; of several samples in a pixel the first that is traced.
   struct Mirrored {
     Vec3<float> direction;  // unit
     float alpha =

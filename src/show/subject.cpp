@@ -20,6 +20,7 @@ namespace {
 
 // Names of the notes in a .ply's comments.
 constexpr const char* extent_note = "extent";
+constexpr const char* focal_note = "focal";
 constexpr const char* render_note = "render";
 constexpr const char* environment_note = "environment";
 constexpr const char* main_file = "main.ply";
@@ -30,13 +31,16 @@ std::string note(const PlyScene& file, const char* key) {
   return found == file.notes.end() ? "" : found->second;
 }
 
-float read_extent(const std::filesystem::path& path, const std::string& text) {
-  float extent = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), extent);
-  if (error != std::errc() || end != text.data() + text.size() || !(extent > 0) || !std::isfinite(extent)) {
-    throw InputError(path.string(), "comment traceflow extent", text, "a positive number");
+// The number in a note; 0 where the note is not there.
+float length_in(const PlyScene& file, const char* key, const std::filesystem::path& path) {
+  const std::string text = note(file, key);
+  if (text.empty()) return 0;
+  float length = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), length);
+  if (error != std::errc() || end != text.data() + text.size() || !(length > 0) || !std::isfinite(length)) {
+    throw InputError(path.string(), fmt::format("comment traceflow {}", key), text, "a positive number");
   }
-  return extent;
+  return length;
 }
 
 // The environment's file as the note names it: a name in the same folder, and nothing else.
@@ -78,9 +82,8 @@ Subject read_ply_subject(const std::filesystem::path& path, const std::filesyste
   PlyScene file = read_ply(path);
   Subject subject;
   subject.scene.specular = Specular::none;
-  subject.scene.extent = 0;
-  if (const std::string text = note(file, extent_note); !text.empty())
-    subject.scene.extent = read_extent(path, text);
+  subject.scene.extent = length_in(file, extent_note, path);
+  subject.scene.focal = length_in(file, focal_note, path);
   if (const std::string text = note(file, render_note); !text.empty()) {
     options_from_json(text, option_fields(subject.render), path.string() + ": comment traceflow render");
     subject.render.validate();
@@ -132,6 +135,7 @@ std::vector<std::filesystem::path> export_subject(const Subject& subject, std::o
                          subject.render.precision);
     undo_normalisation(scene.normalisation, file.surfels);
     file.notes[extent_note] = fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale));
+    if (scene.focal > 0) file.notes[focal_note] = fmt::format("{}", scene.focal);
     return file;
   };
   const bool reflects =

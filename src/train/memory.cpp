@@ -93,16 +93,18 @@ int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t
   const SetShape main_set{o.initial.sh_degree, o.deform.main, o.deform.network};
   const SetShape environment_set{o.initial.environment_sh_degree, o.deform.environment,
                                  o.deform.environment_network};
-  int64_t bytes =
-      main * bytes_per_surfel(main_set) + environment * bytes_per_surfel(environment_set) +
-      field_bytes(main_set, main, kept) + field_bytes(environment_set, mapped ? pixels : environment, kept) +
-      4 * planes_of_a_frame * samples * pixels + o.capture.cache_mebibytes * mebibyte + 64 * mebibyte;
+  int64_t bytes = main * bytes_per_surfel(main_set) + environment * bytes_per_surfel(environment_set) +
+                  field_bytes(main_set, main, kept) +
+                  field_bytes(environment_set, mapped ? samples * pixels : environment, kept) +
+                  4 * planes_of_a_frame * samples * pixels + o.capture.cache_mebibytes * mebibyte +
+                  64 * mebibyte;
   if (mapped) bytes += 4 * copies_of_parameters * 6 * 3 * int64_t{o.initial.map_size} * o.initial.map_size;
   if (o.deform.kind == "nodes") bytes += lighting_bytes(o.deform.lighting, run.times);
   if (o.loss.lpips > 0) bytes += lpips::network_bytes + pixels * lpips::gradient_bytes_per_pixel;
-  if (run.device == Device::cpu) return bytes + (traced ? pixels * bytes_per_ray : 0);
+  if (run.device == Device::cpu) return bytes + (traced ? samples * pixels * bytes_per_ray : 0);
   bytes += device_bytes_of_ops + main * samples * entries_per_surfel * device_bytes_per_entry;
-  if (traced) bytes += environment * device_bytes_per_disk + pixels * device_bytes_per_ray + kept.hit_bytes;
+  if (traced)
+    bytes += environment * device_bytes_per_disk + samples * pixels * device_bytes_per_ray + kept.hit_bytes;
   return bytes;
 }
 

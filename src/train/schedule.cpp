@@ -180,9 +180,15 @@ double Schedule::map_rate(int iteration) const {
   return optimize::log_linear(options_.rates.map, options_.rates.map_end, iteration, options_.iterations);
 }
 
+namespace {
+
+int last_of(int64_t iterations) { return static_cast<int>(std::max<int64_t>(0, iterations - 1)); }
+
+}  // namespace
+
 FrameRequest picture_request(const TrainOptions& options, int64_t iterations) {
   const Schedule schedule(options);
-  const int last = static_cast<int>(std::max<int64_t>(0, iterations - 1));
+  const int last = last_of(iterations);
   FrameRequest request;
   request.sh_degree_main = schedule.sh_degree_main(last);
   request.sh_degree_environment = schedule.sh_degree_environment(last);
@@ -190,6 +196,12 @@ FrameRequest picture_request(const TrainOptions& options, int64_t iterations) {
   request.deform_environment = schedule.deforms_environment(last);
   request.specular = schedule.phase(last) != Phase::diffuse;
   return request;
+}
+
+RenderOptions picture_render(const TrainOptions& options, int64_t iterations) {
+  RenderOptions render = options.render;
+  render.samples = Schedule(options).samples(last_of(iterations));
+  return render;
 }
 
 }  // namespace traceflow

@@ -79,5 +79,7 @@ class Schedule {
 // The parts of the scene that take part in a picture after so many iterations: those that the last one
 // trained with. A run stopped early has parts that never saw a photograph.
 FrameRequest picture_request(const TrainOptions& options, int64_t iterations);
+// And how they are drawn.
+RenderOptions picture_render(const TrainOptions& options, int64_t iterations);
 
 }  // namespace traceflow

@@ -76,7 +76,9 @@ class Graph {
                             pseudo_);
     specular_.reset({0, 3});
     if (s_.specular) forward_specular();
-    shade::forward(raster_.colour, raster_.tint, tensor_of(pixels_), specular_, colour_);
+    Tensor<double> shaded;
+    shade::forward(sampled_.colour, sampled_.tint, tensor_of(pixels_), specular_, shaded);
+    colour_ = mean(shaded);
     return losses();
   }
 
@@ -88,18 +90,20 @@ class Graph {
     g.camera = {};
     grad_.depth.reset(raster_.depth.shape());
     grad_.median_depth.reset(raster_.depth.shape());
-    grad_.tint.reset(raster_.tint.shape());
-    const std::vector<float> weights(pixels_.size(), 1.0F);
-    Tensor<double> grad_specular;
-    shade::backward(raster_.colour, raster_.tint, tensor_of(pixels_), tensor_of(weights), specular_,
-                    grad_colour_, grad_.colour, grad_.tint, grad_specular);
-    if (s_.specular) backward_specular(grad_specular, g);
     surface::pseudo_normals_backward(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha,
                                      s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth,
                                      &g.camera);
+    grad_sampled_ = gradient_of_samples();
+    grad_sampled_.tint.reset(sampled_.tint.shape());
+    const std::vector<float> weights(pixels_.size(), 1.0F);
+    Tensor<double> grad_specular;
+    shade::backward(sampled_.colour, sampled_.tint, tensor_of(pixels_), tensor_of(weights), specular_,
+                    shared_among_samples(grad_colour_, nullptr, nullptr, s_.samples), grad_sampled_.colour,
+                    grad_sampled_.tint, grad_specular);
+    if (s_.specular) backward_specular(grad_specular, g);
     raster::BasicInputGradient<double> input;
-    raster::backward_reference(main_, camera_of_samples(p_.camera, s_.samples), s_.raster,
-                               gradient_of_samples(), input);
+    raster::backward_reference(main_, camera_of_samples(p_.camera, s_.samples), s_.raster, grad_sampled_,
+                               input);
     g.camera.camera_from_world += input.camera.camera_from_world;
     g.camera.position += input.camera.position;
     deform::backward_reference(p_.main, s_.deform ? &p_.main_field : nullptr, s_.main_points, s_.time,
@@ -107,21 +111,23 @@ class Graph {
   }
 
   void reflect() {
-    pixels_ = all_pixels(p_.camera);
-    surface::reflection_rays(p_.camera, tensor_of(pixels_), raster_.depth, raster_.median_depth,
-                             raster_.normal, s_.depth_ratio, origins_, directions_);
+    const Camera<double> camera = camera_of_samples(p_.camera, s_.samples);
+    pixels_ = all_pixels(camera);
+    surface::reflection_rays(camera, tensor_of(pixels_), sampled_.depth, sampled_.median_depth,
+                             sampled_.normal, s_.depth_ratio, origins_, directions_);
   }
   const Tensor<double>& directions() const { return directions_; }
 
  private:
+  Tensor<double> mean(const Tensor<double>& layer) const {
+    Tensor<double> sums = sum_of_samples(layer, nullptr, s_.samples);
+    for (double& v : sums.values()) v /= s_.samples * s_.samples;
+    return sums;
+  }
+
   void draw() {
     const int n = s_.samples;
     raster::forward_reference(main_, camera_of_samples(p_.camera, n), s_.raster, sampled_);
-    const auto mean = [&](const Tensor<double>& layer) {
-      Tensor<double> sums = sum_of_samples(layer, nullptr, n);
-      for (double& v : sums.values()) v /= n * n;
-      return sums;
-    };
     raster_.colour = mean(sampled_.colour);
     raster_.alpha = mean(sampled_.alpha);
     raster_.tint = mean(sampled_.tint);
@@ -138,11 +144,10 @@ class Graph {
     for (int64_t i = 0; i < medians_.size(); ++i) raster_.median_depth[i] /= medians_[i];
   }
 
+  // Of the picture's layers, without colour and tint.
   raster::BasicOutputGradient<double> gradient_of_samples() const {
     const int n = s_.samples;
     raster::BasicOutputGradient<double> g;
-    g.colour = shared_among_samples(grad_.colour, nullptr, nullptr, n);
-    g.tint = shared_among_samples(grad_.tint, nullptr, nullptr, n);
     g.normal = shared_among_samples(grad_.normal, nullptr, nullptr, n);
     g.distortion = shared_among_samples(grad_.distortion, nullptr, nullptr, n);
     g.depth = shared_among_samples(grad_.depth, &weights_, &sampled_.alpha, n);
@@ -193,9 +198,10 @@ class Graph {
                                  s_.environment_points, s_.time, input.surfels, g.environment,
                                  s_.deform ? &g.environment_field : nullptr);
     }
-    surface::reflection_rays_backward(p_.camera, tensor_of(pixels_), raster_.depth, raster_.median_depth,
-                                      raster_.normal, s_.depth_ratio, input.origins, input.directions,
-                                      grad_.depth, grad_.median_depth, grad_.normal, &g.camera);
+    surface::reflection_rays_backward(camera_of_samples(p_.camera, s_.samples), tensor_of(pixels_),
+                                      sampled_.depth, sampled_.median_depth, sampled_.normal, s_.depth_ratio,
+                                      input.origins, input.directions, grad_sampled_.depth,
+                                      grad_sampled_.median_depth, grad_sampled_.normal, &g.camera);
   }
 
   double losses() {
@@ -226,7 +232,7 @@ class Graph {
   std::vector<int32_t> pixels_;
   Tensor<double> pseudo_, origins_, directions_, moved_, specular_, colour_;
   Tensor<double> grad_colour_, grad_pseudo_;
-  raster::BasicOutputGradient<double> grad_;
+  raster::BasicOutputGradient<double> grad_, grad_sampled_;
 };
 
 }  // namespace

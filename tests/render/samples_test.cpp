@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "render/cloud.h"
@@ -28,10 +29,9 @@ raster::Output random_layers(int64_t height, int64_t width, Random& random) {
   return o;
 }
 
-// A picture of several samples a pixel is the mean of pictures whose pixels lie between.
+// A picture of several samples a pixel is the mean of pictures whose pixels lie between, reflections and all.
 TEST(Samples, AreTheMeanOfPicturesThatLieBetween) {
-  Fixture f;
-  f.request.specular = false;
+  const Fixture f;
   RenderOptions options;
   options.low_pass = false;  // it is as wide as a sample
   Tensor<float> mean({f.request.camera.height, f.request.camera.width, 3});
@@ -54,6 +54,34 @@ TEST(Samples, AreTheMeanOfPicturesThatLieBetween) {
     change += std::abs(one[i] - mean[i]);
   }
   EXPECT_LT(error, 1e-3 * change);
+}
+
+TEST(Samples, AreAsManyForAnAngleAsInTraining) {
+  Camera<float> camera;
+  camera.focal_y = 1e6F;
+  for (const auto& [focal, samples] :
+       {std::pair{50, 4}, {100, 4}, {150, 3}, {200, 2}, {215, 2}, {400, 1}, {4000, 1}}) {
+    camera.focal_x = static_cast<float>(focal);
+    EXPECT_EQ(samples::samples_for(camera, 2, 200, 4), samples) << focal;
+    EXPECT_EQ(samples::samples_for(camera, 2, 200, 1), 1);
+    EXPECT_EQ(samples::samples_for(camera, 2, 0, 4), 2) << "nobody knows the trained focal length";
+  }
+  camera.focal_x = 100;
+  EXPECT_EQ(samples::samples_for(camera, 1, 200, 4), 2) << "half as large as the photographs";
+}
+
+// Trained pictures have the options' samples whatever the camera; others as many for an angle.
+TEST(Samples, OfPicturesFollowTheFocalLength) {
+  Fixture f;
+  f.scene.focal = 2 * f.request.camera.focal_x;
+  Renderer renderer{RenderOptions{}};
+  EXPECT_EQ(renderer.forward(f.scene, f.request, true).samples, 1);
+  EXPECT_EQ(renderer.forward(f.scene, f.request).samples, 2);
+  RenderOptions two;
+  two.samples = 2;
+  f.request.most_samples = 2;
+  const Tensor<float> as_trained = Renderer(two).forward(f.scene, f.request, true).colour;
+  EXPECT_TRUE(std::ranges::equal(as_trained.values(), renderer.forward(f.scene, f.request).colour.values()));
 }
 
 TEST(Samples, TheirGradientAgreesWithCentralDifferences) {

@@ -14,10 +14,22 @@ void expect_near(const Vec3<float>& found, const Vec3<float>& expected, float to
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], tolerance) << what << ", component " << c;
 }
 
+// The first of a pixel's samples that the frame traced; as many as were traced where none is.
+int64_t first_traced(const Frame& frame, int x, int y) {
+  const int n = frame.samples, row = n * frame.camera.width;
+  const auto is_of_pixel = [&](int32_t sample) { return sample / row / n == y && sample % row / n == x; };
+  return std::ranges::find_if(frame.traced.pixel.values(), is_of_pixel) - frame.traced.pixel.values().begin();
+}
+
+class ProbeOfSamples : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(PerSide, ProbeOfSamples, ::testing::Values(1, 2));
+
 // The whole frame's layers are the oracle.
-TEST(Probe, FindsWhatTheFrameShows) {
+TEST_P(ProbeOfSamples, FindsWhatTheFrameShows) {
   const Fixture f;
-  Renderer renderer(RenderOptions{}), probing(RenderOptions{});
+  RenderOptions options;
+  options.samples = GetParam();
+  Renderer renderer(options), probing(options);
   const Frame& frame = renderer.forward(f.scene, f.request);
   const Tensor<float> specular = frame.specular_image();
   FrameRequest again = f.request;
@@ -40,10 +52,7 @@ TEST(Probe, FindsWhatTheFrameShows) {
         f.request.camera.ray_in_world(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
     expect_near(found->surface, f.request.camera.position + frame.raster.depth(y, x) * ray, 1e-4F, "surface");
     expect_near(found->normal, normalize(load3<float>(&frame.raster.normal(y, x, 0))), 1e-4F, "normal");
-    const auto* const traced = std::find(frame.traced.pixel.values().data(),
-                                         frame.traced.pixel.values().data() + frame.traced.pixel.size(),
-                                         y * f.request.camera.width + x);
-    const int64_t k = traced - frame.traced.pixel.data();
+    const int64_t k = first_traced(frame, x, y);
     ASSERT_EQ(found->mirrored.has_value(), k < frame.traced.pixel.size());
     if (!found->mirrored) continue;
     ++mirrored;

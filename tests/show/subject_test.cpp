@@ -50,6 +50,7 @@ Subject moving_subject() {
   scene.environment_field = random_field(residual::environment_outputs, random);
   scene.normalisation = {{10, -20, 5}, 0.125};
   scene.extent = 3;
+  scene.focal = 80;  // twice the camera's, so that its pictures have several samples
   subject.render.background = {0.25F, 0.5F, 0.75F};
   subject.render.depth_ratio = 0.5F;
   return subject;
@@ -83,6 +84,7 @@ Frame render(const Subject& subject, const Camera<float>& camera, float time) {
   copy.main = frame.main;
   copy.colour = frame.colour;
   copy.raster = frame.raster;
+  copy.samples = frame.samples;
   copy.traced = frame.traced;
   copy.specular_rays = frame.specular_rays;
   return copy;
@@ -158,6 +160,7 @@ TEST_F(Export, NotesFromAHostileFileAreRefused) {
   Random random(1);
   const Surfels surfels = random_surfels(3, 1, true, random);
   const std::vector<std::pair<std::string, std::string>> cases = {{"extent", "-1"},
+                                                                  {"focal", "0"},
                                                                   {"extent", "nan"},
                                                                   {"extent", "1x"},
                                                                   {"environment", "../other.ply"},

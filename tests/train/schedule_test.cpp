@@ -80,6 +80,8 @@ TEST(Schedule, PixelsHaveSeveralSamplesTowardsTheEnd) {
   options.render.samples = 3;
   EXPECT_EQ(Schedule(options).samples(449), 1);
   EXPECT_EQ(Schedule(options).samples(450), 3);
+  EXPECT_EQ(picture_render(options, 450).samples, 1) << "no photograph has been seen with more";
+  EXPECT_EQ(picture_render(options, 451).samples, 3);
 }
 
 TEST(Schedule, TheTrackerDrawsSurfelsAsWideAsTheyAreTrained) {

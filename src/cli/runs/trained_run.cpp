@@ -23,8 +23,8 @@ TrainedRun read_run(const std::filesystem::path& folder) {
   // What training alone must keep to is no matter of what it has made.
   run.options.render.validate();
   run.subject.scene = get_scene(file);
-  run.subject.render = run.options.render;
   run.iterations = std::llround(file.number("iteration"));
+  run.subject.render = picture_render(run.options, run.iterations);
   run.subject.request = picture_request(run.options, run.iterations);
   run.train_seconds = file.number("train_seconds");
   run.views = views_in(file);

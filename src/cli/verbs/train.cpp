@@ -138,7 +138,7 @@ class Watched {
 
  private:
   static serve::Stage stage_of(const Trainer& trainer) {
-    return {trainer.scene(), trainer.options().render,
+    return {trainer.scene(), picture_render(trainer.options(), trainer.iteration()),
             picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
   }
 
