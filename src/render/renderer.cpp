@@ -221,14 +221,17 @@ void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGra
   const bool faces = with_geometry && !grad_frame.pseudo_normal.empty();
   for (Tensor<float>* depth : {&grad_raster_.depth, &grad_raster_.median_depth})
     depth->place(device).reset(faces ? image : none);
-  const Tensor<float> nothing(none, device);
-  const auto wanted = [&](const Tensor<float>& layer) -> const Tensor<float>& {
-    return with_geometry ? layer : nothing;
+  const auto take = [&](const Tensor<float>& layer, Tensor<float>& gradient) {
+    if (with_geometry && !layer.empty()) {
+      gradient = layer;
+    } else {
+      gradient.place(device).resize(none);
+    }
   };
-  grad_raster_.alpha = wanted(grad_frame.alpha);
-  grad_raster_.silhouette = wanted(grad_frame.silhouette);
-  grad_raster_.distortion = wanted(grad_frame.distortion);
-  grad_raster_.normal = wanted(grad_frame.normal);
+  take(grad_frame.alpha, grad_raster_.alpha);
+  take(grad_frame.silhouette, grad_raster_.silhouette);
+  take(grad_frame.distortion, grad_raster_.distortion);
+  take(grad_frame.normal, grad_raster_.normal);
   if (with_geometry && !grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
   if (faces) {
     surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
