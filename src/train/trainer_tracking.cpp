@@ -91,6 +91,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
   constexpr int64_t strays_every = 5;  // times
   Surfels made;
   if (now.enters && now.key == 1 && see_whether_bodies_stand()) {
+    health_.expect_fall();
     let_strays_go(scene_.main_motion->keys() - 1);
     settle();
     return made;

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
@@ -81,6 +82,29 @@ TEST(StillBodies, AreNotFollowed) {
   const Followed resumed = followed(still, TrackOptions().still, end, true);
   EXPECT_FALSE(resumed.decided->follows);
   EXPECT_FALSE(resumed.moves);
+}
+
+// Views of the first time alone are drawn before it is decided, and then those of all times, of which the
+// scene knows nothing yet.
+TEST(StillBodies, ViewsOfAllTimesAreNoCollapse) {
+  const Tumbling at;
+  TrainOptions options = preset("cpu");
+  options.iterations = 2400;
+  options.specular = Specular::none;
+  options.initial.max_points = options.density.max_surfels = 2000;
+  options.deform.track.still = 1000;
+  options.collapse_decibels = 1;
+  Trainer trainer(options, at.capture,
+                  fs::path(::testing::TempDir()) / ("all_times_" + std::to_string(::getpid())));
+  constexpr int long_after = 60;
+  bool follows = true;
+  trainer.stream().listen([&](const events::Event& event) {
+    if (const auto* e = std::get_if<events::FollowingDecided>(&event)) follows = e->follows;
+    const auto* step = std::get_if<events::Step>(&event);
+    if (step && step->iteration > options.deform.track.warm_up + long_after) trainer.stop_soon();
+  });
+  EXPECT_EQ(trainer.run(std::atomic<bool>(false)).ending, events::Ending::interrupted);
+  EXPECT_FALSE(follows);
 }
 
 }  // namespace
