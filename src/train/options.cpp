@@ -45,7 +45,6 @@ TrainOptions cpu_preset() {
   o.deform.environment_network.width = 64;
   o.deform.environment_network.depth = 4;
   o.deform.environment_network.skip = 2;
-  o.render.samples = 2;
   o.render.precision = field::Precision::bf16;
   o.render.select.min_tint = 0.05F;
   o.render.select.probe_share = 0.05F;
