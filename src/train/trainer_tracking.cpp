@@ -72,9 +72,6 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
   const int64_t keys = scene_.main_motion->keys();
   const int since = iteration - std::min(track.warm_up, options_.iterations / least_share);
   if (since < 0) return {.goes_on = true};
-  if (bodies_stand_) {
-    return {.refines = schedule_.solves_poses_again(iteration, iteration - since), .key = keys - 1};
-  }
   const int64_t key = 1 + since / track.map_each;
   if (key < keys) return {.goes_on = true, .enters = since % track.map_each == 0, .key = key};
   Tracking now{.enters = key == keys && since % track.map_each == 0, .key = keys - 1};
@@ -90,19 +87,13 @@ Tracker Trainer::make_tracker() const {
 Surfels Trainer::follow_bodies(const Tracking& now) {
   constexpr int64_t strays_every = 5;  // times
   Surfels made;
-  if (now.enters && now.key == 1 && see_whether_bodies_stand()) {
-    health_.expect_fall();
-    let_strays_go(scene_.main_motion->keys() - 1);
-    settle();
-    return made;
-  }
   const bool has_come_to_the_end = now.enters && !now.goes_on;
   if (now.enters && now.goes_on) {
     follow(now.key);
     part_bodies(now.key);
     if (options_.deform.track.new_surface) made = new_surface(now.key);
   }
-  if ((now.refines && carries_ && !bodies_stand_) || has_come_to_the_end) follow_again();
+  if ((now.refines && carries_) || has_come_to_the_end) follow_again();
   if (now.refines && carries_) turn_priors();
   if (now.enters && (now.key % strays_every == 0 || has_come_to_the_end)) let_strays_go(now.key);
   if (has_come_to_the_end) settle();
@@ -123,7 +114,7 @@ void Trainer::settle() {
   }
   let_stand();
   if (!carries_) return;
-  if (!bodies_stand_) let_bend(misfits);
+  let_bend(misfits);
   if (options_.deform.lighting.cells > 0) let_light_change();
 }
 
@@ -144,7 +135,7 @@ void Trainer::keep_sizes(const Tracker& tracker, bool poses_are_known, Surfels& 
 }
 
 void Trainer::follow_again() {
-  if (options_.deform.track.true_poses) return;
+  if (options_.deform.track.true_poses || bodies_stand_) return;
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
@@ -164,19 +155,19 @@ void Trainer::follow_again() {
   scene_.lighting = lighting.on(device_);
 }
 
-bool Trainer::see_whether_bodies_stand() {
-  if (options_.deform.track.true_poses) return false;
+void Trainer::see_whether_bodies_stand() {
   const std::vector<double> misfits = silhouette_misfits();
-  if (misfits.empty()) return false;
+  if (misfits.empty()) return;
   const double misfit = mean_of(misfits);
   bodies_stand_ = misfit < options_.deform.track.still;
   stream_.emit(events::FollowingDecided{iteration_, !bodies_stand_, misfit});
-  return bodies_stand_;
 }
 
 void Trainer::follow(int64_t key) {
   health_.expect_fall();
   if (options_.deform.track.true_poses) return;
+  if (key == 1) see_whether_bodies_stand();
+  if (bodies_stand_) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
@@ -199,7 +190,8 @@ void Trainer::follow(int64_t key) {
 
 void Trainer::part_bodies(int64_t key) {
   constexpr std::array<int64_t, 4> at = {5, 10, 20, 40};
-  if (options_.deform.track.true_poses || std::find(at.begin(), at.end(), key) == at.end()) return;
+  if (options_.deform.track.true_poses || bodies_stand_ || std::find(at.begin(), at.end(), key) == at.end())
+    return;
   Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const Tracker tracker = make_tracker();
