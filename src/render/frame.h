@@ -51,8 +51,8 @@ struct Frame {
   raster::Output raster;        // the rasterised layers; the silhouette when asked for
   Tensor<float> pseudo_normal;  // H×W×3 when asked for
   int samples = 1;              // along each side of a pixel (method §3.6)
-  surface::TracedPixels
-      traced;  // of the picture of the samples, which has so many times the rows and columns
+  // Pixels of the picture of the samples, which has so many times the rows and columns.
+  surface::TracedPixels traced;
   MirroredRays mirrored;
   Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
   Tensor<float> colour;         // H×W×3, the final image (method §6)

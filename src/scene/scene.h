@@ -35,7 +35,7 @@ struct Scene {
   SceneNormalisation normalisation;
   float extent =
       1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
-  // Mean focal length of the photographs that it was trained on, pixels; 0 where nobody knows.
+  // Smallest focal length of the photographs that it was trained on, pixels; 0 where nobody knows.
   float focal = 0;
   // One number: the largest distance by which the main field lately moved a surfel, what view culling must
   // allow for. Those that bodies carry are never culled.

@@ -6,6 +6,7 @@
 #include "capture/lens/resample.h"
 #include "files/jpeg.h"
 #include "files/png.h"
+#include "render/samples.h"
 #include "serve/hello.h"
 #include "serve/look_camera.h"
 #include "show/cameras/camera_path.h"
@@ -63,7 +64,9 @@ show::Layer layer_named(const std::string& name) {
 
 // The system may promise memory that is not there, and then end the program: a training, perhaps.
 void check_memory_for(const FrameRequest& request, const Stage& stage) {
-  const int64_t wanted = bytes_per_pixel * request.camera.width * request.camera.height;
+  const int64_t samples =
+      samples::samples_for(request.camera, stage.render.samples, stage.scene.focal, request.most_samples);
+  const int64_t wanted = bytes_per_pixel * samples * samples * request.camera.width * request.camera.height;
   if (stage.scene.device() == Device::cpu && wanted > memory_available() / 2) throw std::bad_alloc();
 }
 

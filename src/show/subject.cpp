@@ -32,15 +32,15 @@ std::string note(const PlyScene& file, const char* key) {
 }
 
 // The number in a note; 0 where the note is not there.
-float length_in(const PlyScene& file, const char* key, const std::filesystem::path& path) {
+float number_in(const PlyScene& file, const char* key, const std::filesystem::path& path) {
   const std::string text = note(file, key);
   if (text.empty()) return 0;
-  float length = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), length);
-  if (error != std::errc() || end != text.data() + text.size() || !(length > 0) || !std::isfinite(length)) {
+  float number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || !(number > 0) || !std::isfinite(number)) {
     throw InputError(path.string(), fmt::format("comment traceflow {}", key), text, "a positive number");
   }
-  return length;
+  return number;
 }
 
 // The environment's file as the note names it: a name in the same folder, and nothing else.
@@ -82,8 +82,8 @@ Subject read_ply_subject(const std::filesystem::path& path, const std::filesyste
   PlyScene file = read_ply(path);
   Subject subject;
   subject.scene.specular = Specular::none;
-  subject.scene.extent = length_in(file, extent_note, path);
-  subject.scene.focal = length_in(file, focal_note, path);
+  subject.scene.extent = number_in(file, extent_note, path);
+  subject.scene.focal = number_in(file, focal_note, path);
   if (const std::string text = note(file, render_note); !text.empty()) {
     options_from_json(text, option_fields(subject.render), path.string() + ": comment traceflow render");
     subject.render.validate();

@@ -117,10 +117,13 @@ void take_true_poses(const Capture& capture, Scene& scene) {
   if (scene.main_motion) set_true_poses(*truth, capture.normalisation, scene.main, *scene.main_motion);
 }
 
-float mean_focal(const std::vector<View>& views) {
-  double sum = 0;
-  for (const View& view : views) sum += std::min(view.camera.focal_x, view.camera.focal_y);
-  return views.empty() ? 0.0F : static_cast<float>(sum / static_cast<double>(views.size()));
+float smallest_focal(const std::vector<View>& views) {
+  float smallest = 0;
+  for (const View& view : views) {
+    const float focal = std::min(view.camera.focal_x, view.camera.focal_y);
+    if (smallest == 0 || focal < smallest) smallest = focal;
+  }
+  return smallest;
 }
 
 }  // namespace
@@ -286,7 +289,7 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   scene.specular = options.specular;
   scene.normalisation = capture.normalisation;
   scene.extent = capture.extent;
-  scene.focal = mean_focal(capture.train);
+  scene.focal = smallest_focal(capture.train);
   Tensor<float> made_up({0, 3});
   if (made.points_in_view > 0 && follows_bodies(capture, options))
     made_up = thinned(points_on_bare_things(capture, seen), limit / 2, random);

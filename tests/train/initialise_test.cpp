@@ -75,6 +75,15 @@ TEST(Initialise, CoincidentAndSinglePointsStayFinite) {
   }
 }
 
+// No photograph then asks for more samples than it was trained with.
+TEST(Initialise, TheSceneKnowsTheSmallestFocalLength) {
+  Capture capture = load_capture(capture_folder(), {});
+  capture.train[1].camera.focal_y *= 0.5F;
+  Random random(1);
+  const Scene scene = initial_scene(capture, small_run(1), random).scene;
+  EXPECT_EQ(scene.focal, capture.train[1].camera.focal_y);
+}
+
 TEST(Initialise, MasksOfTheObjectSayWhatMirrorsAndEstimatedOnesDoNot) {
   const TempFolder folder;
   fs::copy(capture_folder(), folder / "capture", fs::copy_options::recursive);
