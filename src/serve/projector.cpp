@@ -110,6 +110,7 @@ void Projector::forget() {
 
 Renderer& Projector::renderer(const Stage& stage) {
   if (!renderer_) renderer_ = std::make_unique<Renderer>(stage.render);
+  renderer_->options() = stage.render;  // a training changes them as it goes on
   return *renderer_;
 }
 

@@ -13,7 +13,7 @@ namespace traceflow::serve {
 // iterations of a training.
 struct Stage {
   const Scene& scene;
-  const RenderOptions& render;
+  RenderOptions render;
   FrameRequest request;  // which parts of the scene take part; camera and time are each Look's own
   int64_t iteration = 0;
 };

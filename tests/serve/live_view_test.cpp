@@ -21,7 +21,7 @@ struct WatchedRun {
       : trainer(make_trainer(small_run(iterations), name)),
         view({0.5}, make_setting("training", name, &trainer.capture(), trainer.scene().normalisation),
              {[this] {
-                return Stage{trainer.scene(), trainer.options().render,
+                return Stage{trainer.scene(), picture_render(trainer.options(), trainer.iteration()),
                              picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
               },
               [this] {

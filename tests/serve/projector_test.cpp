@@ -29,7 +29,9 @@ struct Screening {
         page(audience, 1) {}
 
   Stage stage() {
-    return {trainer.scene(), trainer.options().render, picture_request(trainer.options(), 20), 7};
+    RenderOptions render = trainer.options().render;
+    render.samples = samples;
+    return {trainer.scene(), render, picture_request(trainer.options(), 20), 7};
   }
   void project() {
     while (const auto job = audience.next()) {
@@ -52,6 +54,7 @@ struct Screening {
   }
 
   Trainer trainer;
+  int samples = 1;
   Audience audience;
   Projector projector;
   FakePage page;
@@ -105,20 +108,25 @@ TEST(Projector, SendsFramesOfTheSizesThatItNames) {
   }
 }
 
-// A still at a photograph's camera is the picture that the verb render makes of it.
+// A still at a photograph's camera is the picture that the verb render makes of it, also where a training has
+// meanwhile begun to supersample.
 TEST(Projector, ShowsACapturedCameraAsRenderDoes) {
   Screening s("captured");
-  s.page.say(at_photo(1, "rgb"));
   const Camera<float>& camera = s.trainer.capture().train[1].camera;
-  const Tensor<uint8_t> shown = s.still(camera.width, camera.height);
+  for (s.samples = 1; s.samples <= 2; ++s.samples) {
+    s.page.say(at_photo(s.samples, "rgb"));
+    const Tensor<uint8_t> shown = s.still(camera.width, camera.height);
 
-  Renderer renderer(s.trainer.options().render);
-  FrameRequest request = s.stage().request;
-  request.camera = camera;
-  request.time = 0;
-  const Tensor<uint8_t> expected = to_8bit(renderer.forward(s.trainer.scene(), request).colour);
-  ASSERT_EQ(shown.shape(), expected.shape());
-  for (int64_t i = 0; i < shown.size(); ++i) ASSERT_NEAR(shown[i], expected[i], 1) << i;
+    Renderer renderer(s.stage().render);
+    FrameRequest request = s.stage().request;
+    request.camera = camera;
+    request.time = 0;
+    const Frame& frame = renderer.forward(s.trainer.scene(), request);
+    ASSERT_EQ(frame.samples, s.samples);
+    const Tensor<uint8_t> expected = to_8bit(frame.colour);
+    ASSERT_EQ(shown.shape(), expected.shape());
+    for (int64_t i = 0; i < shown.size(); ++i) ASSERT_NEAR(shown[i], expected[i], 1) << i;
+  }
 }
 
 // The same view through a free camera: a picture does not depend on how its camera was said.
