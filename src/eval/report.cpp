@@ -68,6 +68,7 @@ std::string report_json(const Report& report) {
   json["render_fps"] = figure_json(report.render_fps);
   json["surfels"] = {{"main", report.main_surfels}, {"environment", report.environment_surfels}};
   put_figures(mean_of(report), json["mean"] = nlohmann::ordered_json::object());
+  if (report.aligned) put_figures(*report.aligned, json["mean_aligned"] = nlohmann::ordered_json::object());
   json["motion"] = motion_json(report.motion);
   json["views"] = nlohmann::ordered_json::array();
   for (const ViewReport& view : report.views) {

@@ -30,6 +30,7 @@ struct Report {
   int64_t main_surfels = 0;
   int64_t environment_surfels = 0;
   std::vector<ViewReport> views;
+  std::optional<Metrics> aligned;      // means with aligned cameras, where those were asked for
   std::optional<MotionReport> motion;  // where the capture has truth/motion
 };
 

@@ -75,6 +75,7 @@ Json page_json(const ReportPage& page) {
                {"render_fps", figure_json(report.render_fps)},
                {"surfels", {{"main", report.main_surfels}, {"environment", report.environment_surfels}}}};
   put_figures(mean_of(report), json["mean"] = Json::object());
+  if (report.aligned) put_figures(*report.aligned, json["mean_aligned"] = Json::object());
   json["motion"] = motion_json(report.motion);
   Json& views = json["views"] = Json::array();
   for (const ViewReport& view : report.views) {

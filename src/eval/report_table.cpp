@@ -66,13 +66,14 @@ std::string report_table(const Report& report) {
   std::vector<Column> shown;
   std::copy_if(columns.begin(), columns.end(), std::back_inserter(shown),
                [&](const Column& c) { return (mean.*c.figure).has_value(); });
-  size_t width = 6;
+  size_t width = 8;
   for (const ViewReport& view : report.views) width = std::max(width, view.id.size() + 1);
   std::string text = fmt::format("{:<{}}", "view", width);
   for (const Column& c : shown) text += fmt::format("{:>10}", c.head);
   text += "\n";
   for (const ViewReport& view : report.views) text += table_line(view.id, width, shown, view.metrics);
   text += table_line("mean", width, shown, mean);
+  if (report.aligned) text += table_line("aligned", width, shown, *report.aligned);
   return report.motion ? text + motion_text(*report.motion) : text;
 }
 

@@ -24,24 +24,6 @@ constexpr const char* other_end = ": it ends in other bytes than one that was ne
 // Rounded, so that a compiler that rounds the last bit otherwise makes no other capture of it.
 int64_t rounded(double value) { return std::llround(value * 1e5); }
 
-std::string checksum_of_views(const Capture& capture) {
-  uLong crc = 0;
-  const auto add = [&crc](const void* bytes, size_t size) {
-    crc = crc32_z(crc, static_cast<const Bytef*>(bytes), size);
-  };
-  for (const View& view : capture.train) {
-    add(view.id.c_str(), view.id.size() + 1);
-    const Mat3<float>& r = view.camera.camera_from_world;
-    const Vec3<float>& p = view.camera.position;
-    for (const float value :
-         {view.time, p.x, p.y, p.z, r[0].x, r[0].y, r[0].z, r[1].x, r[1].y, r[1].z, r[2].x, r[2].y, r[2].z}) {
-      const int64_t number = rounded(value);
-      add(&number, sizeof number);
-    }
-  }
-  return std::to_string(crc);
-}
-
 bool agree(const SceneNormalisation& a, const SceneNormalisation& b) {
   const auto near = [](double x, double y, double length) { return std::fabs(x - y) <= 1e-6 * length; };
   const double length =
@@ -107,8 +89,26 @@ void refuse_other_preset(const std::string& name, const TrainOptions& of_preset,
   }
 }
 
-void put_views(const Capture& capture, Safetensors& checkpoint) {
-  checkpoint.metadata[views_key] = checksum_of_views(capture);
+std::string checksum_of_views(const Capture& capture) {
+  uLong crc = 0;
+  const auto add = [&crc](const void* bytes, size_t size) {
+    crc = crc32_z(crc, static_cast<const Bytef*>(bytes), size);
+  };
+  for (const View& view : capture.train) {
+    add(view.id.c_str(), view.id.size() + 1);
+    const Mat3<float>& r = view.camera.camera_from_world;
+    const Vec3<float>& p = view.camera.position;
+    for (const float value :
+         {view.time, p.x, p.y, p.z, r[0].x, r[0].y, r[0].z, r[1].x, r[1].y, r[1].z, r[2].x, r[2].y, r[2].z}) {
+      const int64_t number = rounded(value);
+      add(&number, sizeof number);
+    }
+  }
+  return std::to_string(crc);
+}
+
+void put_views(const std::string& checksum, Safetensors& checkpoint) {
+  checkpoint.metadata[views_key] = checksum;
 }
 
 std::string views_in(const Safetensors& checkpoint) { return entry(checkpoint, views_key).value_or(""); }

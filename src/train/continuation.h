@@ -22,7 +22,9 @@ void refuse_reshaping(const TrainOptions& before, const TrainOptions& now);
 // Throws InputError where a preset has another value, of whatever option, than the run has.
 void refuse_other_preset(const std::string& name, const TrainOptions& of_preset, const TrainOptions& now);
 
-void put_views(const Capture& capture, Safetensors& checkpoint);
+// Of the training views' names, times and poses.
+std::string checksum_of_views(const Capture& capture);
+void put_views(const std::string& checksum, Safetensors& checkpoint);
 // What a checkpoint says of the views that it was trained on; nothing in older ones.
 std::string views_in(const Safetensors& checkpoint);
 // Whether they are the capture's, for a scene that is normalised so: by the views' names, times and poses,

@@ -124,7 +124,8 @@ void RateOptions::validate() const {
                                     {opacity, "rates.opacity"},
                                     {log_scale, "rates.log_scale"},
                                     {rotation, "rates.rotation"},
-                                    {tint, "rates.tint"}}) {
+                                    {tint, "rates.tint"},
+                                    {camera, "rates.camera"}}) {
     check_not_negative(value, name);
   }
   check_option(sh_rest_divisor > 0, "rates.sh_rest_divisor", sh_rest_divisor, "a positive number");

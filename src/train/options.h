@@ -68,6 +68,7 @@ struct RateOptions {
   float lighting = 0.01F;
   float map = 0.016F;
   float map_end = 1.6e-4F;
+  float camera = 0;
   float beta1 = 0.9F;
   float beta2 = 0.999F;
   float epsilon = 1e-15F;
@@ -90,6 +91,9 @@ struct RateOptions {
     v.field("lighting", lighting, "", "Logarithms of brightness (deform.lighting).");
     v.field("map", map, "", "Environment map, first iteration.");
     v.field("map_end", map_end, "", "Environment map, last iteration (log-linear between).");
+    v.field("camera", camera, "radians",
+            "Poses of training cameras, first iteration, of the last a hundredth (log-linear); shifts in "
+            "extents. 0: they stay as the capture has them (not in the paper).");
     v.field("beta1", beta1, "", "Adam's decay of the first moment.");
     v.field("beta2", beta2, "", "Adam's decay of the second moment.");
     v.field("epsilon", epsilon, "", "Adam's ε.");

@@ -38,7 +38,7 @@ Trainable Schedule::trainable(int iteration) const {
   t.tint = now != Phase::diffuse;
   t.environment = now != Phase::diffuse;
   t.environment_field = deforms_environment(iteration);
-  t.camera = false;
+  t.camera = t.main && options_.rates.camera > 0;
   return t;
 }
 
@@ -174,6 +174,12 @@ double Schedule::motion_rate(int iteration) const {
   const double beyond = static_cast<double>(std::max(0, iteration - falls_in)) / falls_in;
   return optimize::log_linear(rates.motion, rates.motion_end, iteration, falls_in) *
          std::pow(rates.motion_end / rates.motion, beyond);
+}
+
+double Schedule::camera_rate(int iteration) const {
+  constexpr double last = 0.01;
+  return optimize::log_linear(options_.rates.camera, last * options_.rates.camera, iteration,
+                              options_.iterations);
 }
 
 double Schedule::map_rate(int iteration) const {

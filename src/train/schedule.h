@@ -59,6 +59,7 @@ class Schedule {
   // keep a high rate for longer drift away with the surfels that they carry.
   double motion_rate(int iteration) const;
   double map_rate(int iteration) const;
+  double camera_rate(int iteration) const;
 
  private:
   // A mark of the schedule in iterations of this run.

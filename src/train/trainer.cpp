@@ -114,6 +114,8 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
     : options_(with_whole_paths(options)),
       device_(device),
       capture_(with_likely_masks(std::move(capture), options)),
+      views_checksum_(checksum_of_views(capture_)),
+      cameras_(capture_.train),
       capture_folder_(whole_path(capture_.folder).lexically_normal().string()),
       run_{whole_path(run)},
       schedule_(options),
@@ -214,6 +216,7 @@ LossTerms Trainer::step() {
     trainable.main = true;
     trainable.main_field = false;
     trainable.tint = trainable.environment = trainable.environment_field = false;
+    trainable.camera = false;
   }
 
   const Frame& frame = renderer_.forward(scene_, request, true);
@@ -227,14 +230,15 @@ LossTerms Trainer::step() {
   if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
   const LossTerms terms = means_.read();
   const bool learns = std::isfinite(terms.total);
-  if (learns) learn(frame, request, trainable);
+  if (learns) learn(view, frame, request, trainable);
   ++iteration_;
   non_finite_ = learns ? optimiser_.left_alone() : NonFiniteGradients{};
   control_density(iteration_, new_surface);
   return terms;
 }
 
-void Trainer::learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable) {
+void Trainer::learn(const View& view, const Frame& frame, const FrameRequest& request,
+                    const Trainable& trainable) {
   gradient_.reset(scene_);
   renderer_.backward(scene_, request, trainable, grad_frame_, gradient_);
   if (trainable.main_motion) share_among_keys();
@@ -253,6 +257,7 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   torn_ = true;
   const double share_of_positions = follows ? share_while_tracking : 1;
   optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_, share_of_positions);
+  if (trainable.camera) refine_camera(view);
   if (trainable.main) {
     main_density_.shorten_needles(scene_.main, cloud_radius_);
     main_density_.accumulate(gradient_.main_signal, gradient_.main_visible);
@@ -264,6 +269,17 @@ void Trainer::learn(const Frame& frame, const FrameRequest& request, const Train
   parallel_for(device_, "train: follow the reach", 1,
                FollowReach{frame.reach.data(), scene_.main_reach.data()});
   torn_ = false;
+}
+
+void Trainer::refine_camera(const View& view) {
+  cameras_.step(&view - capture_.train.data(), gradient_.camera, schedule_.camera_rate(iteration_),
+                scene_.extent, options_.rates.adam());
+  set_refined_cameras();
+}
+
+void Trainer::set_refined_cameras() {
+  for (size_t i = 0; i < capture_.train.size(); ++i)
+    capture_.train[i].camera = cameras_.camera(static_cast<int64_t>(i));
 }
 
 void Trainer::add_rigidity(const Frame& frame) {

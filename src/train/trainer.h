@@ -12,6 +12,7 @@
 #include "render/renderer.h"
 #include "scene/neighbours.h"
 #include "scene/run_folder.h"
+#include "train/camera_refinement.h"
 #include "train/density.h"
 #include "train/events.h"
 #include "train/health.h"
@@ -149,8 +150,11 @@ class Trainer {
   NormalLosses normal_losses(const Trainable& trainable, const Tracking& now) const;
   // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
   void add_rigidity(const Frame& frame);
+  // Refines the camera of a training view by the gradient of its picture.
+  void refine_camera(const View& view);
+  void set_refined_cameras();
   // Everything of a step that follows a loss that is a number.
-  void learn(const Frame& frame, const FrameRequest& request, const Trainable& trainable);
+  void learn(const View& view, const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done, const Surfels& new_surface);
   void tell_start();
   void warn(const std::string& text) { stream_.emit(events::Warning{iteration_, text}); }
@@ -196,6 +200,8 @@ class Trainer {
   TrainOptions options_;
   Device device_;
   Capture capture_;
+  std::string views_checksum_;  // of the capture as it was given
+  CameraRefinement cameras_;    // of its training views, whose cameras are kept as refined
   std::string capture_folder_;  // whole paths both, so that neither needs the working directory again
   RunFolder run_;
   // Of the current checkpoint.

@@ -103,7 +103,8 @@ Safetensors Trainer::checkpoint() const {
   file.metadata["initial_main_count"] = std::to_string(initial_main_count_);
   file.metadata["bodies_stand"] = std::to_string(bodies_stand_ ? 1 : 0);
   file.metadata["environment_radius"] = fmt::format("{}", environment_radius_);
-  put_views(capture_, file);
+  put_views(views_checksum_, file);
+  cameras_.put(file);
   put_caps(memory_.caps, file);
   put_arithmetic(device_, file);
   put_version(file);
@@ -157,6 +158,8 @@ void Trainer::resume() {
   }
   // Checkpoints of programs before 28 November 2026 have none.
   if (file.has("prior_bias")) set_prior_bias(rotation_in(file.tensor<double>("prior_bias")));
+  cameras_.get(file);
+  if (cameras_.is_begun()) set_refined_cameras();
   views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");
   const Tensor<double> health = file.tensor<double>("health");

@@ -136,6 +136,38 @@ TEST_F(See, EvalLeavesTheSamePage) {
   EXPECT_EQ(eval, report);
 }
 
+// Held-out views of a run that refined its cameras are measured with aligned ones too; training views have
+// the refined ones.
+TEST_F(See, RefinedCamerasAreThoseOfTheTrainingViews) {
+  ASSERT_EQ(run_with({"train", "-d", path("capture"), "-o", path("refined"), "--preset", "demo", "--set",
+                      "rates.camera=1e-3", "--specular", "none", "-q", "-i", "30"})
+                .code,
+            exit_done);
+  const TrainedRun run = read_run(path("refined"));
+  ASSERT_FALSE(run.cameras.empty());
+  const Capture given = load_capture(run.capture_folder, run.options.capture),
+                refined = capture_of(run, "", 0);
+  ASSERT_EQ(refined.train.size(), given.train.size());
+  float largest = 0;
+  for (size_t i = 0; i < given.train.size(); ++i) {
+    const Camera<float>& camera = refined.train[i].camera;
+    EXPECT_EQ(camera.position, run.cameras.applied(given.train[i].camera, static_cast<int64_t>(i)).position);
+    largest = std::max(largest, length(camera.position - given.train[i].camera.position));
+  }
+  EXPECT_GT(largest, 0);
+  for (size_t i = 0; i < given.test.size(); ++i)
+    EXPECT_EQ(refined.test[i].camera.position, given.test[i].camera.position);
+
+  const Outcome eval = run_with({"eval", path("refined"), "--layers", "none"});
+  ASSERT_EQ(eval.code, exit_done) << eval.err;
+  EXPECT_THAT(eval.out, HasSubstr("\naligned "));
+  const Json data = data_of(folder() / "refined/eval/test/report.html");
+  EXPECT_GT(data["mean_aligned"]["psnr"], data["mean"]["psnr"].get<double>() - 0.05);
+  EXPECT_NE(data["mean_aligned"]["psnr"], data["mean"]["psnr"]);
+  ASSERT_EQ(run_with({"eval", path("refined"), "--split", "train", "--layers", "none"}).code, exit_done);
+  EXPECT_FALSE(data_of(folder() / "refined/eval/train/report.html").contains("mean_aligned"));
+}
+
 TEST_F(See, RunsHavePathsOfWhatMoves) {
   const std::vector<std::string> render = {"render",     path("run"),           "--layers",
                                            "rgb,tracks", "--tracks-least-move", "0"};

@@ -148,14 +148,16 @@ TEST(Trainer, AnotherSeedGivesOtherBytes) {
 }
 
 // With a network that moves surfels, with bodies, the second of whose times is entered after 9 iterations,
-// and with bodies that bend from the last time on.
+// with bodies that bend from the last time on, and with cameras that are refined.
 class ResumedTrainer : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, ResumedTrainer, ::testing::Values("network", "nodes", "bend"));
+INSTANTIATE_TEST_SUITE_P(Kinds, ResumedTrainer, ::testing::Values("network", "nodes", "bend", "cameras"));
 
 TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   TrainOptions options = small_run(40);
   const bool bends = std::string(GetParam()) == "bend";
-  options.deform.kind = bends ? "nodes" : GetParam();
+  const bool refines = std::string(GetParam()) == "cameras";
+  options.deform.kind = bends || refines ? "nodes" : GetParam();
+  options.rates.camera = refines ? 1e-4F : 0;
   options.deform.bend.misfit = 0;
   options.deform.track.new_surface = true;
   options.deform.bend.nodes = bends ? 5 : 0;

@@ -10,9 +10,13 @@
 #include "base/atomic_file.h"
 #include "base/option_fields.h"
 #include "base/version.h"
+#include "cli/terminal/count_progress.h"
 #include "scene/run_folder.h"
+#include "scene/viewpoint.h"
 #include "show/cameras/camera_file.h"
+#include "train/camera_alignment.h"
 #include "train/log_history.h"
+#include "train/targets.h"
 
 namespace traceflow::cli {
 
@@ -69,6 +73,10 @@ void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& a) {
       ->option_text("CAPTURE");
   verb.add_option("--downscale", a.downscale, "Measure at another size than the run was trained at")
       ->check(CLI::Range(1, 64));
+  verb.add_flag(
+      "--align-cameras", a.align_cameras,
+      "Also measure with cameras from which the scene looks most like the photographs; always where "
+      "the run refined its cameras and held-out views are measured");
   verb.add_option("--lpips", a.lpips, "Weights for LPIPS, as scripts/export_lpips.py writes them")
       ->envname("TRACEFLOW_LPIPS");
 }
@@ -78,6 +86,7 @@ Evaluation::Evaluation(const EvaluationArguments& a, const DeviceArguments& devi
       run_(read_run(a.run)),
       capture_(capture_of(run_, a.capture, a.downscale)),
       views_(&views_of(capture_, a.split)),
+      aligns_(a.align_cameras || (a.split == "test" && !run_.cameras.empty())),
       pictures_(views_->size()) {
   if (!run_.note.empty()) std::cerr << run_.note << std::endl;
   for (const View& view : *views_) show::check_name(capture_.folder.string(), "view id", view.id);
@@ -103,6 +112,33 @@ void Evaluation::measure(const eval::ViewListener& listener) {
         if (listener) listener(view, images, frame);
       },
       report_);
+  if (!aligns_) return;
+  eval::Report aligned;
+  eval::evaluate(run_.subject, capture_, aligned_views(), network_ ? &*network_ : nullptr, nullptr, aligned);
+  report_.aligned = eval::mean_of(aligned);
+}
+
+std::vector<View> Evaluation::aligned_views() {
+  const show::Subject& subject = run_.subject;
+  const SceneNormalisation &of_capture = capture_.normalisation, &of_scene = subject.scene.normalisation;
+  Renderer renderer(subject.render);
+  Targets targets(device_, 0);
+  std::vector<View> views = *views_;
+  CountProgress progress = CountProgress::for_stderr();
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point start = Clock::now();
+  for (size_t i = 0; i < views.size(); ++i) {
+    FrameRequest request = subject.request;
+    request.camera = carried(views[i].camera, of_capture, of_scene);
+    request.time = views[i].time;
+    ViewImages& photograph = targets.of(capture_, views[i], false);
+    views[i].camera = carried(aligned_camera(renderer, subject.scene, request, photograph, run_.options.loss),
+                              of_scene, of_capture);
+    progress.show({"align", "cameras", static_cast<int64_t>(i) + 1, static_cast<int64_t>(views.size())},
+                  std::chrono::duration<double>(Clock::now() - start).count());
+  }
+  progress.finish();
+  return views;
 }
 
 void Evaluation::write_page(const std::filesystem::path& path) {

@@ -12,6 +12,7 @@ namespace traceflow::cli {
 struct EvaluationArguments {
   std::string run, capture, split = "test", lpips;
   int downscale = 0;
+  bool align_cameras = false;
 };
 void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& arguments);
 
@@ -22,7 +23,8 @@ class Evaluation {
   // missing. Throws InputError.
   Evaluation(const EvaluationArguments& arguments, const DeviceArguments& devices);
 
-  // Renders and measures every view; the listener may be empty.
+  // Renders and measures every view; the listener may be empty. Where it is asked for, or held-out views are
+  // measured of a run that refined its cameras, measures them with aligned cameras too.
   void measure(const eval::ViewListener& listener);
   // What has been measured, as a page (eval/report_page.h).
   void write_page(const std::filesystem::path& path);
@@ -34,12 +36,16 @@ class Evaluation {
   const Capture& capture() const { return capture_; }
 
  private:
+  // The views with cameras from which they look most like their photographs.
+  std::vector<View> aligned_views();
+
   std::filesystem::path folder_;
   TrainedRun run_;
   Capture capture_;
   const std::vector<View>* views_;
   std::optional<lpips::Network> network_;
   Device device_ = Device::cpu;
+  bool aligns_;
   eval::Report report_;
   eval::ReportPictures pictures_;
 };

@@ -28,6 +28,7 @@ TrainedRun read_run(const std::filesystem::path& folder) {
   run.subject.request = picture_request(run.options, run.iterations);
   run.train_seconds = file.number("train_seconds");
   run.views = views_in(file);
+  run.cameras = corrections_in(file);
   run.capture = file.text("capture");
   run.capture_folder = file.text("capture_folder");
   return run;
@@ -51,6 +52,11 @@ Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, i
               << ": its training views are not those that the run was trained on: times may have moved, and "
                  "views that were trained on may be test views now"
               << std::endl;
+    return capture;
+  }
+  for (size_t i = 0; i < capture.train.size(); ++i) {
+    Camera<float>& camera = capture.train[i].camera;
+    camera = run.cameras.applied(camera, static_cast<int64_t>(i));
   }
   return capture;
 }

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "show/subject.h"
+#include "train/camera_refinement.h"
 #include "train/options.h"
 
 namespace traceflow::cli {
@@ -14,6 +15,7 @@ struct TrainedRun {
   TrainOptions options;
   std::string capture;                   // its name
   std::filesystem::path capture_folder;  // where it was when the run was trained
+  CameraCorrections cameras;             // of the views that it was trained on
   std::string views;                     // that it was trained on, as a checkpoint tells them
   int64_t iterations = 0;                // done
   double train_seconds = 0;
@@ -27,7 +29,8 @@ std::string run_name(const std::filesystem::path& folder);
 TrainedRun read_run(const std::filesystem::path& folder);
 
 // The capture that the run was trained on, or the one in `folder` when that is not empty; downscale 0: the
-// run's. Says on the standard error where its views are not those that the run was trained on.
+// run's. Training views have the cameras that the run has refined. Says on the standard error where its views
+// are not those that the run was trained on.
 Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale);
 
 // Whether a capture's training views are those that the run was trained on, as far as its checkpoint tells.

@@ -1,5 +1,5 @@
 import { useState } from 'preact/hooks';
-import type { ReportData } from './data.ts';
+import type { Figures, ReportData } from './data.ts';
 import { ends, present, sorted, written, type Kind, type Order, type View } from './figures.ts';
 import type { Opened } from './Large.tsx';
 
@@ -42,14 +42,8 @@ export function FigureTable({ data, open }: { data: ReportData; open: (opened: O
             ))}
           </tbody>
           <tfoot>
-            <tr>
-              <th scope="row" colSpan={2}>
-                Mean
-              </th>
-              {kinds.map((kind) => (
-                <td key={kind.key}>{written(data.mean[kind.key], kind)}</td>
-              ))}
-            </tr>
+            <Mean label="Mean" figures={data.mean} kinds={kinds} />
+            {data.mean_aligned && <Mean label="Mean, aligned cameras" figures={data.mean_aligned} kinds={kinds} />}
           </tfoot>
         </table>
       </div>
@@ -57,6 +51,19 @@ export function FigureTable({ data, open }: { data: ReportData; open: (opened: O
         <i class="best">▲</i> best <i class="worst">▼</i> worst
       </p>
     </>
+  );
+}
+
+function Mean({ label, figures, kinds }: { label: string; figures: Figures; kinds: Kind[] }) {
+  return (
+    <tr>
+      <th scope="row" colSpan={2}>
+        {label}
+      </th>
+      {kinds.map((kind) => (
+        <td key={kind.key}>{written(figures[kind.key], kind)}</td>
+      ))}
+    </tr>
   );
 }
 

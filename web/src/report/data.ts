@@ -52,6 +52,7 @@ export interface ReportData {
   render_fps: number | null;
   surfels: { main: number; environment: number };
   mean: Figures;
+  mean_aligned?: Figures; // with cameras from which the scene looks most like the photographs
   motion: { mean: MotionFigures; objects: ObjectMotion[] } | null; // null without truth
   views: ({ id: string; time: number } & Figures)[];
   settings: { path: string; value: string; default: string; unit: string; help: string }[];

@@ -1,0 +1,58 @@
+#include "train/camera_alignment.h"
+
+#include <limits>
+
+#include "capture/pixels.h"
+#include "train/camera_refinement.h"
+#include "train/objective.h"
+
+namespace traceflow {
+
+namespace {
+
+// With the main surfels' geometry, which the renderer needs for the camera's gradient.
+Trainable camera_alone() {
+  Trainable trainable;
+  trainable.tint = trainable.main_field = trainable.main_motion = trainable.main_nodes = false;
+  trainable.lighting = trainable.environment = trainable.environment_field = false;
+  return trainable;
+}
+
+}  // namespace
+
+Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const FrameRequest& given,
+                             ViewImages& photograph, const LossOptions& loss,
+                             const CameraAlignment& options) {
+  LossOptions photometric = loss;
+  photometric.normal = photometric.normal_prior = photometric.distortion = photometric.silhouette = 0;
+  photometric.lpips = photometric.rigidity = 0;
+  FrameRequest request = given;
+  FrameGradient by_frame;
+  SceneGradient gradient;
+  LossMeans means;
+  CameraSteps steps;
+  Vec3<double> turn(0), shift(0);
+  Camera<float> best = given.camera;
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= options.iterations; ++i) {
+    const Frame& frame = renderer.forward(scene, request, true);
+    take_unknown(frame.colour, photograph);
+    evaluate_objective(frame, photograph, photometric, NormalLosses::none, by_frame, means, nullptr);
+    leave_unknown(photograph, by_frame.colour);
+    const double now = means.read().total;
+    if (now < least) {
+      least = now;
+      best = request.camera;
+    }
+    if (i == options.iterations) break;
+    gradient.reset(scene);
+    renderer.backward(scene, request, camera_alone(), by_frame, gradient);
+    steps.step(pose_gradient(request.camera, gradient.camera),
+               optimize::log_linear(options.rate, options.rate_end, i, options.iterations), scene.extent, {},
+               turn, shift);
+    request.camera = moved(given.camera, turn, shift);
+  }
+  return best;
+}
+
+}  // namespace traceflow
