@@ -104,7 +104,8 @@ struct ViewPyramid {
 // Whether a stored surfel can show (render/visibility.h).
 struct CanShow {
   // A disk of full opacity ends at √(2 ln 255) = 3.33 standard deviations; the field may also widen it, by
-  // half as much again. One smaller than a pixel shows as far as √(ln 255) pixels (method §3.2).
+  // half as much again. One smaller than a pixel shows as far as √(ln 255) widths of the low-pass (method
+  // §3.2).
   static constexpr float disk_radius = 5.0F;
   static constexpr float low_pass_pixels = 2.36F;
 
@@ -112,6 +113,7 @@ struct CanShow {
   ViewPyramid pyramid;
   const float *position, *log_scale;
   float near_plane;
+  float low_pass;       // width, pixels
   const float* reach;   // null for 0
   const int32_t* body;  // null: none is carried
 
@@ -122,8 +124,8 @@ struct CanShow {
     const float moved = reach != nullptr ? *reach : 0.0F;
     const float disk = disk_radius * std::exp(a < b ? b : a);
     const float focal = camera.focal_x < camera.focal_y ? camera.focal_x : camera.focal_y;
-    const float low_pass = low_pass_pixels * (centre.z + moved) / focal;
-    const float radius = moved + (disk > low_pass ? disk : low_pass);
+    const float blurred = low_pass * low_pass_pixels * (centre.z + moved) / focal;
+    const float radius = moved + (disk > blurred ? disk : blurred);
     return std::isfinite(radius) && pyramid.meets(centre, radius, near_plane);
   }
 };

@@ -24,7 +24,7 @@ raster::Options RenderOptions::raster_options(float extent) const {
   options.sort = sort;
   options.near_plane = near_plane * extent;
   options.far_plane = far_plane * extent;
-  options.low_pass = low_pass;
+  options.low_pass = low_pass ? 1 : 0;
   options.alpha_min = alpha_min;
   options.alpha_max = alpha_max;
   options.transmittance_min = std::max(transmittance_min, raster::least_transmittance);

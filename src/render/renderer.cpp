@@ -107,7 +107,7 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
 
   frame_.subset.place(device).resize({0});
   if (request.cull) {
-    surfels_in_view(scene.main, request.camera, frame_.drawn_with.near_plane,
+    surfels_in_view(scene.main, request.camera, frame_.drawn_with.near_plane, frame_.drawn_with.low_pass,
                     field ? scene.main_reach.data() : nullptr, frame_.subset);
   }
   if (request.cull && frame_.subset.empty()) {
@@ -147,6 +147,9 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   frame_.samples = keep_for_backward ? options_.samples
                                      : samples::samples_for(request.camera, options_.samples, scene.focal,
                                                             request.most_samples);
+  if (!keep_for_backward)
+    frame_.drawn_with.low_pass *=
+        samples::low_pass_for(request.camera, frame_.samples, options_.samples, scene.focal);
 
   // Choose the surfels that can show, and pose them.
   if (!request.reuse_pose) {

@@ -66,6 +66,12 @@ int samples_for(const Camera<float>& camera, int per_side, float focal, int most
   return rounded < static_cast<float>(most) ? std::max(1, static_cast<int>(rounded)) : most;
 }
 
+float low_pass_for(const Camera<float>& camera, int samples, int per_side, float focal) {
+  if (focal <= 0) return 1;
+  const float here = static_cast<float>(samples) * std::min(camera.focal_x, camera.focal_y);
+  return std::max(1.0F, here / (static_cast<float>(per_side) * focal));
+}
+
 Camera<float> camera_of(const Camera<float>& camera, int per_side) {
   const auto n = static_cast<float>(per_side);
   Camera<float> fine = camera;

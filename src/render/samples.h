@@ -12,6 +12,10 @@ namespace traceflow::samples {
 // wide as a sample. Up to a tenth fewer count as enough.
 int samples_for(const Camera<float>& camera, int per_side, float focal, int most);
 
+// Width of the low-pass, in samples of a picture that has `samples` along a pixel's side: as wide for an
+// angle as a sample of those photographs, but no narrower than a sample of the picture.
+float low_pass_for(const Camera<float>& camera, int samples, int per_side, float focal);
+
 // The camera of that picture.
 Camera<float> camera_of(const Camera<float>& camera, int per_side);
 

@@ -139,8 +139,9 @@ PoseSolver::PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, 
       blended_(raster::make_saved()) {
   options_.sort = raster::SortOrder::centre;  // as body_jacobian asks
   // The low-pass widens surfels by a share of a pixel: by more than in training where pixels are larger.
-  options_.low_pass = options_.low_pass && std::none_of(targets_.begin(), targets_.end(),
-                                                        [](const TrackTarget& t) { return t.is_shrunk; });
+  const bool is_any_shrunk =
+      std::any_of(targets_.begin(), targets_.end(), [](const TrackTarget& t) { return t.is_shrunk; });
+  if (is_any_shrunk) options_.low_pass = 0;
   deform::forward(main, nullptr, motion.time[key], {}, 0, field::Precision::fp32, still_, nullptr);
   if (nodes != nullptr) nodes::forward(*nodes, main.body, motion.time[key], {}, still_, *nodes::make_saved());
   // The rasteriser's tint is then the silhouette.

@@ -70,6 +70,28 @@ TEST(Samples, AreAsManyForAnAngleAsInTraining) {
   EXPECT_EQ(samples::samples_for(camera, 1, 200, 4), 2) << "half as large as the photographs";
 }
 
+// Three times as large, a picture has those of the size of training at the middle of each 3x3 pixels: surfels
+// smaller than a pixel are drawn as large for the eye.
+TEST(Samples, ALargerPictureHasThePixelsOfATrainedOne) {
+  Fixture f;
+  f.scene.main.log_scale.fill(std::log(0.01F));  // a quarter of a pixel where most stand
+  f.scene.focal = f.request.camera.focal_x;
+  const Tensor<float> trained = Renderer(RenderOptions{}).forward(f.scene, f.request).colour;
+  f.request.camera = samples::camera_of(f.request.camera, 3);
+  f.request.cull = true;
+  const Tensor<float> larger = Renderer(RenderOptions{}).forward(f.scene, f.request).colour;
+  float largest = 0;
+  for (int64_t y = 0; y < trained.dim(0); ++y) {
+    for (int64_t x = 0; x < trained.dim(1); ++x) {
+      for (int64_t c = 0; c < 3; ++c) {
+        ASSERT_NEAR(larger(3 * y + 1, 3 * x + 1, c), trained(y, x, c), 2e-4) << x << ", " << y;
+        largest = std::max(largest, trained(y, x, c));
+      }
+    }
+  }
+  EXPECT_GT(largest, 0.2);
+}
+
 // Trained pictures have the options' samples whatever the camera; others as many for an angle.
 TEST(Samples, OfPicturesFollowTheFocalLength) {
   Fixture f;

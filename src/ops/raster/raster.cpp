@@ -13,6 +13,7 @@ namespace traceflow::raster {
 
 void Options::validate() const {
   check_option(std::isfinite(near_plane) && near_plane > 0, "near_plane", near_plane, "a length above 0");
+  check_option(std::isfinite(low_pass) && low_pass >= 0, "low_pass", low_pass, "pixels, 0 or more");
   check_option(std::isfinite(far_plane) && far_plane > near_plane, "far_plane", far_plane,
                "a length above near_plane");
   check_option(alpha_min >= 1e-6F && alpha_min < 1, "alpha_min", alpha_min, "1e-6 or more, and under 1");

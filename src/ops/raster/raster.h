@@ -27,7 +27,7 @@ struct Options {
   // units.
   float near_plane = 0.01F;
   float far_plane = 100;  // only for the distortion's depth mapping
-  bool low_pass = true;
+  float low_pass = 1;     // 0: none
   float alpha_min = 1.0F / 255;
   float alpha_max = 0.99F;
   float transmittance_min = 1e-4F;
@@ -39,7 +39,7 @@ struct Options {
     v.field("near_plane", near_plane, "scene units", "Nearest camera depth that is drawn (method §3.4).");
     v.field("far_plane", far_plane, "scene units",
             "Far end of the distortion's depth mapping (method §3.5).");
-    v.field("low_pass", low_pass, "", "Screen-space low-pass of 2DGS (method §3.2).");
+    v.field("low_pass", low_pass, "pixels", "Width of the screen-space low-pass (method §3.2); 0: none.");
     v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
     v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
     v.field("transmittance_min", transmittance_min, "",

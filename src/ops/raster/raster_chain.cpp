@@ -61,6 +61,7 @@ void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved
   const Chain chain{view_of(surfels),
                     convert<double>(camera),
                     saved.splats.data(),
+                    saved.rho_per_pixel2,
                     saved.entry_begin.data(),
                     saved.touched.data(),
                     saved.scratch.gradients.data(),

@@ -16,6 +16,7 @@ struct Chain {
   PosedSurfelsView surfels;
   Camera<double> camera;
   const Splat* splats;
+  float rho_per_pixel2;  // as in Saved
   const uint32_t* entry_begin;
   const uint16_t* touched;
   const SplatGradient* gradients;  // by entry
@@ -92,7 +93,8 @@ struct Chain {
 
     Vec3<double> grad_centre(0, 0, sums.z_centre);
     if (splats[i].has_low_pass()) {
-      grad_centre += project_backward(camera, centre, Vec2<double>(2 * sums.centre_x, 2 * sums.centre_y));
+      grad_centre += project_backward(camera, centre,
+                                      double{rho_per_pixel2} * Vec2<double>(sums.centre_x, sums.centre_y));
     }
     g.from_camera += grad_centre * camera.camera_from_world;
     g.camera_from_world += outerProduct(grad_centre, from_camera);

@@ -30,8 +30,8 @@ struct PixelFootprint {
   }
 };
 
-// x, y: the pixel's centre.
-TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y) {
+// x, y: the pixel's centre. rho_per_pixel2: as in Saved.
+TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y, float rho_per_pixel2) {
   PixelFootprint f;
   f.x = x - s.anchor_x;
   f.y = y - s.anchor_y;
@@ -41,7 +41,7 @@ TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y) {
   f.nv = std::fma(s.v_x, f.x, std::fma(s.v_y, f.y, s.v_1));
   f.dx = f.x - s.centre_x;
   f.dy = f.y - s.centre_y;
-  const float rho_screen = 2.0F * std::fma(f.dx, f.dx, f.dy * f.dy);
+  const float rho_screen = rho_per_pixel2 * std::fma(f.dx, f.dx, f.dy * f.dy);
   const float rho_plane = std::fma(f.nu, f.nu, f.nv * f.nv) * (f.inverse_w * f.inverse_w);
   f.on_plane = f.w > 0.0F && f.w <= s.w_max && rho_plane <= lower(rho_screen, s.rho_max);
   const float rho = f.on_plane ? rho_plane : rho_screen;
@@ -52,7 +52,8 @@ TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y) {
 
 // Whether a splat may reach the centre of a pixel in the rectangle of centres [low_x, high_x] × [low_y,
 // high_y]. Exact for the ellipse and the low-pass disk, up to a margin for rounding.
-TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float high_x, float high_y) {
+TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float high_x, float high_y,
+                                 float rho_per_pixel2) {
   if (s.ellipse_x != s.ellipse_x) return true;
   constexpr float margin = 0.01F;
   low_x -= margin + s.anchor_x;
@@ -76,7 +77,7 @@ TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float
   if (inside(clamp(on_side_y, low_x, high_x), side_y)) return true;
   const float dx = clamp(s.centre_x, low_x, high_x) - s.centre_x;
   const float dy = clamp(s.centre_y, low_y, high_y) - s.centre_y;
-  return 2.0F * std::fma(dx, dx, dy * dy) <= rho;
+  return rho_per_pixel2 * std::fma(dx, dx, dy * dy) <= rho;
 }
 
 }  // namespace traceflow::raster

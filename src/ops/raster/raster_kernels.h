@@ -97,6 +97,7 @@ struct Saved {
   int tile_columns = 0, tile_rows = 0;
   int64_t count = 0;
   bool has_silhouette = false;
+  float rho_per_pixel2 = 2;  // of the low-pass: ρ over the squared distance to the centre
 
   Tensor<Splat> splats;          // by surfel; unspecified where the bounds are empty
   Tensor<Bounds> bounds;         // by surfel

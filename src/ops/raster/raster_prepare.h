@@ -154,7 +154,7 @@ class Prepare {
     p.centre = camera_.camera_from_world * p.from_camera;
     p.in_front = p.centre.z >= near_plane_;
     if (!p.in_front && by_centre_) return;
-    p.has_low_pass = low_pass_ && p.in_front;
+    p.has_low_pass = low_pass_ > 0 && p.in_front;
     p.log_opacity = std::log(double{surfels_.opacity[i]});
     p.rho_max = std::max(2 * (p.log_opacity - log_alpha_min_), 0.0);
     p.radius = std::sqrt(p.rho_max);
@@ -170,7 +170,7 @@ class Prepare {
     Rectangle box = is_ellipse ? ellipse_box(disk, camera_, p.pixel, ellipse_centre)
                                : clipped_box(disk, camera_, near_plane_);
     if (p.has_low_pass) {
-      const double reach = p.radius / std::sqrt(2.0);
+      const double reach = p.radius * low_pass_ / std::sqrt(2.0);
       box.include(p.pixel.x - reach, p.pixel.y - reach);
       box.include(p.pixel.x + reach, p.pixel.y + reach);
     }
@@ -184,7 +184,7 @@ class Prepare {
   // misses some.
   TRACEFLOW_HD bool is_outside(const Placement& p, double scale) const {
     const double ball = p.radius * scale;
-    const double disk = p.in_front ? (p.radius + 1) * p.centre.z : 0;
+    const double disk = p.in_front ? (p.radius * std::max(low_pass_, 1.0) + 1) * p.centre.z : 0;
     for (const Side& side : sides_) {
       if (dot(side.plane, p.centre) + std::max(ball * side.norm, disk) < 0) return true;
     }
@@ -281,7 +281,8 @@ class Prepare {
   double near_plane_;
   float alpha_min_;
   double log_alpha_min_;
-  int32_t by_centre_, low_pass_;  // yes or no, as whole words: no padding that holds an old address
+  int64_t by_centre_;  // yes or no, as a whole word: no padding that holds an old address
+  double low_pass_;
   Splat* splats_;
   Bounds* bounds_;
   Side sides_[4];

@@ -76,6 +76,8 @@ class Scene {
 
   const Prepared& prepared(int64_t i) const { return prepared_[static_cast<size_t>(i)]; }
   int sh_degree() const { return traceflow::sh_degree(surfels_.sh.dim(1)); }
+  // Of the low-pass, over the squared distance in pixels.
+  double rho_per_pixel2() const { return 2 / (double{options_.low_pass} * options_.low_pass); }
 
   Pixel blend(const Vector2& pixel) const {
     std::vector<Hit> hits;
@@ -117,7 +119,7 @@ class Scene {
     if (!in_front && options_.sort == SortOrder::centre) return p;
     if (!(length(from_camera) > 0)) return p;
     p.drawn = true;
-    p.has_low_pass = options_.low_pass && in_front;
+    p.has_low_pass = options_.low_pass > 0 && in_front;
     if (p.has_low_pass) p.pixel = camera_.project(p.centre);
     p.facing = dot(p.frame.rotation[2], from_camera) > 0 ? -1 : 1;
     p.normal = p.facing * p.frame.rotation[2];
@@ -141,7 +143,7 @@ class Scene {
     const bool hits_plane = hit.plane.valid && hit.plane.t >= options_.near_plane;
     const double rho_plane = hits_plane ? hit.plane.u * hit.plane.u + hit.plane.v * hit.plane.v : infinity;
     const Vector2 offset = pixel - p.pixel;
-    const double rho_screen = p.has_low_pass ? 2 * dot(offset, offset) : infinity;
+    const double rho_screen = p.has_low_pass ? rho_per_pixel2() * dot(offset, offset) : infinity;
     const double rho = std::min(rho_plane, rho_screen);
     if (!(rho < infinity)) return std::nullopt;
     hit.on_plane = rho_plane <= rho_screen;
@@ -297,7 +299,7 @@ class Backward {
     to.opacity += grad_raw * hit.gaussian;
     const double grad_rho = -grad_raw * p.opacity * hit.gaussian / 2;
     if (!hit.on_plane) {
-      to.pixel += grad_rho * -4.0 * (position - p.pixel);
+      to.pixel += grad_rho * -2 * scene_.rho_per_pixel2() * (position - p.pixel);
       to.centre.z += grad_z;
       return;
     }

@@ -33,7 +33,9 @@ std::vector<Case> cases() {
   Options hit = centre;
   hit.sort = SortOrder::hit;
   Options sharp = centre;
-  sharp.low_pass = false;
+  sharp.low_pass = 0;
+  Options blurred = centre;
+  blurred.low_pass = 2.5F;
   SceneOptions mixed;
   mixed.count = 300;
   mixed.scale_min = 0.003;
@@ -62,6 +64,8 @@ std::vector<Case> cases() {
   return {{"mixed", 53, 37, centre, mixed},
           {"mixed_hit", 53, 37, hit, mixed},
           {"sharp", 48, 32, sharp, mixed},
+          {"blurred", 48, 32, blurred, mixed},
+          {"needles_blurred", 50, 33, blurred, needles},
           {"needles", 50, 33, centre, needles},
           {"needles_sharp", 50, 33, sharp, needles},
           {"needles_hit", 40, 30, hit, needles},

@@ -81,7 +81,9 @@ std::vector<GradientCase> gradient_cases() {
   Options hit = centre;
   hit.sort = SortOrder::hit;
   Options sharp = centre;
-  sharp.low_pass = false;
+  sharp.low_pass = 0;
+  Options blurred = centre;
+  blurred.low_pass = 2.5F;
   SceneOptions wide;
   SceneOptions small;  // the low-pass wins
   small.scale_min = 0.005;
@@ -99,10 +101,10 @@ std::vector<GradientCase> gradient_cases() {
   near.depth_min = -0.5;
   near.depth_max = 1;
   near.count = 16;
-  return {{"wide", centre, wide},    {"wide_hit", hit, wide},  {"small", centre, small},
-          {"small_hit", hit, small}, {"dense", centre, dense}, {"dense_hit", hit, dense},
-          {"sharp", sharp, small},   {"bare", centre, bare},   {"near", centre, near},
-          {"near_hit", hit, near}};
+  return {{"wide", centre, wide},    {"wide_hit", hit, wide},     {"small", centre, small},
+          {"small_hit", hit, small}, {"dense", centre, dense},    {"dense_hit", hit, dense},
+          {"sharp", sharp, small},   {"blurred", blurred, small}, {"bare", centre, bare},
+          {"near", centre, near},    {"near_hit", hit, near}};
 }
 
 class ReferenceGradient : public ::testing::TestWithParam<GradientCase> {};
@@ -173,7 +175,10 @@ TEST(RasterReference, low_pass_keeps_a_surfel_smaller_than_a_pixel) {
   forward_reference(scene.surfels, scene.camera, options, out);
   EXPECT_NEAR(out.alpha(1, 3), 0.6 * std::exp(-1.0), 1e-12);
   EXPECT_NEAR(out.alpha(2, 3), 0.6 * std::exp(-2.0), 1e-12);
-  options.low_pass = false;
+  options.low_pass = 2;
+  forward_reference(scene.surfels, scene.camera, options, out);
+  EXPECT_NEAR(out.alpha(1, 3), 0.6 * std::exp(-0.25), 1e-12) << "twice as wide";
+  options.low_pass = 0;
   forward_reference(scene.surfels, scene.camera, options, out);
   EXPECT_EQ(out.alpha(1, 3), 0);
 }

@@ -157,7 +157,7 @@ struct Sums {
     const auto g = hn::IfThenElseZero(is_free, hn::Mul(alpha, grad_alpha));
     log_opacity = hn::Add(log_opacity, g);
     add_plane<asked>(f, hn::IfThenElseZero(on_plane, g), hn::IfThenElseZero(on_plane, grad_z), z, on_plane);
-    // The low-pass: ρ = 2 (dx² + dy²).
+    // The low-pass: ρ = rho_per_pixel2 (dx² + dy²).
     const auto by_centre = hn::IfThenZeroElse(on_plane, g);
     centre_x = hn::MulAdd(by_centre, f.dx, centre_x);
     centre_y = hn::MulAdd(by_centre, f.dy, centre_y);
@@ -277,8 +277,8 @@ class TileUnblender {
       const int block = std::countr_zero(touched);
       for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
         const PixelCentres<Pixels> at{hn::Load(d, x_[block] + lane), hn::Load(d, y_[block] + lane)};
-        sums.template add<asked>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
-                                 state_.blocks[block]);
+        sums.template add<asked>(d, o_, splat, evaluate(d, saved_.rho_per_pixel2, splat, at), place,
+                                 blocks_[block], lane, state_.blocks[block]);
       }
     }
     sums.reduce(d, &saved_.scratch.gradients[entry.entry].u_x);
@@ -291,8 +291,8 @@ class TileUnblender {
       const TileEntry entry = lists_.entries[hits[place].place];
       const Splat& splat = saved_.splats[entry.surfel];
       Sums<OnePixel> sums(d);
-      sums.template add<asked>(d, o_, splat, evaluate(d, splat, at), place, blocks_[block], lane,
-                               state_.blocks[block]);
+      sums.template add<asked>(d, o_, splat, evaluate(d, saved_.rho_per_pixel2, splat, at), place,
+                               blocks_[block], lane, state_.blocks[block]);
       float values[Sums<OnePixel>::padded];
       sums.reduce(d, values);
       float* const to = &saved_.scratch.gradients[entry.entry].u_x;

@@ -51,11 +51,11 @@ HWY_INLINE uint32_t bits_of(D d, M<D> mask) {
   return uint32_t{bits[0]} | uint32_t{bits[1]} << 8;
 }
 
-HWY_INLINE void evaluate_block(const Splat& splat, int x, int y, BlockFootprint& to) {
+HWY_INLINE void evaluate_block(const Splat& splat, float rho_per_pixel2, int x, int y, BlockFootprint& to) {
   const Pixels d;
   to.inside = to.on_plane = 0;
   for (size_t lane = 0; lane < pixels_per_block; lane += hn::Lanes(d)) {
-    const auto f = evaluate(d, splat, pixel_centres(d, x, y, lane));
+    const auto f = evaluate(d, rho_per_pixel2, splat, pixel_centres(d, x, y, lane));
     hn::StoreU(f.opacity, d, to.opacity + lane);
     hn::StoreU(f.inverse_w, d, to.inverse_w + lane);
     hn::StoreU(f.nu, d, to.nu + lane);
@@ -83,12 +83,13 @@ inline RhoSlope plane_slope(const SurfelAxes& f, const Camera<float>& camera, co
   return {camera.position + (splat.z_plane * inverse_w) * ray, -2.0F * (u * by_u + v * by_v)};
 }
 
-// ρ = 2 |x − projected centre|².
+// ρ = rho_per_pixel2 |x − projected centre|².
 inline RhoSlope screen_slope(const SurfelAxes& f, const Camera<float>& camera, const BlockFootprint& at,
-                             int pixel) {
+                             int pixel, float rho_per_pixel2) {
   const Vec3<float> centre = camera.point_in_camera(f.position);
-  const float gx = -4 * at.dx[pixel] * camera.focal_x / centre.z;
-  const float gy = -4 * at.dy[pixel] * camera.focal_y / centre.z;
+  const float slope = -2 * rho_per_pixel2;
+  const float gx = slope * at.dx[pixel] * camera.focal_x / centre.z;
+  const float gy = slope * at.dy[pixel] * camera.focal_y / centre.z;
   const Vec3<float> in_camera(gx, gy, -(gx * centre.x + gy * centre.y) / centre.z);
   return {f.position, in_camera * camera.camera_from_world};
 }
@@ -149,7 +150,7 @@ class BodyTile {
       if (listed.body >= 0) listed.axes = axes_of(surfels_, entry->surfel);
       listed.values = {s.tint,      s.normal[0], s.normal[1], s.normal[2],
                        s.colour[0], s.colour[1], s.colour[2], 0};
-      evaluate_block(s, left, top, listed.at);
+      evaluate_block(s, saved_.rho_per_pixel2, left, top, listed.at);
     }
     return true;
   }
@@ -192,7 +193,7 @@ class BodyTile {
     if (listed.at.opacity[pixel] < options_.alpha_max) {
       const RhoSlope rho = (listed.at.on_plane >> pixel & 1) != 0
                                ? plane_slope(listed.axes, camera_, ray, listed.at, pixel, *listed.splat)
-                               : screen_slope(listed.axes, camera_, listed.at, pixel);
+                               : screen_slope(listed.axes, camera_, listed.at, pixel, saved_.rho_per_pixel2);
       const Vec3<float> turn = cross(rho.at - load3<float>(pivot_.row(listed.body)), rho.slope);
       // The hit shows more, what stands behind it less: d ln α = −dρ/2.
       const float dimmed = hit.alpha / (1 - hit.alpha);

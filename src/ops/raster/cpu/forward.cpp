@@ -231,7 +231,7 @@ class TileBlender {
       splats[i] = &saved_.splats[lists_.entries[places[i]].surfel];
       centres[i] = at;
     }
-    evaluate<count>(d, splats, centres, footprints);
+    evaluate<count>(d, saved_.rho_per_pixel2, splats, centres, footprints);
     for (size_t i = 0; i < count; ++i) {
       if (blend.add(d, o_, *splats[i], footprints[i])) touch(lists_.entries[places[i]], block);
     }
@@ -245,7 +245,7 @@ class TileBlender {
     for (uint32_t i = 0; i < hits.size() && blend.is_live(d); ++i) {
       const TileEntry entry = lists_.entries[hits[i].place];
       const Splat& splat = saved_.splats[entry.surfel];
-      if (blend.add(d, o_, splat, evaluate(d, splat, at))) touch(entry, block);
+      if (blend.add(d, o_, splat, evaluate(d, saved_.rho_per_pixel2, splat, at))) touch(entry, block);
     }
     blend.store(d, o_, lane, left, sums);
   }

@@ -95,7 +95,7 @@ HWY_INLINE PixelCentres<D> pixel_centres(D d, int x, int y, size_t lane) {
 // Evaluates `count` pairs of a splat and a vector of pixels side by side. A pair is a long chain of dependent
 // operations; step by step for all pairs the chains overlap.
 template <size_t count, class D>
-HWY_INLINE void evaluate(D d, const Splat* const* splats, const PixelCentres<D>* at,
+HWY_INLINE void evaluate(D d, float rho_per_pixel2, const Splat* const* splats, const PixelCentres<D>* at,
                          Footprint<D>* footprints) {
   const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
   V<D> rho_screen[count];
@@ -115,8 +115,7 @@ HWY_INLINE void evaluate(D d, const Splat* const* splats, const PixelCentres<D>*
     f.nv = hn::MulAdd(set(s.v_x), f.x, hn::MulAdd(set(s.v_y), f.y, set(s.v_1)));
     f.dx = hn::Sub(f.x, set(s.centre_x));
     f.dy = hn::Sub(f.y, set(s.centre_y));
-    const auto distance2 = hn::MulAdd(f.dx, f.dx, hn::Mul(f.dy, f.dy));
-    rho_screen[i] = hn::Add(distance2, distance2);
+    rho_screen[i] = hn::Mul(set(rho_per_pixel2), hn::MulAdd(f.dx, f.dx, hn::Mul(f.dy, f.dy)));
   }
   for (size_t i = 0; i < count; ++i) {
     const Splat& s = *splats[i];
@@ -135,16 +134,16 @@ HWY_INLINE void evaluate(D d, const Splat* const* splats, const PixelCentres<D>*
 }
 
 template <class D>
-HWY_INLINE Footprint<D> evaluate(D d, const Splat& splat, const PixelCentres<D>& at) {
+HWY_INLINE Footprint<D> evaluate(D d, float rho_per_pixel2, const Splat& splat, const PixelCentres<D>& at) {
   const Splat* const splats[] = {&splat};
   Footprint<D> f;
-  evaluate<1>(d, splats, &at, &f);
+  evaluate<1>(d, rho_per_pixel2, splats, &at, &f);
   return f;
 }
 
 // The blocks of a tile in which a splat may reach a pixel, as bits. Exact for the ellipse and the low-pass
 // disk against the square of each block's pixel centres, up to a margin for rounding.
-HWY_INLINE uint32_t reached_blocks(const Splat& s, int tile_x, int tile_y) {
+HWY_INLINE uint32_t reached_blocks(const Splat& s, float rho_per_pixel2, int tile_x, int tile_y) {
   if (s.ellipse_x != s.ellipse_x) return 0xffff;
   const Pixels d;
   const Int<Pixels> di;
@@ -181,8 +180,7 @@ HWY_INLINE uint32_t reached_blocks(const Splat& s, int tile_x, int tile_y) {
                                 inside(clamp(on_side_y, low_x, high_x), side_y));
     const auto dx = hn::Sub(clamp(set(s.centre_x), low_x, high_x), set(s.centre_x));
     const auto dy = hn::Sub(clamp(set(s.centre_y), low_y, high_y), set(s.centre_y));
-    const auto distance2 = hn::MulAdd(dx, dx, hn::Mul(dy, dy));
-    const auto disk = hn::Le(hn::Add(distance2, distance2), rho);
+    const auto disk = hn::Le(hn::Mul(set(rho_per_pixel2), hn::MulAdd(dx, dx, hn::Mul(dy, dy))), rho);
     uint8_t bits[8] = {};
     hn::StoreMaskBits(d, hn::Or(ellipse, disk), bits);
     reached |= (uint32_t{bits[0]} | uint32_t{bits[1]} << 8) << b;
@@ -246,7 +244,8 @@ HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, TileMemory& me
   uint32_t* const reached = memory.reached.data();
   for (uint32_t place = 0; place < lists.count; ++place) {
     prefetch_splat(saved, lists, place + prefetch_distance);
-    reached[place] = reached_blocks(saved.splats[lists.entries[place].surfel], lists.x, lists.y);
+    reached[place] =
+        reached_blocks(saved.splats[lists.entries[place].surfel], saved.rho_per_pixel2, lists.x, lists.y);
   }
   std::fill_n(reached + lists.count, room, 0U);
   for (int b = 0; b < blocks_per_tile; ++b) {
@@ -274,7 +273,7 @@ struct SortedHits {
       for (uint32_t i = 0; i < lists.counts[block]; ++i) {
         const uint32_t place = lists.of_block[block][i];
         const Splat& splat = saved.splats[lists.entries[place].surfel];
-        const auto f = evaluate(d, splat, at);
+        const auto f = evaluate(d, saved.rho_per_pixel2, splat, at);
         HWY_ALIGN float z[pixels_per_block];
         HWY_ALIGN float inside[pixels_per_block];
         hn::Store(f.z(d, splat), d, z);

@@ -174,7 +174,7 @@ __global__ void __launch_bounds__(pixels_per_tile)
       const int k = cuda::warp_lanes - 1 - __clz(static_cast<int>(left_over));
       left_over &= ~(1U << k);
       const Splat& s = batch[k];
-      const PixelFootprint f = footprint(s, pixel.centre_x(), pixel.centre_y());
+      const PixelFootprint f = pixel.footprint_of(s);
       const bool hit = f.inside && base + k <= g.last;
       if (__ballot_sync(cuda::full_warp, hit) == 0) continue;
       float sums[cuda::warp_lanes] = {};

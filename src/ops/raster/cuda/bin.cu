@@ -134,7 +134,7 @@ int64_t read_back(const Tensor<int64_t>& tensor) {
 void bin(SortOrder order, Saved& saved) {
   Saved::Scratch& s = saved.scratch;
   const int64_t n = saved.count;
-  const TileGrid grid{saved.tile_columns};
+  const TileGrid grid{saved.tile_columns, saved.rho_per_pixel2};
   int32_t* const counts = resized(s.counts, n + 1);
   uint32_t* const keys = resized(s.depth_keys, n);
   uint32_t* const surfels = resized(s.surfels, n);

@@ -116,8 +116,7 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
           bool took = false;
           if (live) {
             const Splat& s = batch[k];
-            took =
-                blend.add(o, s, footprint(s, pixel.centre_x(), pixel.centre_y()), static_cast<int>(base) + k);
+            took = blend.add(o, s, pixel.footprint_of(s), static_cast<int>(base) + k);
             live = !blend.ended();
           }
           const unsigned lanes = __ballot_sync(cuda::full_warp, took);

@@ -18,12 +18,13 @@ struct BoundedSurfel {
 
 struct TileGrid {
   int columns;
+  float rho_per_pixel2;
 
   __device__ int tile(int column, int row) const { return row * columns + column; }
   __device__ bool is_reached(const Splat& splat, int column, int row) const {
     const float x = static_cast<float>(column * tile_edge) + 0.5F;
     const float y = static_cast<float>(row * tile_edge) + 0.5F;
-    return reaches(splat, x, y, x + (tile_edge - 1), y + (tile_edge - 1));
+    return reaches(splat, x, y, x + (tile_edge - 1), y + (tile_edge - 1), rho_per_pixel2);
   }
 };
 

@@ -22,6 +22,7 @@ static_assert(sizeof(BatchSplat) / sizeof(float4) % 2 == 1);
 // The addresses of what forward leaves.
 struct SavedView {
   int width, height, tile_columns;
+  float rho_per_pixel2;
   const Splat* splats;
   const uint32_t* tile_begin;
   const TileEntry* entries;
@@ -29,9 +30,10 @@ struct SavedView {
 };
 
 inline SavedView view_of(const Saved& saved, uint16_t* touched) {
-  return {
-      saved.width,          saved.height, saved.tile_columns, saved.splats.data(), saved.tile_begin.data(),
-      saved.entries.data(), touched};
+  return {saved.width,          saved.height,
+          saved.tile_columns,   saved.rho_per_pixel2,
+          saved.splats.data(),  saved.tile_begin.data(),
+          saved.entries.data(), touched};
 }
 
 // A thread's pixel.
@@ -41,9 +43,11 @@ struct TilePixel {
   int64_t index;
   int warp, lane;
   float warp_x, warp_y;  // centre of the warp's first pixel
+  float rho_per_pixel2;
 
   __device__ TilePixel(const SavedView& saved, int tile) {
     const int thread = static_cast<int>(threadIdx.x);
+    rho_per_pixel2 = saved.rho_per_pixel2;
     warp = thread / cuda::warp_lanes;
     lane = thread % cuda::warp_lanes;
     const int first_x = tile % saved.tile_columns * tile_edge + warp % 2 * warp_columns;
@@ -57,8 +61,12 @@ struct TilePixel {
   }
   __device__ float centre_x() const { return static_cast<float>(x) + 0.5F; }
   __device__ float centre_y() const { return static_cast<float>(y) + 0.5F; }
+  __device__ PixelFootprint footprint_of(const Splat& splat) const {
+    return footprint(splat, centre_x(), centre_y(), rho_per_pixel2);
+  }
   __device__ bool reached_by(const Splat& splat) const {
-    return reaches(splat, warp_x, warp_y, warp_x + (warp_columns - 1), warp_y + (warp_rows - 1));
+    return reaches(splat, warp_x, warp_y, warp_x + (warp_columns - 1), warp_y + (warp_rows - 1),
+                   rho_per_pixel2);
   }
 };
 
@@ -106,7 +114,7 @@ __device__ void for_each_hit(const SavedView& saved, const TilePixel& pixel, uin
   uint32_t place[room];
   const auto footprint_at = [&](uint32_t k, const Splat*& splat) {
     splat = saved.splats + saved.entries[begin + k].surfel;
-    return footprint(*splat, pixel.centre_x(), pixel.centre_y());
+    return pixel.footprint_of(*splat);
   };
   bool is_first = true;
   float last_depth = 0;

@@ -47,7 +47,7 @@ std::vector<std::vector<int>> reached_tiles(const Saved& saved) {
       for (int column = bounds[i].tile_x0; column < bounds[i].tile_x1; ++column) {
         const float x = static_cast<float>(column * tile_edge) + 0.5F;
         const float y = static_cast<float>(row * tile_edge) + 0.5F;
-        if (reaches(splats[i], x, y, x + (tile_edge - 1), y + (tile_edge - 1))) {
+        if (reaches(splats[i], x, y, x + (tile_edge - 1), y + (tile_edge - 1), saved.rho_per_pixel2)) {
           tiles[i].push_back(row * saved.tile_columns + column);
         }
       }

@@ -171,6 +171,16 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuWhereSurfelsReachBehindTheCamera) {
   expect_same_gradients(scene_of(4, 40, 30, o), options(), 0xff);
 }
 
+TEST_P(RasterOnDevice, AgreesWithTheCpuWhereTheLowPassIsWide) {
+  SceneOptions o;
+  o.count = 80;
+  o.scale_min = 0.005;
+  o.scale_max = 0.2;
+  Options blurred = options();
+  blurred.low_pass = 2.5F;
+  expect_same_gradients(scene_of(11, 45, 37, o), blurred, 0xff);
+}
+
 // More surfels in a tile than a batch holds, and pixels that end before the list does.
 TEST_P(RasterOnDevice, AgreesWithTheCpuInLongLists) {
   SceneOptions o;
