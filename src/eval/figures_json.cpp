@@ -28,6 +28,12 @@ nlohmann::ordered_json figure_json(const std::optional<double>& value) {
   return value ? Figures(*value) : Figures(nullptr);
 }
 
+nlohmann::ordered_json surfels_json(const Report& report) {
+  return {{"main", report.main_surfels},
+          {"environment", report.environment_surfels},
+          {"per_masked_pixel", figure_json(report.surfels_per_masked_pixel)}};
+}
+
 void put_figures(const Metrics& metrics, nlohmann::ordered_json& json) {
   Metrics::visit(metrics, [&](const char* name, const std::optional<double>& value) {
     json[name] = figure_json(value);

@@ -1,11 +1,13 @@
 #include "eval/report.h"
 
+#include <algorithm>
 #include <chrono>
 
 #include "capture/motion_truth.h"
 #include "capture/pixels.h"
 #include "eval/carriers.h"
 #include "eval/figures_json.h"
+#include "eval/surfel_density.h"
 #include "scene/viewpoint.h"
 
 namespace traceflow::eval {
@@ -26,6 +28,7 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
   const double z_per_truth = subject.scene.normalisation.scale / capture.normalisation.scale;
   Renderer renderer(subject.render);
   double seconds = 0;
+  int64_t masked_surfels = 0, masked_pixels = 0;
   for (const View& view : views) {
     FrameRequest request = subject.request;
     // The capture may have gained views since, and with them another normalisation than the run's.
@@ -50,8 +53,16 @@ void evaluate(const show::Subject& subject, const Capture& capture, const std::v
                  {compared.colour, compared.mask, truth.normal, &compared.known, &truth.depth, z_per_truth},
                  network),
          view.time});
+    if (!images->mask.empty()) {
+      masked_surfels += surfels_in_mask(frame, images->mask);
+      masked_pixels += std::count_if(images->mask.values().begin(), images->mask.values().end(),
+                                     [](uint8_t inside) { return inside != 0; });
+    }
     if (listener) listener(view, *images, frame);
   }
+  if (masked_pixels > 0)
+    report.surfels_per_masked_pixel =
+        static_cast<double>(masked_surfels) / static_cast<double>(masked_pixels);
   if (seconds > 0) report.render_fps = static_cast<double>(views.size()) / seconds;
   if (motion) report.motion = motion_error(*motion, carriers_of(subject));
 }
@@ -66,7 +77,7 @@ std::string report_json(const Report& report) {
   json["iterations"] = report.iterations;
   json["train_seconds"] = report.train_seconds;
   json["render_fps"] = figure_json(report.render_fps);
-  json["surfels"] = {{"main", report.main_surfels}, {"environment", report.environment_surfels}};
+  json["surfels"] = surfels_json(report);
   put_figures(mean_of(report), json["mean"] = nlohmann::ordered_json::object());
   if (report.aligned) put_figures(*report.aligned, json["mean_aligned"] = nlohmann::ordered_json::object());
   json["motion"] = motion_json(report.motion);

@@ -29,6 +29,8 @@ struct Report {
   std::optional<double> render_fps;  // frames a second, rendering alone
   int64_t main_surfels = 0;
   int64_t environment_surfels = 0;
+  // Main surfels that show in the masks (eval/surfel_density.h), over the masks' pixels.
+  std::optional<double> surfels_per_masked_pixel;
   std::vector<ViewReport> views;
   std::optional<Metrics> aligned;      // means with aligned cameras, where those were asked for
   std::optional<MotionReport> motion;  // where the capture has truth/motion

@@ -73,7 +73,7 @@ Json page_json(const ReportPage& page) {
                {"iterations", report.iterations},
                {"train_seconds", report.train_seconds},
                {"render_fps", figure_json(report.render_fps)},
-               {"surfels", {{"main", report.main_surfels}, {"environment", report.environment_surfels}}}};
+               {"surfels", surfels_json(report)}};
   put_figures(mean_of(report), json["mean"] = Json::object());
   if (report.aligned) put_figures(*report.aligned, json["mean_aligned"] = Json::object());
   json["motion"] = motion_json(report.motion);

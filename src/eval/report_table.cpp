@@ -66,7 +66,7 @@ std::string report_table(const Report& report) {
   std::vector<Column> shown;
   std::copy_if(columns.begin(), columns.end(), std::back_inserter(shown),
                [&](const Column& c) { return (mean.*c.figure).has_value(); });
-  size_t width = 8;
+  size_t width = report.aligned ? 8 : 6;
   for (const ViewReport& view : report.views) width = std::max(width, view.id.size() + 1);
   std::string text = fmt::format("{:<{}}", "view", width);
   for (const Column& c : shown) text += fmt::format("{:>10}", c.head);

@@ -59,7 +59,7 @@ TEST(ReportPage, HoldsTheDataOfTheContract) {
       data_of(report_page(some_page())), Json::parse(R"({"version":"1.2.3","made":"2026-01-02T03:04:05Z",
     "run":"run","capture":"kettle","split":"test","downscale":1,"device":"cuda",
     "machine":{"processor":"chip","threads":4,"memory_bytes":8192,"system":"Linux","gpu":"card"},
-    "iterations":7,"train_seconds":0.0,"render_fps":2.5,"surfels":{"main":3,"environment":0},
+    "iterations":7,"train_seconds":0.0,"render_fps":2.5,"surfels":{"main":3,"environment":0,"per_masked_pixel":null},
     "mean":{"psnr":20.0,)" + metrics + R"(,"motion":null,
     "views":[{"id":"000","time":0.25,"psnr":20.0,)" + metrics +
                                                      R"(,{"id":"001","time":1.0,"psnr":null,)" + metrics +

@@ -69,7 +69,7 @@ TEST(Report, HasTheKeysThatScriptsReadAndNullWhereAFigureCannotBeHad) {
   EXPECT_EQ(
       compact,
       R"({"capture":"kettle","split":"test","views_as_trained":true,"downscale":2,"device":"cpu","iterations":100,"train_seconds":1.5,)"
-      R"("render_fps":null,"surfels":{"main":7,"environment":0},"mean":{"psnr":21.5,)" +
+      R"("render_fps":null,"surfels":{"main":7,"environment":0,"per_masked_pixel":null},"mean":{"psnr":21.5,)" +
           rest + R"(,"motion":null,"views":[{"id":"000","time":0.0,"psnr":20.0,)" + rest +
           R"(,{"id":"001","time":0.5,"psnr":23.0,)" + rest + "]}");
 }
@@ -85,6 +85,13 @@ TEST(Report, TheTableHasAColumnForWhatSomeViewHasAndLinesOfTheMotion) {
             "000        20.00      1.23\n"
             "001            -         -\n"
             "mean       20.00      1.23\n");
+  report.aligned = metrics;
+  EXPECT_EQ(report_table(report),
+            "view          PSNR   cdepth%\n"
+            "000          20.00      1.23\n"
+            "001              -         -\n"
+            "mean         20.00      1.23\n"
+            "aligned      20.00      1.23\n");
   report.motion.emplace();
   report.motion->objects = {{1, 9, 8, {0.5, 0.1, 0.2, 3.0, 0.9, 1.0}, {}}, {4, 7, 2, {}, {}}};
   report.motion->mean = report.motion->objects[0].figures;

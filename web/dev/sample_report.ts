@@ -107,7 +107,7 @@ const data: ReportData = {
   iterations: 8000,
   train_seconds: 717.4,
   render_fps: 14.2,
-  surfels: { main: 20000, environment: 8443 },
+  surfels: { main: 20000, environment: 8443, per_masked_pixel: 1.21 },
   mean: { ...figures(0.4), psnr: 22.42 },
   motion: { mean: object(1, 0.15), objects: [object(1, 0.1), object(2, 0.3)] },
   views: captured_cameras.test.map((view, i) => ({ id: view.id, time: view.time, ...figures(i) })),

@@ -11,6 +11,7 @@ export function Facts({ data }: { data: ReportData }) {
     ['Iterations', count(data.iterations)],
     ['Training took', duration(data.train_seconds)],
     ['Surfels', `${count(surfels.main)} main, ${count(surfels.environment)} environment`],
+    ['In masks', surfels.per_masked_pixel === null ? '' : `${surfels.per_masked_pixel.toFixed(2)} main surfels a pixel`],
     ['Rendering', data.render_fps === null ? '' : `${data.render_fps.toFixed(1)} pictures a second`],
     ['Device', data.device],
     ['Processor', `${machine.processor}, ${machine.threads} threads`],

@@ -50,7 +50,7 @@ export interface ReportData {
   iterations: number;
   train_seconds: number;
   render_fps: number | null;
-  surfels: { main: number; environment: number };
+  surfels: { main: number; environment: number; per_masked_pixel: number | null };
   mean: Figures;
   mean_aligned?: Figures; // with cameras from which the scene looks most like the photographs
   motion: { mean: MotionFigures; objects: ObjectMotion[] } | null; // null without truth
