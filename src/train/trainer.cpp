@@ -133,7 +133,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       health_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
-      before_step_{random_, views_, -1, {}, {}, {}, {}, {}} {
+      before_step_{random_, views_, -1, {}, {}, {}, {}, {}, false} {
   density_changes_.reserve(2);
   if (device == Device::cuda) memory::set_device_budget(static_cast<size_t>(memory_.budget_bytes));
 }
@@ -167,9 +167,8 @@ FrameRequest Trainer::request_for(const View& view) {
 NormalLosses Trainer::normal_losses(const Trainable& trainable, const Tracking& now) const {
   if (!trainable.main || !schedule_.uses_normal_losses(iteration_)) return NormalLosses::none;
   // With more of them while bodies are followed, their depth errors were twice as large.
-  const bool follows = now.goes_on && !bodies_stand_;
   const bool mirrors = schedule_.phase(iteration_) != Phase::diffuse;
-  return mirrors && !follows ? NormalLosses::more_on_mirrors : NormalLosses::even;
+  return mirrors && !now.goes_on ? NormalLosses::more_on_mirrors : NormalLosses::even;
 }
 
 const View& Trainer::draw_view() {
@@ -197,18 +196,18 @@ void Trainer::fade(std::span<const int64_t> rows) {
 LossTerms Trainer::step() {
   density_changes_.clear();
   renderer_.options().samples = schedule_.samples(iteration_);
+  const Surfels new_surface = follow_bodies(tracking(iteration_));
   const Tracking now = tracking(iteration_);
-  const Surfels new_surface = follow_bodies(now);
   const View& view = draw_view();
   ViewImages& target = targets_.of(capture_, view, scene_.main_motion.has_value());
   FrameRequest request = request_for(view);
   request.silhouette =
       scene_.main_motion && carries_ && options_.loss.silhouette > 0 && !target.coverage.empty();
   Trainable trainable = schedule_.trainable(iteration_);
-  const bool bodies_move = trainable.main && scene_.main_motion && !now.goes_on;
-  trainable.main_motion = bodies_move && !options_.deform.track.true_poses;
-  trainable.main_nodes = bodies_move && scene_.main_nodes;
-  trainable.lighting = bodies_move && scene_.lighting;
+  const bool has_followed = trainable.main && scene_.main_motion && !now.goes_on;
+  trainable.main_motion = has_followed && !bodies_stand_ && !options_.deform.track.true_poses;
+  trainable.main_nodes = has_followed && scene_.main_nodes;
+  trainable.lighting = has_followed && scene_.lighting;
   // Gradients through reflections hold back the rotation of a body, so it is followed without them.
   if (now.goes_on) {
     request.specular = false;
@@ -398,7 +397,7 @@ std::string Trainer::tell_iteration() {
     tell_measured();
     stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
-  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}, {}, {}};
+  before_step_ = Draws{random_, views_, iteration_, {}, {}, {}, {}, {}, bodies_stand_};
   if (const Tracking now = tracking(iteration_); now.enters || now.refines) {
     before_step_.motion = scene_.main_motion;
     before_step_.nodes = scene_.main_nodes;
@@ -520,6 +519,7 @@ void Trainer::step_back() {
       scene_.lighting = before_step_.lighting;
       scene_.main = *before_step_.main;
       texture_trust_ = before_step_.texture_trust;
+      bodies_stand_ = before_step_.bodies_stand;
     }
   }
   tell_density();

@@ -110,8 +110,12 @@ class Trainer {
   // Measures the bias of normal priors in masks, and undoes it from then on.
   void turn_priors();
   void set_prior_bias(const Mat3<double>& bias);
-  // Before the second time is followed: whether the masks of all times fit bodies that stand still.
+  // Before the second time is followed: whether the masks of all times fit bodies that stand still. Then none
+  // is followed, and their poses stay at rest.
   void see_whether_bodies_stand();
+  // Whether everything trains as soon as bodies are known to stand, and not from the film's end on. Without
+  // normal priors reflections that begin so early harm the shape.
+  bool skips_following() const;
   // Makes rigid bodies as large as the first picture shows them, where poses are known well, and puts them as
   // far away as the points are; and the motion what fits. Everything on the CPU; the scene takes it over, all
   // but the motion.
@@ -188,6 +192,7 @@ class Trainer {
     std::optional<Lighting> lighting;
     std::optional<Surfels> main;
     TextureTrust texture_trust;
+    bool bodies_stand = false;
   };
   // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
   // again.

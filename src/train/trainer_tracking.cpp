@@ -72,6 +72,9 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
   const int64_t keys = scene_.main_motion->keys();
   const int since = iteration - std::min(track.warm_up, options_.iterations / least_share);
   if (since < 0) return {.goes_on = true};
+  if (skips_following()) {
+    return {.refines = schedule_.solves_poses_again(iteration, iteration - since), .key = keys - 1};
+  }
   const int64_t key = 1 + since / track.map_each;
   if (key < keys) return {.goes_on = true, .enters = since % track.map_each == 0, .key = key};
   Tracking now{.enters = key == keys && since % track.map_each == 0, .key = keys - 1};
@@ -87,6 +90,13 @@ Tracker Trainer::make_tracker() const {
 Surfels Trainer::follow_bodies(const Tracking& now) {
   constexpr int64_t strays_every = 5;  // times
   Surfels made;
+  if (now.enters && now.key == 1) see_whether_bodies_stand();
+  if (now.enters && now.key == 1 && skips_following()) {
+    health_.expect_fall();
+    let_strays_go(scene_.main_motion->keys() - 1);
+    settle();
+    return made;
+  }
   const bool has_come_to_the_end = now.enters && !now.goes_on;
   if (now.enters && now.goes_on) {
     follow(now.key);
@@ -114,7 +124,7 @@ void Trainer::settle() {
   }
   let_stand();
   if (!carries_) return;
-  let_bend(misfits);
+  if (!bodies_stand_) let_bend(misfits);
   if (options_.deform.lighting.cells > 0) let_light_change();
 }
 
@@ -156,6 +166,7 @@ void Trainer::follow_again() {
 }
 
 void Trainer::see_whether_bodies_stand() {
+  if (options_.deform.track.true_poses) return;
   const std::vector<double> misfits = silhouette_misfits();
   if (misfits.empty()) return;
   const double misfit = mean_of(misfits);
@@ -163,11 +174,11 @@ void Trainer::see_whether_bodies_stand() {
   stream_.emit(events::FollowingDecided{iteration_, !bodies_stand_, misfit});
 }
 
+bool Trainer::skips_following() const { return bodies_stand_ && capture_.has_normal_priors; }
+
 void Trainer::follow(int64_t key) {
   health_.expect_fall();
-  if (options_.deform.track.true_poses) return;
-  if (key == 1) see_whether_bodies_stand();
-  if (bodies_stand_) return;
+  if (options_.deform.track.true_poses || bodies_stand_) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);
   const TrackOptions& track = options_.deform.track;
