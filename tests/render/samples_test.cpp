@@ -74,7 +74,7 @@ TEST(Samples, AreAsManyForAnAngleAsInTraining) {
 // smaller than a pixel are drawn as large for the eye.
 TEST(Samples, ALargerPictureHasThePixelsOfATrainedOne) {
   Fixture f;
-  f.scene.main.log_scale.fill(std::log(0.01F));  // a quarter of a pixel where most stand
+  f.scene.main.log_scale.fill(std::log(0.001F));  // a fortieth of a pixel where most stand
   f.scene.focal = f.request.camera.focal_x;
   const Tensor<float> trained = Renderer(RenderOptions{}).forward(f.scene, f.request).colour;
   f.request.camera = samples::camera_of(f.request.camera, 3);
