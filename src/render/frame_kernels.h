@@ -44,6 +44,26 @@ struct AddNumbers {
   TRACEFLOW_HD void operator()(int64_t i) const { to[i] += from[i]; }
 };
 
+// What lies behind the environment surfels: colour += (1 − α) · behind, of each channel of a ray (method
+// §5.4).
+struct AddBehind {
+  const float *alpha, *behind;
+  float* colour;
+  TRACEFLOW_HD void operator()(int64_t i) const { colour[i] += (1 - alpha[i / 3]) * behind[i]; }
+};
+struct AddBehindBackward {
+  const float *alpha, *behind, *grad_colour;
+  float *grad_alpha, *grad_behind;
+  TRACEFLOW_HD void operator()(int64_t ray) const {
+    float sum = 0;
+    for (int64_t i = 3 * ray; i < 3 * ray + 3; ++i) {
+      sum -= grad_colour[i] * behind[i];
+      grad_behind[i] = (1 - alpha[ray]) * grad_colour[i];
+    }
+    grad_alpha[ray] = sum;
+  }
+};
+
 // Density control's signals of the drawn surfels, at the places of the stored ones.
 struct PlaceSignal {
   StoredRow row;

@@ -94,6 +94,12 @@ bool Renderer::reflects(const Scene& scene, const FrameRequest& request) const {
   return scene.specular == Specular::environment_map && scene.environment_map.has_value();
 }
 
+trace::Options Renderer::trace_options(const Scene& scene) const {
+  trace::Options options = options_.trace_options(scene.extent);
+  if (scene.environment_map) options.background = Vec3<float>(0);
+  return options;
+}
+
 void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
   const Field* field = field_if(scene.main_field, request.deform_main);
   const Device device = scene.device();
@@ -209,9 +215,14 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
     return;
   }
   pose_environment(scene, request, keep_for_backward);
-  trace::forward(frame_.environment, *bvh_, rays.origins, rays.directions,
-                 options_.trace_options(scene.extent), trace_output_,
-                 keep_for_backward ? trace_saved_.get() : nullptr);
+  trace::forward(frame_.environment, *bvh_, rays.origins, rays.directions, trace_options(scene),
+                 trace_output_, keep_for_backward ? trace_saved_.get() : nullptr);
+  if (scene.environment_map) {
+    reflection_map::forward(*scene.environment_map, rays.directions, request.time, false, options_.precision,
+                            behind_, map_saved_);
+    parallel_for(scene.device(), "render: behind the environment", behind_.size(),
+                 AddBehind{trace_output_.alpha.data(), behind_.data(), trace_output_.colour.data()});
+  }
   frame_.specular_rays.swap(trace_output_.colour);
   rays.alpha.swap(trace_output_.alpha);
   rays.distance.swap(trace_output_.distance);
@@ -315,8 +326,21 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
                              grad_trace_.colour, gradient.environment_map, *grad_directions);
   } else {
     const Field* field = field_if(scene.environment_field, request.deform_environment);
+    if (scene.environment_map) {
+      grad_trace_.alpha.place(scene.device()).resize(frame_.mirrored.alpha.shape());
+      grad_behind_.place(scene.device()).resize(behind_.shape());
+      parallel_for(scene.device(), "render: behind the environment backward", frame_.mirrored.alpha.size(),
+                   AddBehindBackward{frame_.mirrored.alpha.data(), behind_.data(), grad_trace_.colour.data(),
+                                     grad_trace_.alpha.data(), grad_behind_.data()});
+      reflection_map::backward(*scene.environment_map, frame_.mirrored.directions, request.time, false, false,
+                               map_saved_, grad_behind_, gradient.environment_map, grad_behind_directions_);
+    }
     trace::backward(frame_.environment, frame_.mirrored.origins, frame_.mirrored.directions,
-                    options_.trace_options(scene.extent), *trace_saved_, grad_trace_, grad_trace_input_);
+                    trace_options(scene), *trace_saved_, grad_trace_, grad_trace_input_);
+    if (scene.environment_map) {
+      parallel_for(scene.device(), "render: add gradients of directions", grad_behind_directions_.size(),
+                   AddNumbers{grad_behind_directions_.data(), grad_directions->data()});
+    }
     gradient.environment_signal = grad_trace_input_.position_gradient;
     parallel_for(scene.device(), "render: flag signals", frame_.environment.count(),
                  FlagNonZero{gradient.environment_signal.data(), gradient.environment_visible.data()});

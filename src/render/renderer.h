@@ -64,6 +64,7 @@ class Renderer {
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                          SceneGradient& gradient);
   bool reflects(const Scene& scene, const FrameRequest& request) const;
+  trace::Options trace_options(const Scene& scene) const;
 
   RenderOptions options_;
   Frame frame_;
@@ -77,6 +78,8 @@ class Renderer {
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;
   reflection_map::Saved map_saved_;
+  Tensor<float> behind_;  // P×3, what lies behind the environment surfels, and its gradients
+  Tensor<float> grad_behind_, grad_behind_directions_;
   raster::Output samples_;       // where a pixel has several
   Tensor<float> sample_colour_;  // these shaded, and its gradient
   Tensor<float> grad_sample_colour_;

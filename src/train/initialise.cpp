@@ -324,6 +324,10 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
       scene.environment_field =
           make_field(options.deform.environment_network, residual::environment_outputs, random);
     }
+    if (const int64_t side = options.initial.far_size; side > 0) {
+      scene.environment_map.emplace();
+      scene.environment_map->logit.reset({6 * side, side, 3});
+    }
   } else if (options.specular == Specular::environment_map) {
     scene.environment_map.emplace();
     scene.environment_map->logit.reset({6L * options.initial.map_size, options.initial.map_size, 3});

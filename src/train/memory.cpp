@@ -98,7 +98,8 @@ int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t
                   field_bytes(environment_set, mapped ? samples * pixels : environment, kept) +
                   4 * planes_of_a_frame * samples * pixels + o.capture.cache_mebibytes * mebibyte +
                   64 * mebibyte;
-  if (mapped) bytes += 4 * copies_of_parameters * 6 * 3 * int64_t{o.initial.map_size} * o.initial.map_size;
+  const int64_t side = mapped ? o.initial.map_size : o.initial.far_size;
+  if (o.specular != Specular::none) bytes += 4 * copies_of_parameters * 6 * 3 * side * side;
   if (o.deform.kind == "nodes") bytes += lighting_bytes(o.deform.lighting, run.times);
   if (o.loss.lpips > 0) bytes += lpips::network_bytes + pixels * lpips::gradient_bytes_per_pixel;
   if (run.device == Device::cpu) return bytes + (traced ? samples * pixels * bytes_per_ray : 0);

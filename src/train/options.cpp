@@ -231,6 +231,8 @@ void InitialOptions::validate() const {
   check_option(environment_per_cell >= 1, "initial.environment_per_cell", environment_per_cell, "1 or more");
   check_option(environment_box > 0, "initial.environment_box", environment_box, "a positive number");
   check_option(environment_points >= 0, "initial.environment_points", environment_points, "0 or more");
+  check_option(far_size == 0 || (far_size >= 2 && far_size <= 4096), "initial.far_size", far_size,
+               "0, or 2 to 4096");
   check_option(map_size >= 2 && map_size <= 4096, "initial.map_size", map_size, "2 to 4096");
 }
 

@@ -343,6 +343,7 @@ struct InitialOptions {
   float environment_opacity = 0.1F;
   float environment_box = 1.5F;
   int environment_points = 0;
+  int far_size = 0;
   int map_size = 64;
 
   template <class Visitor>
@@ -367,6 +368,8 @@ struct InitialOptions {
     v.field("environment_box", environment_box, "", "Size of that box, in boxes around cameras and points.");
     v.field("environment_points", environment_points, "points",
             "So many of the capture's points outside its masks start as environment surfels too.");
+    v.field("far_size", far_size, "texels",
+            "Side of a face of the cube map behind the environment surfels; 0: none (method §5.4).");
     v.field("map_size", map_size, "texels", "Side of a face of the environment map.");
   }
   void validate() const;

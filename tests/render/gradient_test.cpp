@@ -46,7 +46,7 @@ TEST_P(EndToEnd, RendererGradientAgreesWithReference) {
 
 INSTANTIATE_TEST_SUITE_P(Graphs, EndToEnd,
                          testing::Values(Graph::diffuse, Graph::diffuse_deformed, Graph::reflected,
-                                         Graph::reflected_map, Graph::several_samples));
+                                         Graph::reflected_map, Graph::reflected_far, Graph::several_samples));
 
 }  // namespace
 }  // namespace traceflow::whole_graph

@@ -163,7 +163,7 @@ class Graph {
 
   void forward_specular() {
     reflect();
-    if (p_.map) {
+    if (p_.map && p_.map->field) {
       moved_ = directions_;
       if (s_.deform) {
         Tensor<double> residuals;
@@ -177,12 +177,16 @@ class Graph {
                               s_.environment_points, s_.time, s_.sh_degree, environment_);
     trace::forward_reference(environment_, origins_, directions_, s_.trace, trace_);
     specular_ = trace_.colour;
+    if (!p_.map) return;
+    moved_ = directions_;
+    environment_map::forward(p_.map->logit, moved_, behind_);
+    for (int64_t i = 0; i < specular_.size(); ++i) specular_[i] += (1 - trace_.alpha[i / 3]) * behind_[i];
   }
 
   void backward_specular(const Tensor<double>& grad_specular, Gradient& g) {
     trace::BasicInputGradient<double> input;
-    if (p_.map) {
-      g.map.logit.reset(p_.map->logit.shape());
+    if (p_.map) g.map.logit.reset(p_.map->logit.shape());
+    if (p_.map && p_.map->field) {
       g.map.field = zeros_like<double>(*p_.map->field);
       input.origins.reset(origins_.shape());
       input.directions.reset(directions_.shape());
@@ -193,10 +197,22 @@ class Graph {
     } else {
       trace::BasicOutputGradient<double> grad_trace;
       grad_trace.colour = grad_specular;
+      Tensor<double> by_behind;
+      if (p_.map) {
+        grad_trace.alpha.reset(trace_.alpha.shape());
+        Tensor<double> grad_behind(behind_.shape());
+        for (int64_t i = 0; i < behind_.size(); ++i) {
+          grad_behind[i] = (1 - trace_.alpha[i / 3]) * grad_specular[i];
+          grad_trace.alpha[i / 3] -= grad_specular[i] * behind_[i];
+        }
+        by_behind.reset(directions_.shape());
+        environment_map::backward(p_.map->logit, moved_, grad_behind, g.map.logit, by_behind);
+      }
       trace::backward_reference(environment_, origins_, directions_, s_.trace, grad_trace, input);
       deform::backward_reference(p_.environment, s_.deform ? &p_.environment_field : nullptr,
                                  s_.environment_points, s_.time, input.surfels, g.environment,
                                  s_.deform ? &g.environment_field : nullptr);
+      for (int64_t i = 0; i < by_behind.size(); ++i) input.directions[i] += by_behind[i];
     }
     surface::reflection_rays_backward(camera_of_samples(p_.camera, s_.samples), tensor_of(pixels_),
                                       sampled_.depth, sampled_.median_depth, sampled_.normal, s_.depth_ratio,
@@ -230,7 +246,7 @@ class Graph {
   Tensor<double> weights_, medians_, has_median_;
   trace::BasicOutput<double> trace_;
   std::vector<int32_t> pixels_;
-  Tensor<double> pseudo_, origins_, directions_, moved_, specular_, colour_;
+  Tensor<double> pseudo_, origins_, directions_, moved_, behind_, specular_, colour_;
   Tensor<double> grad_colour_, grad_pseudo_;
   raster::BasicOutputGradient<double> grad_, grad_sampled_;
 };

@@ -15,7 +15,8 @@ namespace traceflow::reference {
 struct Parameters {
   BasicSurfels<double> main, environment;
   BasicField<double> main_field, environment_field;
-  std::optional<BasicEnvironmentMap<double>> map;  // in the place of the environment surfels when present
+  // In the place of the environment surfels where it has a field, else behind them.
+  std::optional<BasicEnvironmentMap<double>> map;
   Camera<double> camera;
 };
 

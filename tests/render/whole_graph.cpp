@@ -60,7 +60,7 @@ Tensor<double> random_image(Random& random, bool unit) {
   return image;
 }
 
-std::vector<float> flat(const SceneGradient& g, bool map) {
+std::vector<float> flat(const SceneGradient& g, const Scene& scene) {
   std::vector<float> all;
   const auto take = [&](const Tensor<float>& placed) {
     const Tensor<float> t = placed.on(Device::cpu);
@@ -68,8 +68,8 @@ std::vector<float> flat(const SceneGradient& g, bool map) {
   };
   g.main.for_each([&](const char*, const Tensor<float>& t) { take(t); });
   g.main_field.for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
-  if (map) {
-    take(g.environment_map.logit);
+  if (scene.environment_map) take(g.environment_map.logit);
+  if (scene.specular == Specular::environment_map) {
     g.environment_map.field->for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
   } else {
     g.environment.for_each([&](const char*, const Tensor<float>& t) { take(t); });
@@ -109,11 +109,13 @@ Case make_case(Graph graph) {
   c.scene.environment = wall_of_surfels(8, -3.2F, 0.8F, 1.6F, false, random);
   c.scene.main_field = small_field(residual::main_outputs, random);
   c.scene.environment_field = small_field(residual::environment_outputs, random);
-  if (graph == Graph::reflected_map) {
-    c.scene.specular = Specular::environment_map;
+  if (graph == Graph::reflected_map || graph == Graph::reflected_far) {
     c.scene.environment_map.emplace();
     c.scene.environment_map->logit.reset({6 * 5, 5, 3});
     for (float& v : c.scene.environment_map->logit.values()) v = static_cast<float>(random.normal());
+  }
+  if (graph == Graph::reflected_map) {
+    c.scene.specular = Specular::environment_map;
     c.scene.environment_map->field = small_field(3, random);
   }
   Camera<float>& camera = c.request.camera;
@@ -128,8 +130,7 @@ Case make_case(Graph graph) {
   c.request.sh_degree_main = 2;
   c.request.sh_degree_environment = 2;
   c.request.deform_main = c.request.deform_environment = graph != Graph::diffuse;
-  c.request.specular =
-      graph == Graph::reflected || graph == Graph::reflected_map || graph == Graph::several_samples;
+  c.request.specular = graph != Graph::diffuse && graph != Graph::diffuse_deformed;
   c.request.pseudo_normals = true;
   c.options.samples = graph == Graph::several_samples ? 2 : 1;
   c.options.depth_ratio = 0.3F;
@@ -147,7 +148,8 @@ Case make_case(Graph graph) {
   if (c.scene.environment_map) {
     c.parameters.map.emplace();
     c.parameters.map->logit = convert<double>(c.scene.environment_map->logit);
-    c.parameters.map->field = convert<double>(*c.scene.environment_map->field);
+    if (c.scene.environment_map->field)
+      c.parameters.map->field = convert<double>(*c.scene.environment_map->field);
   }
   c.parameters.camera = convert<double>(camera);
   c.setting.raster = c.options.raster_options(1);
@@ -161,7 +163,8 @@ Case make_case(Graph graph) {
   c.setting.prior = random_image(random, true);
   c.setting.main_points = c.parameters.main.position;
   c.setting.environment_points = c.parameters.environment.position;
-  if (c.parameters.map) c.setting.map_directions = reference::reflection_directions(c.parameters, c.setting);
+  if (graph == Graph::reflected_map)
+    c.setting.map_directions = reference::reflection_directions(c.parameters, c.setting);
   return c;
 }
 
@@ -174,7 +177,7 @@ std::vector<float> renderer_gradient(const Case& c, Device device) {
   SceneGradient gradient;
   gradient.reset(scene);
   renderer.backward(scene, c.request, Trainable{}, grad_frame, gradient);
-  return flat(gradient, c.parameters.map.has_value());
+  return flat(gradient, c.scene);
 }
 
 void expect_agreement_with_reference(Graph graph, Device device) {

@@ -9,7 +9,7 @@
 // A small scene through every phase's graph, for the end-to-end gradient tests.
 namespace traceflow::whole_graph {
 
-enum class Graph { diffuse, diffuse_deformed, reflected, reflected_map, several_samples };
+enum class Graph { diffuse, diffuse_deformed, reflected, reflected_map, reflected_far, several_samples };
 
 struct Case {
   Scene scene;
@@ -43,8 +43,8 @@ void for_each_group(reference::Parameters& p, reference::Gradient& g, const F& f
   };
   surfels("main", p.main, g.main);
   field("main_field", p.main_field, g.main_field);
-  if (p.map) {
-    f(std::string("map.logit"), p.map->logit.values(), g.map.logit.values());
+  if (p.map) f(std::string("map.logit"), p.map->logit.values(), g.map.logit.values());
+  if (p.map && p.map->field) {
     field("map.field", *p.map->field, *g.map.field);
   } else {
     surfels("environment", p.environment, g.environment);

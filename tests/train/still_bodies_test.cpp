@@ -98,8 +98,9 @@ TEST(StillBodies, ReflectAtOnceWhereThereAreNormalPriors) {
     Trainer trainer(options, std::move(capture),
                     fs::path(::testing::TempDir()) / ("reflects_" + std::to_string(::getpid())));
     bool decided = false;
-    trainer.stream().listen(
-        [&](const events::Event& event) { decided |= std::holds_alternative<events::FollowingDecided>(event); });
+    trainer.stream().listen([&](const events::Event& event) {
+      decided |= std::holds_alternative<events::FollowingDecided>(event);
+    });
     while (!decided) trainer.step();
     const std::vector<float> before(trainer.scene().main.tint_logit.values().begin(),
                                     trainer.scene().main.tint_logit.values().end());

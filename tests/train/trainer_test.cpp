@@ -148,7 +148,8 @@ TEST(Trainer, AnotherSeedGivesOtherBytes) {
 }
 
 // With a network that moves surfels, with bodies, the second of whose times is entered after 9 iterations,
-// with bodies that bend from the last time on, and with cameras that are refined.
+// with bodies that bend from the last time on, and with cameras that are refined and a far part of the
+// environment.
 class ResumedTrainer : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, ResumedTrainer, ::testing::Values("network", "nodes", "bend", "cameras"));
 
@@ -158,6 +159,7 @@ TEST_P(ResumedTrainer, EndsInTheBytesOfAnUninterruptedOne) {
   const bool refines = std::string(GetParam()) == "cameras";
   options.deform.kind = bends || refines ? "nodes" : GetParam();
   options.rates.camera = refines ? 1e-4F : 0;
+  options.initial.far_size = refines ? 4 : 0;
   options.deform.bend.misfit = 0;
   options.deform.track.new_surface = true;
   options.deform.bend.nodes = bends ? 5 : 0;
@@ -507,6 +509,10 @@ TEST(Memory, AnEnvironmentMapCounts) {
   const NetworkOptions& network = options.deform.environment_network;
   EXPECT_GT(map - none, int64_t{3000} * 4 * network.width * network.depth) << "the field at every pixel";
   EXPECT_GT(large - map, int64_t{6} * 1024 * 1024 * 3 * 4 * 4) << "parameter, gradient and moments";
+  options.specular = Specular::environment_gaussians;
+  const int64_t near = unlimited_forecast({options, Device::cpu, 3000, 1});
+  options.initial.far_size = 1024;
+  EXPECT_GT(unlimited_forecast({options, Device::cpu, 3000, 1}) - near, int64_t{6} * 1024 * 1024 * 3 * 4 * 4);
 }
 
 TEST(Memory, SamplesCountAsPixels) {

@@ -25,6 +25,8 @@ void run_export(const ExportArguments& a) {
   if (run.subject.request.specular && run.subject.scene.specular == Specular::environment_map) {
     std::cerr
         << "this run's reflections are a cube map, which a .ply cannot hold: main.ply alone is written\n";
+  } else if (run.subject.request.specular && run.subject.scene.environment_map) {
+    std::cerr << "the cube map behind this run's environment is left out: a .ply cannot hold one\n";
   }
   const std::optional<float> time = a.undeformed ? std::nullopt : std::optional(a.time);
   for (const auto& path : show::export_subject(run.subject, time, a.output))

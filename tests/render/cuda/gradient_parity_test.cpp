@@ -22,7 +22,8 @@ TEST_P(EndToEndOnDevice, SumsInAFixedOrderHaveTheSameBytesEveryTime) {
 
 INSTANTIATE_TEST_SUITE_P(Graphs, EndToEndOnDevice,
                          ::testing::Values(Graph::diffuse, Graph::diffuse_deformed, Graph::reflected,
-                                           Graph::reflected_map, Graph::several_samples));
+                                           Graph::reflected_map, Graph::reflected_far,
+                                           Graph::several_samples));
 
 }  // namespace
 }  // namespace traceflow::whole_graph
