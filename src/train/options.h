@@ -25,7 +25,7 @@ struct ScheduleOptions {
   int time_jitter_until = 20000;
   float first_times = 1;
   int all_times_from = 0;
-  int samples_from = 42000;
+  int samples_from = 46500;
 
   template <class Visitor>
   void visit(Visitor& v) {

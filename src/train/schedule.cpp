@@ -62,10 +62,9 @@ int Schedule::samples(int iteration) const {
   return iteration >= mark(options_.schedule.samples_from) ? options_.render.samples : 1;
 }
 
-RenderOptions Schedule::render_for_tracking(int iteration) const {
+RenderOptions Schedule::render(int iteration) const {
   RenderOptions render = options_.render;
-  render.samples = 1;
-  render.low_pass = render.low_pass && samples(iteration) == 1;
+  render.samples = samples(iteration);
   return render;
 }
 
@@ -205,9 +204,7 @@ FrameRequest picture_request(const TrainOptions& options, int64_t iterations) {
 }
 
 RenderOptions picture_render(const TrainOptions& options, int64_t iterations) {
-  RenderOptions render = options.render;
-  render.samples = Schedule(options).samples(last_of(iterations));
-  return render;
+  return Schedule(options).render(last_of(iterations));
 }
 
 }  // namespace traceflow

@@ -23,9 +23,8 @@ class Schedule {
   bool uses_lpips(int iteration) const;
   // Along each side of a pixel (RenderOptions).
   int samples(int iteration) const;
-  // How bodies are drawn for the tracker: always one sample a pixel. Its low-pass is wider than that of
-  // several, and would widen surfels that are trained with these.
-  RenderOptions render_for_tracking(int iteration) const;
+  // The options' own, with the samples of the iteration.
+  RenderOptions render(int iteration) const;
   int sh_degree_main(int iteration) const;
   int sh_degree_environment(int iteration) const;
   // Standard deviation of the noise on the time (method §7.6), in frame intervals.

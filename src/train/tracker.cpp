@@ -92,6 +92,12 @@ void hold_mirrors(Motion& motion, int64_t key, const LooseTurns& loose, const Te
 
 }  // namespace
 
+raster::Options raster_for_tracking(const RenderOptions& render, float extent) {
+  raster::Options options = render.raster_options(extent);
+  options.low_pass /= static_cast<float>(render.samples);
+  return options;
+}
+
 Tracker::Tracker(const TrackOptions& options, const RenderOptions& render, const Capture& capture)
     : options_(options), render_(render), capture_(capture) {}
 
@@ -154,7 +160,7 @@ PoseSolver Tracker::solver(const Surfels& main, const Nodes* nodes, Motion& moti
     TrackTarget target = target_of(view, widest);
     if (!target.coverage.empty()) targets.push_back(std::move(target));
   }
-  PoseSolver solver(main, nodes, motion, key, render_.raster_options(extent), std::move(targets));
+  PoseSolver solver(main, nodes, motion, key, raster_for_tracking(render_, extent), std::move(targets));
   solver.turn_priors();
   return solver;
 }
@@ -177,7 +183,7 @@ std::vector<Tracker::EarlierView> Tracker::earlier_views(const Surfels& main, co
     for (const size_t view : views_at(motion, key - back)) {
       earlier.push_back({back, view,
                          draw_bodies(drawn_camera(capture_.train[view]), motion, key - back, main,
-                                     render_.raster_options(extent))});
+                                     raster_for_tracking(render_, extent))});
       if (!has_tracks()) break;
     }
   }
@@ -339,7 +345,7 @@ std::vector<Tracker::Adjusted> Tracker::adjust(const Surfels& main, const std::v
   std::vector<Adjusted> adjusted(bodies.size());
   std::vector<Motion> rigid(bodies.size(), motion);
   std::vector<PhotometricAdjustment> as_rigid, as_bent;
-  const raster::Options drawing = render_.raster_options(extent);
+  const raster::Options drawing = raster_for_tracking(render_, extent);
   for (size_t b = 0; b < bodies.size(); ++b) {
     adjusted[b] = {bodies[b], 0, 0, motion, nodes};
     as_rigid.emplace_back(main, bodies[b], drawing, rigid[b], nullptr);
@@ -392,8 +398,8 @@ std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& 
 std::vector<double> Tracker::distances_by_points(const Surfels& main, const Motion& motion,
                                                  float extent) const {
   const View& first = capture_.train[views_at(motion, 0).front()];
-  const BodySurface surface =
-      draw_bodies(drawn_camera(first, widest_for_sizes), motion, 0, main, render_.raster_options(extent));
+  const BodySurface surface = draw_bodies(drawn_camera(first, widest_for_sizes), motion, 0, main,
+                                          raster_for_tracking(render_, extent));
   return distance_by_points(surface, capture_.points, motion.bodies());
 }
 

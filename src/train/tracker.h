@@ -13,6 +13,10 @@
 
 namespace traceflow {
 
+// How bodies are drawn for the tracker: one sample a pixel, with a low-pass as wide as the samples that they
+// are trained with.
+raster::Options raster_for_tracking(const RenderOptions& render, float extent);
+
 // Finds where rigid bodies are at a time of the film: Gauss–Newton on six numbers a body, from what does not
 // depend on how their surface reflects: that they cover what the masks cover, and that their normals are
 // those of the capture's priors; and from colour and tracked points where they are trusted. The priors'

@@ -84,7 +84,7 @@ Trainer::Tracking Trainer::tracking(int iteration) const {
 }
 
 Tracker Trainer::make_tracker() const {
-  return {options_.deform.track, schedule_.render_for_tracking(iteration_), capture_};
+  return {options_.deform.track, schedule_.render(iteration_), capture_};
 }
 
 Surfels Trainer::follow_bodies(const Tracking& now) {

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+
 #include <functional>
 #include <vector>
+#include "train/tracker.h"
 
 namespace traceflow {
 namespace {
@@ -89,12 +91,13 @@ TEST(Schedule, TheTrackerDrawsSurfelsAsWideAsTheyAreTrained) {
   options.iterations = 600;
   options.schedule.samples_from = 45000;
   options.render.samples = 2;
-  const Schedule schedule(options);
-  EXPECT_TRUE(schedule.render_for_tracking(449).low_pass);
-  EXPECT_FALSE(schedule.render_for_tracking(450).low_pass);
-  EXPECT_EQ(schedule.render_for_tracking(450).samples, 1);
-  options.render.samples = 1;
-  EXPECT_TRUE(Schedule(options).render_for_tracking(450).low_pass);
+  const auto low_pass_at = [&](int iteration) {
+    return raster_for_tracking(Schedule(options).render(iteration), 1).low_pass;
+  };
+  EXPECT_EQ(low_pass_at(449), 1);
+  EXPECT_EQ(low_pass_at(450), 0.5);
+  options.render.low_pass = false;
+  EXPECT_EQ(low_pass_at(449), 0);
 }
 
 TEST(Schedule, PhaseTwoFreezesTheMainSurfelsButTheirTint) {

@@ -61,21 +61,13 @@ std::vector<Case> cases() {
   SceneOptions bare = mixed;
   bare.has_tint = bare.says_carried = false;
   bare.sh_degree = 0;
-  return {{"mixed", 53, 37, centre, mixed},
-          {"mixed_hit", 53, 37, hit, mixed},
-          {"sharp", 48, 32, sharp, mixed},
-          {"blurred", 48, 32, blurred, mixed},
-          {"needles_blurred", 50, 33, blurred, needles},
-          {"needles", 50, 33, centre, needles},
-          {"needles_sharp", 50, 33, sharp, needles},
-          {"needles_hit", 40, 30, hit, needles},
-          {"dense", 31, 50, centre, dense},
-          {"dense_hit", 33, 17, hit, dense},
-          {"near", 45, 31, centre, near},
-          {"near_hit", 45, 31, hit, near, 0.004},
-          {"outside", 45, 31, centre, outside},
-          {"bare", 17, 16, centre, bare},
-          {"one_pixel", 1, 1, centre, mixed, 0}};
+  return {{"mixed", 53, 37, centre, mixed},       {"mixed_hit", 53, 37, hit, mixed},
+          {"sharp", 48, 32, sharp, mixed},        {"blurred", 48, 32, blurred, mixed},
+          {"needles", 50, 33, centre, needles},   {"needles_sharp", 50, 33, sharp, needles},
+          {"needles_hit", 40, 30, hit, needles},  {"dense", 31, 50, centre, dense},
+          {"dense_hit", 33, 17, hit, dense},      {"near", 45, 31, centre, near},
+          {"near_hit", 45, 31, hit, near, 0.004}, {"outside", 45, 31, centre, outside},
+          {"bare", 17, 16, centre, bare},         {"one_pixel", 1, 1, centre, mixed, 0}};
 }
 
 bool close(double found, double expected, double tolerance) {
