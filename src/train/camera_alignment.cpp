@@ -20,37 +20,37 @@ Trainable camera_alone() {
 
 }  // namespace
 
-Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const FrameRequest& given,
+Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const FrameRequest& request,
                              ViewImages& photograph, const LossOptions& loss,
                              const CameraAlignment& options) {
   LossOptions photometric = loss;
   photometric.normal = photometric.normal_prior = photometric.distortion = photometric.silhouette = 0;
   photometric.lpips = photometric.rigidity = 0;
-  FrameRequest request = given;
+  FrameRequest moving = request;
   FrameGradient by_frame;
   SceneGradient gradient;
   LossMeans means;
   CameraSteps steps;
   Vec3<double> turn(0), shift(0);
-  Camera<float> best = given.camera;
+  Camera<float> best = request.camera;
   double least = std::numeric_limits<double>::infinity();
   for (int i = 0; i <= options.iterations; ++i) {
-    const Frame& frame = renderer.forward(scene, request, true);
+    const Frame& frame = renderer.forward(scene, moving, true);
     take_unknown(frame.colour, photograph);
     evaluate_objective(frame, photograph, photometric, NormalLosses::none, by_frame, means, nullptr);
     leave_unknown(photograph, by_frame.colour);
     const double now = means.read().total;
     if (now < least) {
       least = now;
-      best = request.camera;
+      best = moving.camera;
     }
     if (i == options.iterations) break;
     gradient.reset(scene);
-    renderer.backward(scene, request, camera_alone(), by_frame, gradient);
-    steps.step(pose_gradient(request.camera, gradient.camera),
+    renderer.backward(scene, moving, camera_alone(), by_frame, gradient);
+    steps.step(pose_gradient(moving.camera, gradient.camera),
                optimize::log_linear(options.rate, options.rate_end, i, options.iterations), scene.extent, {},
                turn, shift);
-    request.camera = moved(given.camera, turn, shift);
+    moving.camera = moved(request.camera, turn, shift);
   }
   return best;
 }
