@@ -134,7 +134,7 @@ TEST(Tracker, ABallThatMirrorsDoesNotTurnOn) {
     const Vec4<double> turned = quaternion_exp(Vec3<double>(0.1, 0.2, 0.1));
     for (int c = 0; c < 4; ++c) motion.rotation(body, 1, c) = static_cast<float>(turned[c]);
   }
-  Tracker(options.deform.track, options.render, at.capture)
+  Tracker(options.deform.track, Schedule(options).render(0), at.capture)
       .follow(at.scene.main, motion, 2, at.scene.extent, trust);
   for (int64_t body = 0; body < motion.bodies(); ++body) {
     EXPECT_GT(turn_of(body, 0, 1), 0.2);
@@ -364,7 +364,7 @@ TEST(Tracker, KeepsBodiesAtTheirFirstDistance) {
 TEST(Tracker, ComesToTheSameBytesAtAnyThreadCount) {
   Tumbling at;
   const TrackOptions options;
-  const Tracker tracker(options, preset("cpu").render, at.capture);
+  const Tracker tracker(options, Schedule(preset("cpu")).render(0), at.capture);
   std::set<std::vector<float>> found;
   for (const int threads : {1, 3}) {
     set_threads(threads);

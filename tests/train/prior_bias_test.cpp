@@ -96,7 +96,7 @@ TEST(PriorBias, OfAViewKeepsTheTrackerFromTheSurroundings) {
       for (View& view : at.capture.train) view.prior_turn = Mat3<float>(1);
     }
     solved.push_back(*at.scene.main_motion);
-    Tracker(options.deform.track, options.render, at.capture)
+    Tracker(options.deform.track, Schedule(options).render(0), at.capture)
         .solve(at.scene.main, nullptr, solved.back(), 0, at.scene.extent, {4, 1}, {});
   }
   double turned = 0;

@@ -218,7 +218,7 @@ TEST(Tracker, TheFirstPictureTellsHowLargeBodiesAre) {
   at.scene.main.opacity_logit.fill(4);
   TrackOptions options;
   options.colour = 0;
-  const Tracker tracker(options, preset("cpu").render, at.capture);
+  const Tracker tracker(options, Schedule(preset("cpu")).render(0), at.capture);
   const auto ratios = [&] {
     return tracker.distance_ratios(at.scene.main, *at.scene.main_motion, at.scene.extent, {options.steps, 1},
                                    {});
@@ -269,7 +269,7 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
     while (trainer.iteration() < 2 * options.iterations / track.rounds) trainer.step();
     const Scene& scene = trainer.scene();
     ASSERT_EQ(scene.main_nodes.has_value(), bends);
-    const Tracker tracker(track, options.render, at.capture);
+    const Tracker tracker(track, Schedule(options).render(trainer.iteration()), at.capture);
     std::vector<double> ratios = tracker.distance_ratios(scene.main, *scene.main_motion, scene.extent,
                                                          {track.steps, 0.35 * track.blur}, {});
     const std::vector<double> before = sizes(scene);
