@@ -75,11 +75,18 @@ void leave_what_differs(const Frame& frame, const ViewImages& target, FrameGradi
   }
 }
 
+// A sample a pixel throughout: what is trained with one looks thin with several.
+RenderOptions drawn_by(const TrainOptions& options) {
+  RenderOptions render = options.render;
+  render.samples = 1;
+  return render;
+}
+
 TrainOptions still(const TrainOptions& options, int iterations) {
   TrainOptions o = preset("cpu");
   o.seed = options.seed;
   o.capture = options.capture;
-  o.render = options.render;
+  o.render = drawn_by(options);
   o.iterations = iterations;
   o.specular = Specular::none;
   o.deform.main = o.deform.environment = false;
@@ -102,7 +109,7 @@ Tensor<float> mean_difference(const Tensor<float>& a, const Tensor<float>& b) {
 
 StillScene::StillScene(const Capture& capture, const TrainOptions& options, int iterations,
                        const StepsDone& told)
-    : renderer_(options.render), agreement_renderer_(options.render) {
+    : renderer_(drawn_by(options)), agreement_renderer_(drawn_by(options)) {
   Trainer trainer(still(options, iterations), capture, {});
   const int first = static_cast<int>(first_test * iterations);
   const int every = std::max(1, (iterations - first) / tests);
@@ -110,7 +117,7 @@ StillScene::StillScene(const Capture& capture, const TrainOptions& options, int 
     if (!told(k, iterations)) return;
     if (k == first) trainer.review_gradients(leave_what_differs);
     if (k >= first && (k - first) % every == 0) {
-      const Votes votes = vote(trainer.scene(), capture, options.render);
+      const Votes votes = vote(trainer.scene(), capture, trainer.options().render);
       std::vector<int64_t> moving;
       for (size_t i = 0; i < votes.shown.size(); ++i) {
         if (votes.shown[i] >= least_shown && votes.share(i) < least_share)
@@ -121,7 +128,7 @@ StillScene::StillScene(const Capture& capture, const TrainOptions& options, int 
     trainer.step();
   }
   scene_ = trainer.scene();
-  const Votes votes = vote(scene_, capture, options.render);
+  const Votes votes = vote(scene_, capture, trainer.options().render);
   agreement_ = scene_;
   Surfels& grey = agreement_.main;
   grey.sh.reset({grey.count(), 1, 3});
