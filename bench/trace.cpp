@@ -51,9 +51,7 @@ PosedSurfels make_shell(const Setting& setting) {
   return s;
 }
 
-struct Rays {
-  Tensor<float> origins, directions;
-};
+using trace::Rays;
 
 // A camera at z = -4 looks at a ball of radius 1 whose surface is a little uneven; pixels in rows, as a
 // renderer has them. The picture reaches as far as `half_width` from the ball's middle.
@@ -125,13 +123,12 @@ void against_embree(benchmark::State& state, const Setting& setting, double unev
   trace::Output own, other;
   double own_time = 1e9, time16 = 1e9, time48 = 1e9;
   for (auto _ : state) {
-    own_time = std::min(own_time, fastest(3, [&] {
-                          trace::forward(surfels, *bvh, rays.origins, rays.directions, options, own, nullptr);
-                        }));
+    own_time =
+        std::min(own_time, fastest(3, [&] { trace::forward(surfels, *bvh, rays, options, own, nullptr); }));
     time16 = std::min(time16, fastest(2, [&] { embree16.forward(rays.origins, rays.directions, other); }));
     time48 = std::min(time48, fastest(2, [&] { embree48.forward(rays.origins, rays.directions, other); }));
   }
-  trace::forward(surfels, *bvh, rays.origins, rays.directions, options, own, saved.get());
+  trace::forward(surfels, *bvh, rays, options, own, saved.get());
   const auto n = static_cast<double>(rays.origins.dim(0));
   state.counters["hits_per_ray"] = static_cast<double>(trace::blended_hits(*saved)) / n;
   state.counters["Mrays/s"] = 1e-6 * n / own_time;
@@ -158,7 +155,7 @@ void forward(benchmark::State& state, const Setting& setting, double unevenness)
   trace::build(surfels, options, *bvh);
   trace::Output output;
   for (auto _ : state) {
-    trace::forward(surfels, *bvh, rays.origins, rays.directions, options, output, nullptr);
+    trace::forward(surfels, *bvh, rays, options, output, nullptr);
   }
   state.SetItemsProcessed(state.iterations() * rays.origins.dim(0));
 }
@@ -185,11 +182,11 @@ void backward(benchmark::State& state, const Setting& setting, double unevenness
   const trace::SavedPtr saved = trace::make_saved();
   trace::build(surfels, options, *bvh);
   trace::Output output;
-  trace::forward(surfels, *bvh, rays.origins, rays.directions, options, output, saved.get());
+  trace::forward(surfels, *bvh, rays, options, output, saved.get());
   trace::OutputGradient grad{output.colour, output.alpha, output.distance};
   trace::InputGradient gradient;
   for (auto _ : state) {
-    trace::backward(surfels, rays.origins, rays.directions, options, *saved, grad, gradient);
+    trace::backward(surfels, rays, options, *saved, grad, gradient);
   }
   state.SetItemsProcessed(state.iterations() * rays.origins.dim(0));
 }
@@ -210,19 +207,16 @@ class OnDevice {
  public:
   OnDevice(const Setting& setting, const Rays& rays) {
     surfels_ = make_shell(setting).on(Device::cuda);
-    origins_ = rays.origins.on(Device::cuda);
-    directions_ = rays.directions.on(Device::cuda);
+    rays_ = rays.on(Device::cuda);
     build();
     forward(saved_.get());
     grad_ = {output_.colour, output_.alpha, output_.distance};
     backward();
   }
   void build() { trace::build(surfels_, {}, *bvh_); }
-  void forward(trace::Saved* saved) {
-    trace::forward(surfels_, *bvh_, origins_, directions_, {}, output_, saved);
-  }
-  void backward() { trace::backward(surfels_, origins_, directions_, {}, *saved_, grad_, gradient_); }
-  int64_t rays() const { return origins_.dim(0); }
+  void forward(trace::Saved* saved) { trace::forward(surfels_, *bvh_, rays_, {}, output_, saved); }
+  void backward() { trace::backward(surfels_, rays_, {}, *saved_, grad_, gradient_); }
+  int64_t rays() const { return rays_.count(); }
   double hits_per_ray() const { return hits() / static_cast<double>(rays()); }
   trace::Saved* saved() { return saved_.get(); }
 
@@ -233,13 +227,13 @@ class OnDevice {
   // A blended hit, by the formulas of math/: its place in the plane 30, its weight 10, its colour 96 and what
   // is blended 10; backward the derivatives of all of them. Walks through the tree do not count.
   bench::Floor forward_floor() const {
-    return {bench::bytes(surfels_) +
-                bench::bytes(origins_, directions_, output_.colour, output_.alpha, output_.distance),
+    return {bench::bytes(surfels_) + bench::bytes(rays_.origins, rays_.directions, output_.colour,
+                                                  output_.alpha, output_.distance),
             146 * hits()};
   }
   bench::Floor backward_floor() const {
     return {bench::bytes(surfels_) + bench::bytes(gradient_.surfels) +
-                bench::bytes(origins_, directions_, grad_.colour, grad_.alpha, grad_.distance) +
+                bench::bytes(rays_.origins, rays_.directions, grad_.colour, grad_.alpha, grad_.distance) +
                 bench::bytes(gradient_.origins, gradient_.directions, gradient_.position_gradient),
             400 * hits()};
   }
@@ -248,7 +242,7 @@ class OnDevice {
   double hits() const { return static_cast<double>(trace::blended_hits(*saved_)); }
 
   PosedSurfels surfels_;
-  Tensor<float> origins_, directions_;
+  Rays rays_;
   trace::BvhPtr bvh_ = trace::make_bvh();
   trace::SavedPtr saved_ = trace::make_saved();
   trace::Output output_;

@@ -37,8 +37,8 @@ struct FrameRequest {
 
 // The rays that the traced pixels see mirrored, and what these meet.
 struct MirroredRays {
-  Tensor<float> origins, directions;  // P×3, world
-  Tensor<float> alpha, distance;      // P, as trace::Output has them; empty with an environment map
+  trace::Rays rays;               // P
+  Tensor<float> alpha, distance;  // P, as trace::Output has them; empty with an environment map
 };
 
 // A picture with all its layers, on the device of the scene that it shows.

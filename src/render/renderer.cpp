@@ -181,9 +181,10 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   frame_.traced.pixel.place(device).resize({0});
   frame_.traced.weight.place(device).resize({0});
   frame_.specular_rays.place(device).resize({0, 3});
-  MirroredRays& rays = frame_.mirrored;
-  for (Tensor<float>* values : {&rays.origins, &rays.directions}) values->place(device).resize({0, 3});
-  for (Tensor<float>* values : {&rays.alpha, &rays.distance}) values->place(device).resize({0});
+  MirroredRays& mirrored = frame_.mirrored;
+  for (Tensor<float>* values : {&mirrored.rays.origins, &mirrored.rays.directions})
+    values->place(device).resize({0, 3});
+  for (Tensor<float>* values : {&mirrored.alpha, &mirrored.distance}) values->place(device).resize({0});
   if (reflects(scene, request)) {
     forward_specular(scene, request, keep_for_backward);
   }
@@ -200,7 +201,7 @@ void Renderer::draw(const FrameRequest& request) {
 }
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
-  MirroredRays& rays = frame_.mirrored;
+  trace::Rays& rays = frame_.mirrored.rays;
   // As many probes in a picture whatever the samples.
   surface::SelectOptions select = options_.select;
   select.probe_share /= static_cast<float>(frame_.samples * frame_.samples);
@@ -215,8 +216,8 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
     return;
   }
   pose_environment(scene, request, keep_for_backward);
-  trace::forward(frame_.environment, *bvh_, rays.origins, rays.directions, trace_options(scene),
-                 trace_output_, keep_for_backward ? trace_saved_.get() : nullptr);
+  trace::forward(frame_.environment, *bvh_, rays, trace_options(scene), trace_output_,
+                 keep_for_backward ? trace_saved_.get() : nullptr);
   if (scene.environment_map) {
     reflection_map::forward(*scene.environment_map, rays.directions, request.time, false, options_.precision,
                             behind_, map_saved_);
@@ -224,8 +225,8 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
                  AddBehind{trace_output_.alpha.data(), behind_.data(), trace_output_.colour.data()});
   }
   frame_.specular_rays.swap(trace_output_.colour);
-  rays.alpha.swap(trace_output_.alpha);
-  rays.distance.swap(trace_output_.distance);
+  frame_.mirrored.alpha.swap(trace_output_.alpha);
+  frame_.mirrored.distance.swap(trace_output_.distance);
 }
 
 void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGradient& grad_frame,
@@ -317,11 +318,12 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
 
 void Renderer::backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                                  SceneGradient& gradient) {
-  Tensor<float>* grad_origins = &grad_trace_input_.origins;
-  Tensor<float>* grad_directions = &grad_trace_input_.directions;
+  const trace::Rays& rays = frame_.mirrored.rays;
+  Tensor<float>* grad_origins = &grad_trace_input_.rays.origins;
+  Tensor<float>* grad_directions = &grad_trace_input_.rays.directions;
   if (scene.specular == Specular::environment_map) {
-    grad_origins->place(scene.device()).reset(frame_.mirrored.origins.shape());
-    reflection_map::backward(*scene.environment_map, frame_.mirrored.directions, request.time,
+    grad_origins->place(scene.device()).reset(rays.origins.shape());
+    reflection_map::backward(*scene.environment_map, rays.directions, request.time,
                              request.deform_environment, trainable.environment_field, map_saved_,
                              grad_trace_.colour, gradient.environment_map, *grad_directions);
   } else {
@@ -332,11 +334,11 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
       parallel_for(scene.device(), "render: behind the environment backward", frame_.mirrored.alpha.size(),
                    AddBehindBackward{frame_.mirrored.alpha.data(), behind_.data(), grad_trace_.colour.data(),
                                      grad_trace_.alpha.data(), grad_behind_.data()});
-      reflection_map::backward(*scene.environment_map, frame_.mirrored.directions, request.time, false, false,
+      reflection_map::backward(*scene.environment_map, rays.directions, request.time, false, false,
                                map_saved_, grad_behind_, gradient.environment_map, grad_behind_directions_);
     }
-    trace::backward(frame_.environment, frame_.mirrored.origins, frame_.mirrored.directions,
-                    trace_options(scene), *trace_saved_, grad_trace_, grad_trace_input_);
+    trace::backward(frame_.environment, rays, trace_options(scene), *trace_saved_, grad_trace_,
+                    grad_trace_input_);
     if (scene.environment_map) {
       parallel_for(scene.device(), "render: add gradients of directions", grad_behind_directions_.size(),
                    AddNumbers{grad_behind_directions_.data(), grad_directions->data()});

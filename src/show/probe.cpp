@@ -20,12 +20,12 @@ Vec3<float> vector(const Tensor<float>& values) { return load3<float>(values.on(
 // A pixel list of the one pixel, where the frame is.
 Tensor<int32_t> first_pixel(Device device) { return Tensor<int32_t>(Shape{1}, device); }
 
-ProbeResult::Mirrored mirrored_of(const MirroredRays& rays) {
+ProbeResult::Mirrored mirrored_of(const MirroredRays& from) {
   ProbeResult::Mirrored mirrored;
-  mirrored.direction = vector(rays.directions);
-  mirrored.alpha = rays.alpha.empty() ? 0 : number(rays.alpha);
-  mirrored.distance = rays.distance.empty() ? 0 : number(rays.distance);
-  mirrored.end = vector(rays.origins) + mirrored.distance * mirrored.direction;
+  mirrored.direction = vector(from.rays.directions);
+  mirrored.alpha = from.alpha.empty() ? 0 : number(from.alpha);
+  mirrored.distance = from.distance.empty() ? 0 : number(from.distance);
+  mirrored.end = vector(from.rays.origins) + mirrored.distance * mirrored.direction;
   return mirrored;
 }
 
@@ -46,7 +46,7 @@ std::optional<ProbeResult> probe(Renderer& renderer, const Scene& scene, const F
     return std::nullopt;
   }
   // The surface's point is where a mirrored ray begins, traced or not.
-  MirroredRays ray;
+  trace::Rays ray;
   surface::reflection_rays(one.camera, first_pixel(scene.device()), frame.raster.depth,
                            frame.raster.median_depth, frame.raster.normal, renderer.options().depth_ratio,
                            ray.origins, ray.directions);

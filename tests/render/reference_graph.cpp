@@ -114,9 +114,9 @@ class Graph {
     const Camera<double> camera = camera_of_samples(p_.camera, s_.samples);
     pixels_ = all_pixels(camera);
     surface::reflection_rays(camera, tensor_of(pixels_), sampled_.depth, sampled_.median_depth,
-                             sampled_.normal, s_.depth_ratio, origins_, directions_);
+                             sampled_.normal, s_.depth_ratio, rays_.origins, rays_.directions);
   }
-  const Tensor<double>& directions() const { return directions_; }
+  const Tensor<double>& directions() const { return rays_.directions; }
 
  private:
   Tensor<double> mean(const Tensor<double>& layer) const {
@@ -164,7 +164,7 @@ class Graph {
   void forward_specular() {
     reflect();
     if (p_.map && p_.map->field) {
-      moved_ = directions_;
+      moved_ = rays_.directions;
       if (s_.deform) {
         Tensor<double> residuals;
         field::forward_reference(*p_.map->field, s_.map_directions, s_.time, residuals);
@@ -175,10 +175,10 @@ class Graph {
     }
     deform::forward_reference(p_.environment, s_.deform ? &p_.environment_field : nullptr,
                               s_.environment_points, s_.time, s_.sh_degree, environment_);
-    trace::forward_reference(environment_, origins_, directions_, s_.trace, trace_);
+    trace::forward_reference(environment_, rays_, s_.trace, trace_);
     specular_ = trace_.colour;
     if (!p_.map) return;
-    moved_ = directions_;
+    moved_ = rays_.directions;
     environment_map::forward(p_.map->logit, moved_, behind_);
     for (int64_t i = 0; i < specular_.size(); ++i) specular_[i] += (1 - trace_.alpha[i / 3]) * behind_[i];
   }
@@ -188,11 +188,12 @@ class Graph {
     if (p_.map) g.map.logit.reset(p_.map->logit.shape());
     if (p_.map && p_.map->field) {
       g.map.field = zeros_like<double>(*p_.map->field);
-      input.origins.reset(origins_.shape());
-      input.directions.reset(directions_.shape());
-      environment_map::backward(p_.map->logit, moved_, grad_specular, g.map.logit, input.directions);
+      input.rays.origins.reset(rays_.origins.shape());
+      input.rays.directions.reset(rays_.directions.shape());
+      environment_map::backward(p_.map->logit, moved_, grad_specular, g.map.logit, input.rays.directions);
       if (s_.deform) {
-        field::backward_reference(*p_.map->field, s_.map_directions, s_.time, input.directions, *g.map.field);
+        field::backward_reference(*p_.map->field, s_.map_directions, s_.time, input.rays.directions,
+                                  *g.map.field);
       }
     } else {
       trace::BasicOutputGradient<double> grad_trace;
@@ -205,18 +206,18 @@ class Graph {
           grad_behind[i] = (1 - trace_.alpha[i / 3]) * grad_specular[i];
           grad_trace.alpha[i / 3] -= grad_specular[i] * behind_[i];
         }
-        by_behind.reset(directions_.shape());
+        by_behind.reset(rays_.directions.shape());
         environment_map::backward(p_.map->logit, moved_, grad_behind, g.map.logit, by_behind);
       }
-      trace::backward_reference(environment_, origins_, directions_, s_.trace, grad_trace, input);
+      trace::backward_reference(environment_, rays_, s_.trace, grad_trace, input);
       deform::backward_reference(p_.environment, s_.deform ? &p_.environment_field : nullptr,
                                  s_.environment_points, s_.time, input.surfels, g.environment,
                                  s_.deform ? &g.environment_field : nullptr);
-      for (int64_t i = 0; i < by_behind.size(); ++i) input.directions[i] += by_behind[i];
+      for (int64_t i = 0; i < by_behind.size(); ++i) input.rays.directions[i] += by_behind[i];
     }
     surface::reflection_rays_backward(camera_of_samples(p_.camera, s_.samples), tensor_of(pixels_),
                                       sampled_.depth, sampled_.median_depth, sampled_.normal, s_.depth_ratio,
-                                      input.origins, input.directions, grad_sampled_.depth,
+                                      input.rays.origins, input.rays.directions, grad_sampled_.depth,
                                       grad_sampled_.median_depth, grad_sampled_.normal, &g.camera);
   }
 
@@ -246,7 +247,8 @@ class Graph {
   Tensor<double> weights_, medians_, has_median_;
   trace::BasicOutput<double> trace_;
   std::vector<int32_t> pixels_;
-  Tensor<double> pseudo_, origins_, directions_, moved_, behind_, specular_, colour_;
+  trace::BasicRays<double> rays_;
+  Tensor<double> pseudo_, moved_, behind_, specular_, colour_;
   Tensor<double> grad_colour_, grad_pseudo_;
   raster::BasicOutputGradient<double> grad_, grad_sampled_;
 };

@@ -56,7 +56,7 @@ TEST_P(ProbeOfSamples, FindsWhatTheFrameShows) {
     ASSERT_EQ(found->mirrored.has_value(), k < frame.traced.pixel.size());
     if (!found->mirrored) continue;
     ++mirrored;
-    expect_near(found->mirrored->direction, load3<float>(frame.mirrored.directions.row(k)), 1e-4F,
+    expect_near(found->mirrored->direction, load3<float>(frame.mirrored.rays.directions.row(k)), 1e-4F,
                 "mirrored");
     EXPECT_NEAR(found->mirrored->alpha, frame.mirrored.alpha[k], 1e-3F);
     EXPECT_NEAR(found->mirrored->distance, frame.mirrored.distance[k], 1e-2F);

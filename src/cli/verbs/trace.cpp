@@ -21,20 +21,19 @@ struct TraceArguments {
   trace::Options options;
 };
 
-struct Rays {
-  Tensor<float> origins, directions;
-};
-
-Rays read_rays(const std::filesystem::path& path) {
+trace::Rays read_rays(const std::filesystem::path& path) {
   const Tensor<float> rows = read_npy(path);
-  if (rows.shape().rank() != 2 || rows.dim(1) != 6) {
+  if (rows.shape().rank() != 2 || (rows.dim(1) != 6 && rows.dim(1) != 7)) {
     throw InputError(path.string(), "shape", rows.shape().to_string(),
-                     "Nx6: origin and direction of each ray");
+                     "Nx6: origin and direction of each ray; or Nx7: the width of its cone too");
   }
-  Rays rays{Tensor<float>(Shape{rows.dim(0), 3}), Tensor<float>(Shape{rows.dim(0), 3})};
+  const bool cones = rows.dim(1) == 7;
+  trace::Rays rays{Tensor<float>(Shape{rows.dim(0), 3}), Tensor<float>(Shape{rows.dim(0), 3}),
+                   Tensor<float>(Shape{cones ? rows.dim(0) : 0})};
   for (int64_t i = 0; i < rows.dim(0); ++i) {
     std::copy(rows.row(i), rows.row(i) + 3, rays.origins.row(i));
     std::copy(rows.row(i) + 3, rows.row(i) + 6, rays.directions.row(i));
+    if (cones) rays.widths[i] = rows(i, 6);
   }
   return rays;
 }
@@ -42,24 +41,24 @@ Rays read_rays(const std::filesystem::path& path) {
 void run_trace(const TraceArguments& a, const DeviceArguments& devices) {
   a.options.validate();
   Surfels surfels = read_ply(a.ply).surfels;
-  Rays rays = read_rays(a.rays);
+  trace::Rays rays = read_rays(a.rays);
   const Device device = devices.choose();
   surfels = surfels.on(device);
-  rays = {rays.origins.on(device), rays.directions.on(device)};
+  rays = rays.on(device);
   PosedSurfels posed;
   deform::forward(surfels, nullptr, 0, {}, sh_degree(surfels.sh.dim(1)), field::Precision::fp32, posed,
                   nullptr);
   const trace::BvhPtr bvh = trace::make_bvh();
   trace::build(posed, a.options, *bvh);
   trace::Output output;
-  trace::forward(posed, *bvh, rays.origins, rays.directions, a.options, output, nullptr);
+  trace::forward(posed, *bvh, rays, a.options, output, nullptr);
 
   const std::filesystem::path folder(a.output);
   std::filesystem::create_directories(folder);
   write_npy(folder / "colour.npy", output.colour.on(Device::cpu));
   write_npy(folder / "alpha.npy", output.alpha.on(Device::cpu));
   write_npy(folder / "distance.npy", output.distance.on(Device::cpu));
-  fmt::print("{} rays through {} surfels: {}\n", rays.origins.dim(0), surfels.count(), folder.string());
+  fmt::print("{} rays through {} surfels: {}\n", rays.count(), surfels.count(), folder.string());
 }
 
 }  // namespace
@@ -69,7 +68,9 @@ void add_trace(CLI::App& program) {
   const auto a = std::make_shared<TraceArguments>();
   a->options.t_min = 0;
   verb->add_option("FILE", a->ply, "Surfels, a 2DGS .ply")->required();
-  verb->add_option("--rays", a->rays, "Rays, a .npy of Nx6: origin and direction")->required();
+  verb->add_option("--rays", a->rays,
+                   "Rays, a .npy of Nx6: origin and direction; or Nx7: the width of a cone too")
+      ->required();
   verb->add_option("-o,--output", a->output, "Folder for colour.npy, alpha.npy and distance.npy")->required();
   const OptionArguments options(*verb, option_fields(a->options));
   const DeviceArguments devices(*verb);

@@ -28,27 +28,27 @@ void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
   }
 }
 
-void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
-             const Tensor<float>& directions, const Options& options, Output& output, Saved* saved) {
+void forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays, const Options& options,
+             Output& output, Saved* saved) {
   require(bvh.surfels == surfels.count(), "the BVH was built from these surfels");
-  require(surfels.count() == 0 || surfels.device() == origins.device() || origins.empty(),
+  require(surfels.count() == 0 || surfels.device() == rays.device() || rays.count() == 0,
           "rays and surfels are on one device");
-  if (saved) saved->device = origins.device();
-  if (origins.device() == Device::cpu) {
-    cpu::forward(surfels, bvh, origins, directions, options, output, saved);
+  require(rays.widths.empty() || rays.widths.size() == rays.count(), "a width for every ray");
+  if (saved) saved->device = rays.device();
+  if (rays.device() == Device::cpu) {
+    cpu::forward(surfels, bvh, rays, options, output, saved);
   } else {
-    cuda::forward(surfels, bvh, origins, directions, options, output, saved);
+    cuda::forward(surfels, bvh, rays, options, output, saved);
   }
 }
 
-void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
-              const Options& options, const Saved& saved, const OutputGradient& grad_output,
-              InputGradient& gradient) {
-  require(saved.device == origins.device(), "the hits were saved for these rays");
-  if (origins.device() == Device::cpu) {
-    cpu::backward(surfels, origins, directions, options, saved, grad_output, gradient);
+void backward(const PosedSurfels& surfels, const Rays& rays, const Options& options, const Saved& saved,
+              const OutputGradient& grad_output, InputGradient& gradient) {
+  require(saved.device == rays.device(), "the hits were saved for these rays");
+  if (rays.device() == Device::cpu) {
+    cpu::backward(surfels, rays, options, saved, grad_output, gradient);
   } else {
-    cuda::backward(surfels, origins, directions, options, saved, grad_output, gradient);
+    cuda::backward(surfels, rays, options, saved, grad_output, gradient);
   }
 }
 

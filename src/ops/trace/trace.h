@@ -8,8 +8,8 @@
 #include "scene/surfels.h"
 
 // Traces rays through surfels and blends all hits in exact order of distance (method §5). Runs where the rays
-// are, which is where the surfels are. Differentiable: every posed value but tint, ray origins, ray
-// directions.
+// are, which is where the surfels are. Differentiable: every posed value but tint, ray origins, directions
+// and widths.
 namespace traceflow::trace {
 
 struct Options {
@@ -35,6 +35,25 @@ struct Options {
   void validate() const;
 };
 
+// R rays. One with a width stands for a cone of them: the directions of its rays are spread about its own as
+// a Gaussian of that standard deviation (a tangent), so that a surfel at distance t is convolved, in its own
+// plane, with an isotropic Gaussian of standard deviation width · t (method §5.5).
+template <class T>
+struct BasicRays {
+  Tensor<T> origins;     // R×3, world
+  Tensor<T> directions;  // R×3, world, of any length; SH uses the unit one
+  Tensor<T> widths{};    // R, ≥ 0; empty: all are 0
+
+  int64_t count() const { return origins.empty() ? 0 : origins.dim(0); }
+  Device device() const { return origins.device(); }
+  BasicRays on(Device device) const { return {origins.on(device), directions.on(device), widths.on(device)}; }
+};
+using Rays = BasicRays<float>;
+template <class To, class From>
+BasicRays<To> convert(const BasicRays<From>& rays) {
+  return {convert<To>(rays.origins), convert<To>(rays.directions), convert<To>(rays.widths)};
+}
+
 template <class T>
 struct BasicOutput {
   Tensor<T> colour;    // R×3, Σ w c + background · remaining transmittance; c by the ray's direction
@@ -53,8 +72,7 @@ using OutputGradient = BasicOutputGradient<float>;
 template <class T>
 struct BasicInputGradient {
   BasicPosedSurfels<T> surfels;
-  Tensor<T> origins;     // R×3
-  Tensor<T> directions;  // R×3
+  BasicRays<T> rays;  // in their shapes
   // M, the density-control signal: |Σ over hits of dL/dposition · t / 2| as EnvGS has it, t in scene units.
   // Hits that pull a surfel to all sides do not ask for more of it. The reference leaves it empty.
   Tensor<T> position_gradient;
@@ -86,24 +104,22 @@ int64_t blended_hits(const Saved& saved);
 // is set. Rays whose hits do not fit are traced again by backward, in parts.
 void limit_device_bytes(Saved& saved, int64_t bytes);
 
-// origins, directions: R×3, world; directions need not have unit length (SH uses the unit one). Rays that are
-// not finite or have a zero direction see the background. `bvh` was built from these surfels. saved may be
-// null.
-void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
-             const Tensor<float>& directions, const Options& options, Output& output, Saved* saved);
+// Rays that are not finite, have a zero direction or a negative width see the background. `bvh` was built
+// from these surfels. saved may be null.
+void forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays, const Options& options,
+             Output& output, Saved* saved);
 
 // Sets (does not add to) `gradient`. On the CPU sums are in a fixed order: the same bytes at any thread
 // count. On the CUDA device they are where cuda::deterministic() is set. The BVH of the forward pass has not
 // been built anew since.
-void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
-              const Options& options, const Saved& saved, const OutputGradient& grad_output,
-              InputGradient& gradient);
+void backward(const PosedSurfels& surfels, const Rays& rays, const Options& options, const Saved& saved,
+              const OutputGradient& grad_output, InputGradient& gradient);
 
 // The plain truth: double precision, every ray against every surfel, sorted.
-void forward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
-                       const Tensor<double>& directions, const Options& options, BasicOutput<double>& output);
-void backward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
-                        const Tensor<double>& directions, const Options& options,
-                        const BasicOutputGradient<double>& grad_output, BasicInputGradient<double>& gradient);
+void forward_reference(const BasicPosedSurfels<double>& surfels, const BasicRays<double>& rays,
+                       const Options& options, BasicOutput<double>& output);
+void backward_reference(const BasicPosedSurfels<double>& surfels, const BasicRays<double>& rays,
+                        const Options& options, const BasicOutputGradient<double>& grad_output,
+                        BasicInputGradient<double>& gradient);
 
 }  // namespace traceflow::trace

@@ -95,6 +95,12 @@ struct FinishSurfel {
   }
 };
 
+// dL/d of a ray by the places of its hits; that to the direction as a change of a unit vector.
+struct RayPull {
+  Vec3<float> origin{0}, direction{0};
+  float width = 0;
+};
+
 // dL/d(caller's direction) = from the unit direction, and from the distance, which is in units of its length.
 TRACEFLOW_HD inline Vec3<float> direction_backward(const UnitRay& ray, const Vec3<float>& grad_unit,
                                                    float grad_distance, float distance) {
@@ -117,8 +123,7 @@ std::vector<Group> make_groups(const Saved& saved, int64_t surfels);
 
 struct BackwardInput {
   const PosedSurfels& surfels;
-  const Tensor<float>& origins;
-  const Tensor<float>& directions;
+  const Rays& rays;
   const Options& options;
   const OutputGradient& grad_output;
   const std::vector<BackwardFrame>& frames;

@@ -57,8 +57,7 @@ struct Saved {
 struct BlockTask {
   const PosedSurfels& surfels;
   const Bvh& bvh;
-  const Tensor<float>& origins;
-  const Tensor<float>& directions;
+  const Rays& rays;
   const Options& options;
   const RayOrder& order;
   int64_t begin, end;  // in that order
@@ -71,16 +70,30 @@ struct UnitRay {
   Vec3<float> origin{0};
   Vec3<float> direction{0};
   float length = 0;  // of the caller's direction
+  float width = 0;   // of its cone, at distance 1
+};
+
+// Addresses of rays, on any device. widths: null where all are 0.
+struct RayView {
+  const float *origins = nullptr, *directions = nullptr, *widths = nullptr;
+
+  RayView() = default;
+  explicit RayView(const Rays& rays)
+      : origins(rays.origins.data()),
+        directions(rays.directions.data()),
+        widths(rays.widths.empty() ? nullptr : rays.widths.data()) {}
 };
 
 // False for a ray that sees the background only. Scales first, so that no square over- or underflows.
-TRACEFLOW_HD inline bool make_unit_ray(const float* origin, const float* direction, UnitRay& ray) {
-  if (!is_traceable(origin, direction)) return false;
+TRACEFLOW_HD inline bool make_unit_ray(const RayView& rays, int64_t i, UnitRay& ray) {
+  const float *origin = rays.origins + 3 * i, *direction = rays.directions + 3 * i;
+  const float width = rays.widths != nullptr ? rays.widths[i] : 0;
+  if (!is_traceable(origin, direction) || !is_width(width)) return false;
   const Vec3<float> d = load3<float>(direction);
   const float largest = std::fmax(std::abs(d.x), std::fmax(std::abs(d.y), std::abs(d.z)));
   const Vec3<float> scaled = d / largest;
   const float scaled_length = std::sqrt(dot(scaled, scaled));
-  ray = {load3<float>(origin), scaled / scaled_length, largest * scaled_length};
+  ray = {load3<float>(origin), scaled / scaled_length, largest * scaled_length, width};
   return std::isfinite(ray.length);
 }
 

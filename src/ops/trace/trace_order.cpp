@@ -25,12 +25,12 @@ Vec3<float> median(std::vector<Vec3<float>> points) {
 }
 
 // Medians of samples: neither stray rays nor stray surfels move them.
-Vec3<float> typical_origin(const Tensor<float>& origins, const Tensor<float>& directions) {
+Vec3<float> typical_origin(const Rays& rays) {
   constexpr int64_t samples = 1000;
-  const int64_t rays = origins.dim(0);
   std::vector<Vec3<float>> points;
-  for (int64_t r = 0; r < rays; r += std::max<int64_t>(1, rays / samples)) {
-    if (is_traceable(origins.row(r), directions.row(r))) points.push_back(load3<float>(origins.row(r)));
+  for (int64_t r = 0; r < rays.count(); r += std::max<int64_t>(1, rays.count() / samples)) {
+    if (is_traceable(rays.origins.row(r), rays.directions.row(r)))
+      points.push_back(load3<float>(rays.origins.row(r)));
   }
   return median(std::move(points));
 }
@@ -106,14 +106,13 @@ void group_ways(Way* begin, Way* end) {
   group_ways(middle, end);
 }
 
-void group_section(const Tensor<float>& origins, const Tensor<float>& directions, float reach,
-                   uint32_t* begin, uint32_t* end) {
+void group_section(const RayView& rays, float reach, uint32_t* begin, uint32_t* end) {
   constexpr float origin_weight = 0.3F;  // the beam is thick at one end only
   std::array<Way, section_rays> ways;
   Way* last = ways.data();
   for (const uint32_t* ray = begin; ray != end; ++ray) {
     UnitRay unit;
-    make_unit_ray(origins.row(*ray), directions.row(*ray), unit);
+    make_unit_ray(rays, *ray, unit);
     store3(last->at, unit.origin + reach * unit.direction);
     store3(last->at + 3, origin_weight * unit.origin);
     (last++)->ray = *ray;
@@ -124,25 +123,23 @@ void group_section(const Tensor<float>& origins, const Tensor<float>& directions
 
 }  // namespace
 
-void order_rays(const Bvh& bvh, const Tensor<float>& origins, const Tensor<float>& directions,
-                RayOrder& order) {
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  order.ray.resize(static_cast<size_t>(rays));
-  if (rays == 0) return;
-  const Vec3<float> centre = typical_origin(origins, directions);
+void order_rays(const Bvh& bvh, const Rays& rays, RayOrder& order) {
+  const int64_t count = rays.count();
+  order.ray.resize(static_cast<size_t>(count));
+  if (count == 0) return;
+  const RayView view(rays);
+  const Vec3<float> centre = typical_origin(rays);
   order.reach = typical_distance(bvh, centre);
-  std::vector<Keyed> items(static_cast<size_t>(rays));
-  parallel_for("trace order", rays, [&](int64_t r) {
-    items[static_cast<size_t>(r)] = {ray_key(origins.row(r), directions.row(r), centre, order.reach),
-                                     static_cast<uint32_t>(r)};
+  std::vector<Keyed> items(static_cast<size_t>(count));
+  parallel_for("trace order", count, [&](int64_t r) {
+    items[static_cast<size_t>(r)] = {ray_key(view, r, centre, order.reach), static_cast<uint32_t>(r)};
   });
   radix_sort(items);
   std::transform(items.begin(), items.end(), order.ray.begin(), [](const Keyed& item) { return item.ray; });
   const auto traceable = std::partition_point(items.begin(), items.end(),
                                               [](const Keyed& item) { return item.key != untraceable_key; });
   parallel_blocks("trace group", traceable - items.begin(), section_rays, [&](int64_t begin, int64_t end) {
-    group_section(origins, directions, order.reach, &order.ray[static_cast<size_t>(begin)],
-                  order.ray.data() + end);
+    group_section(view, order.reach, &order.ray[static_cast<size_t>(begin)], order.ray.data() + end);
   });
 }
 

@@ -14,7 +14,6 @@ struct RayOrder {
 };
 
 // Sorts along a space-filling curve by the points at that distance. Equal ones stay in the caller's order.
-void order_rays(const Bvh& bvh, const Tensor<float>& origins, const Tensor<float>& directions,
-                RayOrder& order);
+void order_rays(const Bvh& bvh, const Rays& rays, RayOrder& order);
 
 }  // namespace traceflow::trace

@@ -11,30 +11,61 @@ struct HitGradient {
   float grad_distance;
 };
 
-// Sets the parts of one hit, and adds what its place does to the ray: dL/d of the origin, and of the
-// direction as a change of a unit vector. The CPU does 16 hits at once (cpu/geometry-inl.h).
+// -dL/d(along t_u or t_v) of a hit so far along that axis, and dL/d(scale), where a cone widens the disk by a
+// Gaussian of variance spread2. Adds to -2 dL/d(spread2).
+struct AxisGradient {
+  float along, scale;
+};
+TRACEFLOW_HD inline AxisGradient axis_backward(float grad_exponent, float along, float inverse_scale,
+                                               float spread2, float& by_spread2) {
+  const float scale = 1 / inverse_scale;
+  const float precision = 1 / (scale * scale + spread2);
+  const float u = along * precision;
+  // What widening takes from the exponent, twice: it lowers the peak and flattens the slope.
+  const float lost = grad_exponent * (precision - u * u);
+  by_spread2 += lost;
+  // The peak is as high as scale · √precision.
+  return {grad_exponent * u, grad_exponent * inverse_scale - scale * lost};
+}
+
+// Sets the parts of one hit, and adds what its place does to the ray. The CPU does 16 hits at once
+// (cpu/geometry-inl.h).
 TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& ray, const HitGradient& hit,
-                                        float* parts, Vec3<float>& grad_origin, Vec3<float>& grad_direction) {
+                                        float* parts, RayPull& pull) {
   const Vec3<float> x = ray.origin - f.position + hit.distance * ray.direction;
   const float along_u = dot(f.t_u, x), along_v = dot(f.t_v, x);
-  const float u = along_u * f.inverse_scale.x, v = along_v * f.inverse_scale.y;
-  const float pull_u = hit.grad_exponent * u * f.inverse_scale.x;  // -dL/d(along t_u)
-  const float pull_v = hit.grad_exponent * v * f.inverse_scale.y;
+  const float spread = ray.width * hit.distance;
+  AxisGradient by_u, by_v;
+  float grad_distance = hit.grad_distance;
+  if (ray.width > 0) {
+    float by_spread2 = 0;
+    by_u = axis_backward(hit.grad_exponent, along_u, f.inverse_scale.x, spread * spread, by_spread2);
+    by_v = axis_backward(hit.grad_exponent, along_v, f.inverse_scale.y, spread * spread, by_spread2);
+    grad_distance -= by_spread2 * spread * ray.width;
+    pull.width -= by_spread2 * spread * hit.distance;
+  } else {
+    const float u = along_u * f.inverse_scale.x, v = along_v * f.inverse_scale.y;
+    by_u.along = hit.grad_exponent * u * f.inverse_scale.x;
+    by_v.along = hit.grad_exponent * v * f.inverse_scale.y;
+    by_u.scale = by_u.along * u;
+    by_v.scale = by_v.along * v;
+  }
+  const float pull_u = by_u.along, pull_v = by_v.along;
   const Vec3<float> grad_x = -pull_u * f.t_u - pull_v * f.t_v;
-  const float a = (hit.grad_distance + dot(grad_x, ray.direction)) / dot(f.normal, ray.direction);
+  const float a = (grad_distance + dot(grad_x, ray.direction)) / dot(f.normal, ray.direction);
   parts[part::position] = pull_u;
   parts[part::position + 1] = pull_v;
   parts[part::position + 2] = a;
   parts[part::turn] = a * along_v;
   parts[part::turn + 1] = -a * along_u;
   parts[part::turn + 2] = pull_v * along_u - pull_u * along_v;
-  parts[part::scale] = pull_u * u;
-  parts[part::scale + 1] = pull_v * v;
+  parts[part::scale] = by_u.scale;
+  parts[part::scale + 1] = by_v.scale;
   parts[part::opacity] = hit.grad_exponent * f.inverse_opacity;
   for (size_t k = 0; k < 3; ++k) parts[part::signal + k] = 0.5F * hit.distance * parts[part::position + k];
   const Vec3<float> moved = grad_x - a * f.normal;
-  grad_origin += moved;
-  grad_direction += hit.distance * moved;
+  pull.origin += moved;
+  pull.direction += hit.distance * moved;
 }
 
 }  // namespace traceflow::trace

@@ -23,10 +23,9 @@ TRACEFLOW_HD inline uint32_t morton_key(const Vec3<float>& unit_cube) {
 }
 
 // Along a space-filling curve by the point at the distance `reach`, seen from `centre`.
-TRACEFLOW_HD inline uint32_t ray_key(const float* origin, const float* direction, const Vec3<float>& centre,
-                                     float reach) {
+TRACEFLOW_HD inline uint32_t ray_key(const RayView& rays, int64_t i, const Vec3<float>& centre, float reach) {
   UnitRay ray;
-  if (!make_unit_ray(origin, direction, ray)) return untraceable_key;
+  if (!make_unit_ray(rays, i, ray)) return untraceable_key;
   const float scale = 0.25F / reach;
   return morton_key(scale * (ray.origin + reach * ray.direction - centre) + Vec3<float>(0.5F));
 }

@@ -16,15 +16,43 @@ namespace {
 
 using Frame = SurfelFrame<double>;
 
+struct Ray {
+  Vec3<double> origin, direction;
+  double width;
+  Vec3<double> unit() const { return glm::normalize(direction); }
+};
+
+Ray load_ray(const BasicRays<double>& rays, int64_t r) {
+  return {load3<double>(rays.origins.row(r)), load3<double>(rays.directions.row(r)),
+          rays.widths.empty() ? 0 : rays.widths[r]};
+}
+bool can_be_traced(const BasicRays<double>& rays, int64_t r) {
+  return is_traceable(rays.origins.row(r), rays.directions.row(r)) &&
+         (rays.widths.empty() || is_width(rays.widths[r]));
+}
+
+// A Gaussian that a cone has widened (method §5.5): the deviations σ become √(σ² + spread²), and the peak
+// falls from 1 to Π σ / √(σ² + spread²), so that the integral stays.
+struct Widened {
+  double spread;       // the cone's width times the distance, scene units
+  Vec2<double> scale;  // √(σ² + spread²)
+  double u, v;         // in those
+  double value;        // at the hit
+};
+
+Widened widened(const Frame& frame, const SurfelHit<double>& at, const Ray& ray) {
+  const double spread = ray.width * at.t * length(ray.direction);
+  const Vec2<double> scale = glm::sqrt(frame.scale * frame.scale + spread * spread);
+  const double u = at.u * frame.scale.x / scale.x, v = at.v * frame.scale.y / scale.y;
+  const double peak = frame.scale.x / scale.x * (frame.scale.y / scale.y);
+  return {spread, scale, u, v, peak * std::exp(-0.5 * (u * u + v * v))};
+}
+
 struct Hit {
   int64_t surfel;
   SurfelHit<double> at;
+  Widened gaussian;
   BlendAlpha<double> alpha;
-};
-
-struct Ray {
-  Vec3<double> origin, direction;
-  Vec3<double> unit() const { return glm::normalize(direction); }
 };
 
 BlendRules<double> rules(const Options& o) { return {o.alpha_min, o.alpha_max, o.transmittance_min}; }
@@ -56,9 +84,9 @@ std::vector<Hit> find_hits(const BasicPosedSurfels<double>& surfels, const std::
     if (!is_usable(surfels, i, static_cast<double>(options.alpha_min))) continue;
     const SurfelHit<double> at = intersect(frames[static_cast<size_t>(i)], ray.origin, ray.direction);
     if (!at.valid || !(at.t * length(ray.direction) >= options.t_min)) continue;
-    const double gaussian = std::exp(-0.5 * (at.u * at.u + at.v * at.v));
-    const BlendAlpha<double> alpha = blend_alpha(rules(options), surfels.opacity[i], gaussian);
-    if (alpha.value > 0) hits.push_back({i, at, alpha});
+    const Widened gaussian = widened(frames[static_cast<size_t>(i)], at, ray);
+    const BlendAlpha<double> alpha = blend_alpha(rules(options), surfels.opacity[i], gaussian.value);
+    if (alpha.value > 0) hits.push_back({i, at, gaussian, alpha});
   }
   std::stable_sort(hits.begin(), hits.end(), [](const Hit& a, const Hit& b) { return a.at.t < b.at.t; });
   return hits;
@@ -112,16 +140,44 @@ std::vector<double> alpha_gradients(const Blend& b, const RayGradient& grad, con
 
 struct HitGradient {
   SurfelHitGradient<double> geometry;
-  double opacity = 0;
+  double opacity = 0, width = 0;
 };
+
+// dL/d(u, v, scale and spread) from dL/d(log of the widened Gaussian), u and v in the surfel's own
+// deviations.
+struct WidenedGradient {
+  double u, v, spread;
+  Vec2<double> scale;
+};
+
+WidenedGradient widened_backward(const Frame& frame, const Widened& g, double grad_log) {
+  const Vec2<double> share = frame.scale / g.scale;  // σ / √(σ² + spread²)
+  // By the widened deviation of an axis: -1 / it of the peak, and u² / it of the slope.
+  const Vec2<double> by_scale = grad_log * Vec2<double>(g.u * g.u - 1, g.v * g.v - 1) / g.scale;
+  WidenedGradient to{};
+  to.u = -grad_log * g.u * share.x;
+  to.v = -grad_log * g.v * share.y;
+  // u here is a length over the widened deviation: only the peak and that deviation know of σ.
+  to.scale = grad_log / frame.scale + by_scale * share;
+  to.spread = dot(by_scale, g.spread / g.scale);
+  return to;
+}
 
 HitGradient hit_backward(const Frame& frame, const Ray& ray, const Hit& hit, double opacity,
                          double grad_alpha, double grad_t) {
   const double grad_exponent =
       grad_alpha * hit.alpha.slope * hit.alpha.value;  // alpha = opacity · exp(-(u² + v²) / 2)
-  return {intersect_backward(frame, ray.origin, ray.direction, hit.at, grad_t, -grad_exponent * hit.at.u,
-                             -grad_exponent * hit.at.v),
-          grad_exponent / opacity};
+  const WidenedGradient g = widened_backward(frame, hit.gaussian, grad_exponent);
+  const double length_of_ray = length(ray.direction);
+  HitGradient to;
+  to.geometry = intersect_backward(frame, ray.origin, ray.direction, hit.at,
+                                   grad_t + g.spread * ray.width * length_of_ray, g.u, g.v);
+  // That step holds lengths over the surfel's own deviations; what is by the widened ones is here.
+  to.geometry.scale = g.scale;
+  to.geometry.direction += g.spread * ray.width * hit.at.t * ray.unit();
+  to.opacity = grad_exponent / opacity;
+  to.width = g.spread * hit.at.t * length_of_ray;
+  return to;
 }
 
 void add_surfel(const HitGradient& hit, int64_t i, const Vec4<double>& quaternion,
@@ -140,8 +196,8 @@ Vec3<double> normalise_backward(const Vec3<double>& direction, const Vec3<double
 }
 
 void ray_backward(const BasicPosedSurfels<double>& surfels, const std::vector<Frame>& frames, const Ray& ray,
-                  const Options& options, const RayGradient& grad_output,
-                  BasicPosedSurfels<double>& grad_surfels, double* grad_origin, double* grad_direction) {
+                  const Options& options, const RayGradient& grad_output, int64_t r,
+                  BasicInputGradient<double>& gradient) {
   const int degree = sh_degree(surfels.sh.dim(1));
   const Blend b = blend(surfels, frames, ray, options);
   const std::vector<double> grad_alpha = alpha_gradients(b, grad_output, Vec3<double>(options.background));
@@ -152,31 +208,29 @@ void ray_backward(const BasicPosedSurfels<double>& surfels, const std::vector<Fr
     const HitGradient g =
         hit_backward(frames[static_cast<size_t>(hit.surfel)], ray, hit, surfels.opacity[hit.surfel],
                      grad_alpha[i], grad_output.distance * weight / b.alpha);
-    add_surfel(g, hit.surfel, load4<double>(surfels.rotation.row(hit.surfel)), grad_surfels);
-    add3(grad_origin, g.geometry.origin);
-    add3(grad_direction, g.geometry.direction);
+    add_surfel(g, hit.surfel, load4<double>(surfels.rotation.row(hit.surfel)), gradient.surfels);
+    add3(gradient.rays.origins.row(r), g.geometry.origin);
+    add3(gradient.rays.directions.row(r), g.geometry.direction);
+    if (!gradient.rays.widths.empty()) gradient.rays.widths[r] += g.width;
     grad_unit += sh_colour_backward(degree, surfels.sh.row(hit.surfel), ray.unit(),
-                                    weight * grad_output.colour, grad_surfels.sh.row(hit.surfel));
+                                    weight * grad_output.colour, gradient.surfels.sh.row(hit.surfel));
   }
-  add3(grad_direction, normalise_backward(ray.direction, grad_unit));
+  add3(gradient.rays.directions.row(r), normalise_backward(ray.direction, grad_unit));
 }
 
 }  // namespace
 
-void forward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
-                       const Tensor<double>& directions, const Options& options,
-                       BasicOutput<double>& output) {
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  output.colour.reset({rays, 3});
-  output.alpha.reset({rays});
-  output.distance.reset({rays});
+void forward_reference(const BasicPosedSurfels<double>& surfels, const BasicRays<double>& rays,
+                       const Options& options, BasicOutput<double>& output) {
+  output.colour.reset({rays.count(), 3});
+  output.alpha.reset({rays.count()});
+  output.distance.reset({rays.count()});
   const std::vector<Frame> frames = make_frames(surfels);
-  parallel_for("trace reference", rays, [&](int64_t r) {
+  parallel_for("trace reference", rays.count(), [&](int64_t r) {
     const Vec3<double> background(options.background);
     store3(output.colour.row(r), background);
-    if (!is_traceable(origins.row(r), directions.row(r))) return;
-    const Ray ray{load3<double>(origins.row(r)), load3<double>(directions.row(r))};
-    const Blend b = blend(surfels, frames, ray, options);
+    if (!can_be_traced(rays, r)) return;
+    const Blend b = blend(surfels, frames, load_ray(rays, r), options);
     Vec3<double> colour = b.remaining * background;
     for (size_t i = 0; i < b.hits.size(); ++i)
       colour += b.hits[i].alpha.value * b.transmittance[i] * b.colour[i];
@@ -186,20 +240,17 @@ void forward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<do
   });
 }
 
-void backward_reference(const BasicPosedSurfels<double>& surfels, const Tensor<double>& origins,
-                        const Tensor<double>& directions, const Options& options,
-                        const BasicOutputGradient<double>& grad_output,
+void backward_reference(const BasicPosedSurfels<double>& surfels, const BasicRays<double>& rays,
+                        const Options& options, const BasicOutputGradient<double>& grad_output,
                         BasicInputGradient<double>& gradient) {
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
   gradient.surfels.reset_like(surfels);
-  gradient.origins.reset({rays, 3});
-  gradient.directions.reset({rays, 3});
+  gradient.rays.origins.reset({rays.count(), 3});
+  gradient.rays.directions.reset({rays.count(), 3});
+  gradient.rays.widths.reset(rays.widths.shape());
   const std::vector<Frame> frames = make_frames(surfels);
-  for (int64_t r = 0; r < rays; ++r) {
-    if (!is_traceable(origins.row(r), directions.row(r))) continue;
-    const Ray ray{load3<double>(origins.row(r)), load3<double>(directions.row(r))};
-    ray_backward(surfels, frames, ray, options, load_gradient(grad_output, r), gradient.surfels,
-                 gradient.origins.row(r), gradient.directions.row(r));
+  for (int64_t r = 0; r < rays.count(); ++r) {
+    if (!can_be_traced(rays, r)) continue;
+    ray_backward(surfels, frames, load_ray(rays, r), options, load_gradient(grad_output, r), r, gradient);
   }
 }
 

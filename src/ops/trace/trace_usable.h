@@ -56,5 +56,10 @@ TRACEFLOW_HD bool is_traceable(const T* origin, const T* direction) {
   return all_finite(origin, 3) && all_finite(direction, 3) &&
          (direction[0] != T(0) || direction[1] != T(0) || direction[2] != T(0));
 }
+// Whether a cone can: a width that is a number, and not negative.
+template <class T>
+TRACEFLOW_HD bool is_width(T width) {
+  return std::isfinite(width) && width >= T(0);
+}
 
 }  // namespace traceflow::trace

@@ -37,9 +37,8 @@ void expect_output_near(const Output& fast, const BasicOutput<double>& truth, do
 void expect_matches_reference(const TestScene& scene, const Options& options, double flips) {
   const Traced fast = trace(scene, options);
   const auto surfels = convert<double>(scene.surfels);
-  const auto origins = convert<double>(scene.origins), directions = convert<double>(scene.directions);
   BasicOutput<double> truth;
-  forward_reference(surfels, origins, directions, options, truth);
+  forward_reference(surfels, convert<double>(scene.rays), options, truth);
   expect_output_near(fast.output, truth, flips);
 }
 
@@ -48,6 +47,14 @@ TEST(Trace, MatchesTheReferenceAtEveryDegree) {
     const SceneOptions o{
         .surfels = 2000, .rays = 700, .sh_degree = degree, .scale_min = 0.02, .scale_max = 0.2};
     expect_matches_reference(random_scene(static_cast<uint64_t>(degree), o), {}, 0.01);
+  }
+}
+
+TEST(Trace, MatchesTheReferenceWithCones) {
+  for (const double width : {0.01, 0.1, 1.0}) {
+    const SceneOptions o{
+        .surfels = 2000, .rays = 700, .scale_min = 0.02, .scale_max = 0.2, .width_max = width};
+    expect_matches_reference(random_scene(13, o), {}, 0.01);
   }
 }
 
@@ -74,17 +81,17 @@ TEST(Trace, MatchesTheReferenceFromInsideTheScene) {
 // Faint, wide surfels, few enough that no two bright hits of a ray come at almost one distance, and a far
 // cut-off: nothing flips, so that gradients agree everywhere.
 TEST(Trace, GradientsMatchTheReference) {
-  for (int degree = 0; degree <= 3; ++degree) {
-    const SceneOptions o{.surfels = 150, .rays = 700, .sh_degree = degree, .opacity_max = 0.6};
+  for (const auto& [degree, width] : {std::pair{0, 0.0}, {1, 0.0}, {2, 0.0}, {3, 0.0}, {1, 0.1}, {3, 0.2}}) {
+    const SceneOptions o{
+        .surfels = 150, .rays = 700, .sh_degree = degree, .opacity_max = 0.6, .width_max = width};
     const TestScene scene = random_scene(20 + static_cast<uint64_t>(degree), o);
     Options options;
     options.alpha_min = 1e-9F;
     options.background = {0.4F, 0.1F, 0.2F};
     const Traced fast = trace(scene, options, 5);
     BasicInputGradient<double> truth;
-    backward_reference(convert<double>(scene.surfels), convert<double>(scene.origins),
-                       convert<double>(scene.directions), options,
-                       random_output_gradient(5, scene.origins.dim(0)), truth);
+    backward_reference(convert<double>(scene.surfels), convert<double>(scene.rays), options,
+                       random_output_gradient(5, scene.rays.count()), truth);
     const auto expect_near = [&](const Tensor<float>& a, const Tensor<double>& b, const char* name) {
       EXPECT_EQ(count_far(a, b, 5e-3 * root_mean_square(b)), 0) << name << " degree " << degree;
     };
@@ -93,16 +100,17 @@ TEST(Trace, GradientsMatchTheReference) {
     expect_near(fast.gradient.surfels.rotation, truth.surfels.rotation, "rotation");
     expect_near(fast.gradient.surfels.opacity, truth.surfels.opacity, "opacity");
     expect_near(fast.gradient.surfels.sh, truth.surfels.sh, "sh");
-    expect_near(fast.gradient.origins, truth.origins, "origins");
-    expect_near(fast.gradient.directions, truth.directions, "directions");
+    expect_near(fast.gradient.rays.origins, truth.rays.origins, "origins");
+    expect_near(fast.gradient.rays.directions, truth.rays.directions, "directions");
+    expect_near(fast.gradient.rays.widths, truth.rays.widths, "widths");
   }
 }
 
 TEST(Trace, PositionGradientIsTheNormTimesHalfTheDistance) {
   TestScene scene = blank_scene(1, 0, 1);
   set_facing(scene.surfels, 0, 2, 0.5F, 0.8F);
-  scene.origins(0, 0) = 0.3F;
-  scene.directions(0, 2) = 4;
+  scene.rays.origins(0, 0) = 0.3F;
+  scene.rays.directions(0, 2) = 4;
   const Traced t = trace(scene, {});
   const Vec3<float> g = load3<float>(t.gradient.surfels.position.row(0));
   EXPECT_GT(glm::length(g), 0);
@@ -111,18 +119,18 @@ TEST(Trace, PositionGradientIsTheNormTimesHalfTheDistance) {
 
 // The scene's first rays with one weight for all, whichever are traced.
 Traced traced_alike(TestScene scene, int64_t first, int64_t count) {
-  Tensor<float> origins({count, 3}), directions({count, 3});
-  std::copy_n(scene.origins.row(first), 3 * count, origins.data());
-  std::copy_n(scene.directions.row(first), 3 * count, directions.data());
+  Rays rays{Tensor<float>({count, 3}), Tensor<float>({count, 3})};
+  std::copy_n(scene.rays.origins.row(first), 3 * count, rays.origins.data());
+  std::copy_n(scene.rays.directions.row(first), 3 * count, rays.directions.data());
   const BvhPtr bvh = make_bvh();
   const SavedPtr saved = make_saved();
   Traced result;
   build(scene.surfels, {}, *bvh);
-  forward(scene.surfels, *bvh, origins, directions, {}, result.output, saved.get());
+  forward(scene.surfels, *bvh, rays, {}, result.output, saved.get());
   OutputGradient weights;
   weights.colour.reset({count, 3});
   weights.colour.fill(0.7F);
-  backward(scene.surfels, origins, directions, {}, *saved, weights, result.gradient);
+  backward(scene.surfels, rays, {}, *saved, weights, result.gradient);
   return result;
 }
 
@@ -132,16 +140,16 @@ TEST(Trace, PositionGradientOfManyHitsIsTheNormOfTheirSum) {
   TestScene scene = blank_scene(1, 0, rays);
   set_facing(scene.surfels, 0, 2, 0.5F, 0.8F);
   for (int64_t ray = 0; ray < rays; ++ray) {
-    scene.origins(ray, 0) = 0.2F * static_cast<float>(ray) - 0.7F;
-    scene.origins(ray, 1) = 0.1F;
-    scene.directions(ray, 0) = 0.05F * static_cast<float>(ray);
-    scene.directions(ray, 2) = 1;
+    scene.rays.origins(ray, 0) = 0.2F * static_cast<float>(ray) - 0.7F;
+    scene.rays.origins(ray, 1) = 0.1F;
+    scene.rays.directions(ray, 0) = 0.05F * static_cast<float>(ray);
+    scene.rays.directions(ray, 2) = 1;
   }
   Vec3<float> sum(0);
   float norms = 0;
   for (int64_t ray = 0; ray < rays; ++ray) {
     const Traced one = traced_alike(scene, ray, 1);
-    const float t = one.output.distance[0] * glm::length(load3<float>(scene.directions.row(ray)));
+    const float t = one.output.distance[0] * glm::length(load3<float>(scene.rays.directions.row(ray)));
     sum += 0.5F * t * load3<float>(one.gradient.surfels.position.row(0));
     norms += one.gradient.position_gradient[0];
   }
@@ -211,8 +219,8 @@ TEST(Trace, TheOrderOfTheSurfelsDoesNotMatter) {
                             permuted(s.sh, order),
                             {},
                             {}},
-                           scene.origins,
-                           scene.directions};
+                           scene.rays.origins,
+                           scene.rays.directions};
   const Traced a = trace(scene, {}), b = trace(shuffled, {});
   expect_near(b.output.colour, a.output.colour, 1e-6);
   EXPECT_TRUE(same_bytes(a.output.alpha, b.output.alpha));
@@ -228,7 +236,7 @@ TEST(Trace, HitsAtOneDistanceBlendInOrderOfIndex) {
     for (int c = 0; c < 3; ++c)
       scene.surfels.sh.row(i)[c] = static_cast<float>((i == 0 ? 0.5 : -0.5) / sh_c0);
   }
-  scene.directions(0, 2) = 1;
+  scene.rays.directions(0, 2) = 1;
   for (const int k : {1, 64}) {
     Options options;
     options.hits_per_pass = k;
@@ -242,43 +250,60 @@ TEST(Trace, AnyNumberOfHits) {
   TestScene scene = blank_scene(count, 0, 2);
   for (int64_t i = 0; i < count; ++i)
     set_facing(scene.surfels, i, 1 + 0.001F * static_cast<float>(i), 1, 0.004F);
-  scene.directions(0, 2) = 1;
-  scene.directions(1, 2) = 1;
-  scene.origins(1, 2) = 10;
-  scene.directions(1, 2) = -1;
+  scene.rays.directions(0, 2) = 1;
+  scene.rays.directions(1, 2) = 1;
+  scene.rays.origins(1, 2) = 10;
+  scene.rays.directions(1, 2) = -1;
   const Traced t = trace(scene, {});
   EXPECT_GT(t.hits, 4000);
   BasicOutput<double> truth;
-  forward_reference(convert<double>(scene.surfels), convert<double>(scene.origins),
-                    convert<double>(scene.directions), {}, truth);
+  forward_reference(convert<double>(scene.surfels), convert<double>(scene.rays), {}, truth);
   expect_output_near(t.output, truth, 0);
 }
 
+TEST(Trace, ConesWithoutWidthAreRays) {
+  TestScene scene = random_scene(14, {.surfels = 2000, .rays = 700, .scale_min = 0.02, .scale_max = 0.2});
+  const Traced rays = trace(scene, {});
+  scene.rays.widths = Tensor<float>({700});
+  const Traced cones = trace(scene, {});
+  expect_near(cones.output.colour, rays.output.colour, 1e-5);
+  expect_near(cones.gradient.rays.origins, rays.gradient.rays.origins, 1e-3);
+}
+
 // Rays side by side share a walk; each on its own must find the same.
-TEST(Trace, RaysTogetherAndAloneAgree) {
+void expect_together_as_alone(float width) {
   const SceneOptions o{.surfels = 5000, .scale_min = 0.02, .scale_max = 0.2};
   TestScene scene = random_scene(61, o);
   constexpr int64_t side = 24;
-  scene.origins = Tensor<float>({side * side, 3});
-  scene.directions = Tensor<float>({side * side, 3});
+  scene.rays.origins = Tensor<float>({side * side, 3});
+  scene.rays.directions = Tensor<float>({side * side, 3});
   for (int64_t r = 0; r < side * side; ++r) {
     const int64_t column = r % side - side / 2, row = r / side - side / 2;
-    store3(scene.origins.row(r), Vec3<float>(0, 0, -3));
-    store3(scene.directions.row(r),
+    store3(scene.rays.origins.row(r), Vec3<float>(0, 0, -3));
+    store3(scene.rays.directions.row(r),
            Vec3<float>(0.01F * static_cast<float>(column), 0.01F * static_cast<float>(row), 1));
+  }
+  if (width > 0) {
+    scene.rays.widths = Tensor<float>({side * side});
+    for (int64_t r = 0; r < side * side; ++r) scene.rays.widths[r] = width * static_cast<float>(r % 5);
   }
   const Traced together = trace(scene, {});
   EXPECT_GT(together.hits, 10 * side * side);
-  TestScene one{scene.surfels, Tensor<float>({1, 3}), Tensor<float>({1, 3})};
+  TestScene one{scene.surfels,
+                {Tensor<float>({1, 3}), Tensor<float>({1, 3}), Tensor<float>({width > 0 ? 1 : 0})}};
   for (int64_t r = 0; r < side * side; r += 7) {
-    std::copy_n(scene.origins.row(r), 3, one.origins.data());
-    std::copy_n(scene.directions.row(r), 3, one.directions.data());
+    std::copy_n(scene.rays.origins.row(r), 3, one.rays.origins.data());
+    std::copy_n(scene.rays.directions.row(r), 3, one.rays.directions.data());
+    if (width > 0) one.rays.widths[0] = scene.rays.widths[r];
     const Traced alone = trace(one, {});
     EXPECT_EQ(alone.output.alpha[0], together.output.alpha[r]);
     EXPECT_EQ(alone.output.distance[0], together.output.distance[r]);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(alone.output.colour(0, c), together.output.colour(r, c), 1e-6);
   }
 }
+
+TEST(Trace, RaysTogetherAndAloneAgree) { expect_together_as_alone(0); }
+TEST(Trace, ConesTogetherAndAloneAgree) { expect_together_as_alone(0.02F); }
 
 RC_GTEST_PROP(TraceProperty, FindsWhatBruteForceFinds, ()) {
   SceneOptions o;
@@ -290,6 +315,7 @@ RC_GTEST_PROP(TraceProperty, FindsWhatBruteForceFinds, ()) {
   o.opacity_min = 0;
   o.opacity_max = *rc::gen::element(0.01, 0.5, 1.0);
   o.ray_distance = *rc::gen::element(0.0, 0.5, 3.0, 100.0);
+  o.width_max = *rc::gen::element(0.0, 0.0, 0.001, 0.1, 10.0);
   const auto seed = *rc::gen::arbitrary<uint64_t>();
   Options options;
   options.hits_per_pass = *rc::gen::inRange(1, 20);

@@ -11,8 +11,7 @@ inline Output on(const Output& o, Device device) {
   return {o.colour.on(device), o.alpha.on(device), o.distance.on(device)};
 }
 inline InputGradient on(const InputGradient& g, Device device) {
-  return {g.surfels.on(device), g.origins.on(device), g.directions.on(device),
-          g.position_gradient.on(device)};
+  return {g.surfels.on(device), g.rays.on(device), g.position_gradient.on(device)};
 }
 inline OutputGradient on(const OutputGradient& g, Device device) {
   return {g.colour.on(device), g.alpha.on(device), g.distance.on(device)};
@@ -23,16 +22,16 @@ inline Traced trace_on_device(const TestScene& scene, const Options& options,
                               int64_t limit = int64_t{1} << 30) {
   constexpr Device device = Device::cuda;
   const PosedSurfels surfels = scene.surfels.on(device);
-  const Tensor<float> origins = scene.origins.on(device), directions = scene.directions.on(device);
+  const Rays rays = scene.rays.on(device);
   const BvhPtr bvh = make_bvh();
   const SavedPtr saved = make_saved();
   limit_device_bytes(*saved, limit);
   Output output;
   InputGradient gradient;
   build(surfels, options, *bvh);
-  forward(surfels, *bvh, origins, directions, options, output, saved.get());
-  backward(surfels, origins, directions, options, *saved,
-           on(to_float(random_output_gradient(5, origins.empty() ? 0 : origins.dim(0))), device), gradient);
+  forward(surfels, *bvh, rays, options, output, saved.get());
+  backward(surfels, rays, options, *saved, on(to_float(random_output_gradient(5, rays.count())), device),
+           gradient);
   return {on(output, Device::cpu), on(gradient, Device::cpu), blended_hits(*saved)};
 }
 
@@ -63,8 +62,9 @@ inline void expect_same(const Traced& found, const Traced& expected, double valu
   EXPECT_EQ(count_far(f.surfels.rotation, e.surfels.rotation, slope), 0);
   EXPECT_EQ(count_far(f.surfels.opacity, e.surfels.opacity, slope), 0);
   EXPECT_EQ(count_far(f.surfels.sh, e.surfels.sh, slope), 0);
-  EXPECT_EQ(count_far(f.origins, e.origins, slope), 0);
-  EXPECT_EQ(count_far(f.directions, e.directions, slope), 0);
+  EXPECT_EQ(count_far(f.rays.origins, e.rays.origins, slope), 0);
+  EXPECT_EQ(count_far(f.rays.directions, e.rays.directions, slope), 0);
+  EXPECT_EQ(count_far(f.rays.widths, e.rays.widths, slope), 0);
   EXPECT_EQ(count_far(f.position_gradient, e.position_gradient, slope), 0);
 }
 

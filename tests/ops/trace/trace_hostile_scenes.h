@@ -57,33 +57,41 @@ inline void make_extreme(PosedSurfels& s) {
 inline int64_t break_rays(TestScene& scene) {
   int64_t broken = 0;
   for (const float value : {nan, infinite, -infinite}) {
-    scene.origins(broken++, 0) = value;
-    scene.directions(broken++, 2) = value;
+    scene.rays.origins(broken++, 0) = value;
+    scene.rays.directions(broken++, 2) = value;
   }
-  for (int k = 0; k < 3; ++k) scene.directions(broken, k) = 0;
+  for (int k = 0; k < 3; ++k) scene.rays.directions(broken, k) = 0;
   return broken + 1;
+}
+
+// Likewise the first cones.
+inline int64_t break_widths(TestScene& scene) {
+  scene.rays.widths = Tensor<float>({scene.rays.count()});
+  int64_t broken = 0;
+  for (const float value : {nan, infinite, -infinite, -0.1F}) scene.rays.widths[broken++] = value;
+  return broken;
 }
 
 inline void make_rays_extreme(TestScene& scene) {
   for (int k = 0; k < 3; ++k) {
-    scene.origins(0, k) = largest;
-    scene.origins(1, k) = 1e20F;
-    scene.directions(2, k) = smallest;
-    scene.directions(3, k) = 1e-30F;
-    scene.directions(4, k) = 1e30F;
-    scene.directions(5, k) = largest;
+    scene.rays.origins(0, k) = largest;
+    scene.rays.origins(1, k) = 1e20F;
+    scene.rays.directions(2, k) = smallest;
+    scene.rays.directions(3, k) = 1e-30F;
+    scene.rays.directions(4, k) = 1e30F;
+    scene.rays.directions(5, k) = largest;
   }
-  scene.directions(6, 0) = scene.directions(6, 1) = -0.0F;
-  scene.directions(7, 1) = scene.directions(7, 2) = 0;
+  scene.rays.directions(6, 0) = scene.rays.directions(6, 1) = -0.0F;
+  scene.rays.directions(7, 1) = scene.rays.directions(7, 2) = 0;
 }
 
 inline TestScene rays_inside_a_plane() {
   TestScene scene = blank_scene(1, 0, 2);
   set_facing(scene.surfels, 0, 1, 1, 0.5F);
-  scene.directions(0, 0) = 1;  // parallel to the plane
-  scene.origins(1, 0) = -5;    // in the plane
-  scene.origins(1, 2) = 1;
-  scene.directions(1, 0) = 1;
+  scene.rays.directions(0, 0) = 1;  // parallel to the plane
+  scene.rays.origins(1, 0) = -5;    // in the plane
+  scene.rays.origins(1, 2) = 1;
+  scene.rays.directions(1, 0) = 1;
   return scene;
 }
 
@@ -91,7 +99,7 @@ inline TestScene rays_inside_a_plane() {
 inline TestScene surfels_in_a_row(int64_t count) {
   TestScene scene = blank_scene(count, 0, 1);
   for (int64_t i = 0; i < count; ++i) set_facing(scene.surfels, i, 2 + static_cast<float>(i), 0.5F, 0.8F);
-  scene.directions(0, 2) = 1;
+  scene.rays.directions(0, 2) = 1;
   return scene;
 }
 
@@ -99,7 +107,7 @@ inline TestScene surfels_in_a_row(int64_t count) {
 inline TestScene surfels_in_one_place(int64_t count) {
   TestScene scene = blank_scene(count, 0, 1);
   for (int64_t i = 0; i < count; ++i) set_facing(scene.surfels, i, 1, 1, 0.01F);
-  scene.directions(0, 2) = 1;
+  scene.rays.directions(0, 2) = 1;
   return scene;
 }
 
@@ -110,7 +118,7 @@ inline TestScene surfels_of_every_scale(int64_t count) {
     const float depth = std::ldexp(1.0F, static_cast<int>(i % 100) - 90);
     set_facing(scene.surfels, i, depth, depth * 0.1F, 0.01F);
   }
-  scene.directions(0, 2) = 1;
+  scene.rays.directions(0, 2) = 1;
   return scene;
 }
 

@@ -28,7 +28,7 @@ bool is_zero(const float* row, int64_t n) {
 // A broken surfel is as good as absent, and has no gradient.
 void expect_left_out(const TestScene& broken, int64_t count) {
   const Traced with = trace(broken, {});
-  const Traced without = trace({without_first(broken.surfels, count), broken.origins, broken.directions}, {});
+  const Traced without = trace({without_first(broken.surfels, count), broken.rays}, {});
   EXPECT_TRUE(same_bytes(with.output, without.output));
   EXPECT_TRUE(all_finite(with));
   for (int64_t i = 0; i < count; ++i) {
@@ -65,9 +65,7 @@ TEST(TraceHostile, ExtremeSurfelsAreFinite) {
   EXPECT_TRUE(all_finite(trace(scene, {})));
 }
 
-TEST(TraceHostile, RaysThatCannotBeTracedSeeTheBackground) {
-  TestScene scene = clean_scene();
-  const int64_t broken = break_rays(scene);
+void expect_first_see_the_background(const TestScene& scene, int64_t broken) {
   Options options;
   options.background = {0.25F, 0.5F, 0.75F};
   const Traced t = trace(scene, options);
@@ -76,9 +74,31 @@ TEST(TraceHostile, RaysThatCannotBeTracedSeeTheBackground) {
     for (int c = 0; c < 3; ++c) EXPECT_EQ(t.output.colour(r, c), options.background[c]);
     EXPECT_EQ(t.output.alpha[r], 0);
     EXPECT_EQ(t.output.distance[r], 0);
-    EXPECT_TRUE(is_zero(t.gradient.origins.row(r), 3));
-    EXPECT_TRUE(is_zero(t.gradient.directions.row(r), 3));
+    EXPECT_TRUE(is_zero(t.gradient.rays.origins.row(r), 3));
+    EXPECT_TRUE(is_zero(t.gradient.rays.directions.row(r), 3));
+    EXPECT_TRUE(scene.rays.widths.empty() || t.gradient.rays.widths[r] == 0);
   }
+}
+
+TEST(TraceHostile, RaysThatCannotBeTracedSeeTheBackground) {
+  TestScene scene = clean_scene();
+  const int64_t broken = break_rays(scene);
+  expect_first_see_the_background(scene, broken);
+}
+
+TEST(TraceHostile, ConesThatCannotBeTracedSeeTheBackground) {
+  TestScene scene = clean_scene();
+  const int64_t broken = break_widths(scene);
+  expect_first_see_the_background(scene, broken);
+}
+
+TEST(TraceHostile, ExtremeCones) {
+  TestScene scene = clean_scene();
+  make_extreme(scene.surfels);
+  scene.rays.widths = Tensor<float>({scene.rays.count()});
+  for (int64_t r = 0; r < scene.rays.count(); ++r)
+    scene.rays.widths[r] = r % 3 == 0 ? largest : r % 3 == 1 ? 1e10F : smallest;
+  EXPECT_TRUE(all_finite(trace(scene, {})));
 }
 
 TEST(TraceHostile, ExtremeRays) {
@@ -94,10 +114,10 @@ TEST(TraceHostile, ExtremeRays) {
 TEST(TraceHostile, LengthOfTheDirection) {
   TestScene scene = clean_scene();
   const Traced one = trace(scene, {});
-  for (float& v : scene.directions.values()) v *= 0x1p-60F;
+  for (float& v : scene.rays.directions.values()) v *= 0x1p-60F;
   const Traced shorter = trace(scene, {});
   EXPECT_TRUE(same_bytes(one.output.colour, shorter.output.colour));
-  for (int64_t r = 0; r < scene.origins.dim(0); ++r) {
+  for (int64_t r = 0; r < scene.rays.count(); ++r) {
     EXPECT_EQ(shorter.output.distance[r], one.output.distance[r] * 0x1p60F);
   }
 }
@@ -113,9 +133,9 @@ TEST(TraceHostile, NothingToTrace) {
   EXPECT_EQ(t.hits, 0);
   EXPECT_EQ(t.output.alpha.size(), 3);
   EXPECT_EQ(t.output.alpha[2], 0);
-  const TestScene no_rays{clean_scene().surfels, {}, {}};
+  const TestScene no_rays{clean_scene().surfels, {}};
   EXPECT_EQ(trace(no_rays, {}).output.colour.size(), 0);
-  EXPECT_EQ(trace({{}, {}, {}}, {}).hits, 0);
+  EXPECT_EQ(trace({{}, {}}, {}).hits, 0);
 }
 
 TEST(TraceHostile, OneSurfel) { EXPECT_NEAR(trace(surfels_in_a_row(1), {}).output.alpha[0], 0.8F, 1e-6); }
@@ -133,8 +153,7 @@ TEST(TraceHostile, SurfelsOfEveryScale) {
   Options options;
   options.t_min = 0;
   BasicOutput<double> truth;
-  forward_reference(convert<double>(scene.surfels), convert<double>(scene.origins),
-                    convert<double>(scene.directions), options, truth);
+  forward_reference(convert<double>(scene.surfels), convert<double>(scene.rays), options, truth);
   EXPECT_NEAR(trace(scene, options).output.alpha[0], truth.alpha[0], 1e-4);
 }
 

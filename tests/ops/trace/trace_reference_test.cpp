@@ -11,14 +11,13 @@ namespace {
 
 struct Problem {
   BasicPosedSurfels<double> surfels;
-  Tensor<double> origins, directions;
+  BasicRays<double> rays;
   Options options;
 };
 
 Problem make_problem(uint64_t seed, const SceneOptions& scene_options) {
   const TestScene scene = random_scene(seed, scene_options);
-  Problem p{
-      convert<double>(scene.surfels), convert<double>(scene.origins), convert<double>(scene.directions), {}};
+  Problem p{convert<double>(scene.surfels), convert<double>(scene.rays), {}};
   // The cut-off at alpha_min is a step in the image: far enough down, differences do not meet it.
   p.options.alpha_min = 1e-12F;
   p.options.transmittance_min = 0;
@@ -28,7 +27,7 @@ Problem make_problem(uint64_t seed, const SceneOptions& scene_options) {
 
 double loss(const Problem& p, const BasicOutputGradient<double>& weights) {
   BasicOutput<double> out;
-  forward_reference(p.surfels, p.origins, p.directions, p.options, out);
+  forward_reference(p.surfels, p.rays, p.options, out);
   double sum = 0;
   for (int64_t i = 0; i < out.colour.size(); ++i) sum += weights.colour[i] * out.colour[i];
   for (int64_t i = 0; i < out.alpha.size(); ++i) sum += weights.alpha[i] * out.alpha[i];
@@ -55,16 +54,17 @@ void expect_matches_differences(Problem& p, Tensor<double>& values, const Tensor
 }
 
 void expect_all_gradients(Problem p, uint64_t seed) {
-  const BasicOutputGradient<double> weights = random_output_gradient(seed, p.origins.dim(0));
+  const BasicOutputGradient<double> weights = random_output_gradient(seed, p.rays.count());
   BasicInputGradient<double> g;
-  backward_reference(p.surfels, p.origins, p.directions, p.options, weights, g);
+  backward_reference(p.surfels, p.rays, p.options, weights, g);
   expect_matches_differences(p, p.surfels.position, g.surfels.position, weights, "position");
   expect_matches_differences(p, p.surfels.scale, g.surfels.scale, weights, "scale");
   expect_matches_differences(p, p.surfels.rotation, g.surfels.rotation, weights, "rotation");
   expect_matches_differences(p, p.surfels.opacity, g.surfels.opacity, weights, "opacity");
   expect_matches_differences(p, p.surfels.sh, g.surfels.sh, weights, "sh");
-  expect_matches_differences(p, p.origins, g.origins, weights, "origins");
-  expect_matches_differences(p, p.directions, g.directions, weights, "directions");
+  expect_matches_differences(p, p.rays.origins, g.rays.origins, weights, "origins");
+  expect_matches_differences(p, p.rays.directions, g.rays.directions, weights, "directions");
+  if (!p.rays.widths.empty()) expect_matches_differences(p, p.rays.widths, g.rays.widths, weights, "widths");
 }
 
 // Few, wide, faint surfels: every ray meets each far from where a hit would come or go.
@@ -79,6 +79,51 @@ TEST(TraceReference, GradientsMatchCentralDifferencesAtEveryDegree) {
   }
 }
 
+TEST(TraceReference, GradientsOfConesMatchCentralDifferences) {
+  SceneOptions o = smooth_scene(2);
+  o.width_max = 0.3;
+  expect_all_gradients(make_problem(12, o), 101);
+}
+
+// What a cone sees of one surfel is the mean of what its rays see: over directions (x, y, 1), with x and y
+// from a Gaussian of the cone's width, by Simpson's rule.
+TEST(TraceReference, AConeSeesTheMeanOfItsRays) {
+  constexpr int steps = 200;
+  constexpr double width = 0.2, reach = 7;
+  PosedSurfels s = make_surfels(1, 0);
+  set_facing(s, 0, 2, 0.5F, 0.8F);
+  s.scale(0, 1) = 0.1F;
+  const BasicPosedSurfels<double> surfels = convert<double>(s);
+  Options options;
+  options.alpha_min = 1e-30F;
+  BasicRays<double> rays{Tensor<double>({(steps + 1) * (steps + 1), 3}), {}};
+  rays.directions = Tensor<double>(rays.origins.shape());
+  for (int64_t r = 0; r < rays.count(); ++r) {
+    rays.origins(r, 0) = 0.3;
+    rays.directions(r, 0) = width * reach * (2 * static_cast<double>(r % (steps + 1)) / steps - 1);
+    rays.directions(r, 1) = width * reach * (2 * static_cast<double>(r / (steps + 1)) / steps - 1);
+    rays.directions(r, 2) = 1;
+  }
+  BasicOutput<double> each;
+  forward_reference(surfels, rays, options, each);
+  const auto weight = [](int64_t i) { return i == 0 || i == steps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0; };
+  double mean = 0, sum = 0;
+  for (int64_t r = 0; r < rays.count(); ++r) {
+    const double x = rays.directions(r, 0) / width, y = rays.directions(r, 1) / width;
+    const double w = weight(r % (steps + 1)) * weight(r / (steps + 1)) * std::exp(-0.5 * (x * x + y * y));
+    mean += w * each.alpha[r];
+    sum += w;
+  }
+  BasicRays<double> cone{Tensor<double>({1, 3}), Tensor<double>({1, 3}), Tensor<double>({1})};
+  cone.origins(0, 0) = 0.3;
+  cone.directions(0, 2) = 3;
+  cone.widths[0] = width;
+  BasicOutput<double> found;
+  forward_reference(surfels, cone, options, found);
+  EXPECT_NEAR(found.alpha[0], mean / sum, 1e-6);
+  EXPECT_LT(found.alpha[0], 0.5 * each.alpha[rays.count() / 2]) << "the cone is no mere ray";
+}
+
 TEST(TraceReference, GradientOfAClampedAlphaIsZero) {
   Problem p = make_problem(3, smooth_scene(0));
   p.options.alpha_max = 0.2F;
@@ -89,13 +134,13 @@ TEST(TraceReference, OneFacingSurfelIsWhatTheFormulaSays) {
   PosedSurfels s = make_surfels(1, 0);
   set_facing(s, 0, 2, 0.5F, 0.8F);
   for (int c = 0; c < 3; ++c) s.sh.row(0)[c] = static_cast<float>(0.1 * (c + 1) / sh_c0);
-  Tensor<double> origins({1, 3}), directions({1, 3});
-  origins(0, 0) = 0.25;
-  directions(0, 2) = 4;
+  BasicRays<double> rays{Tensor<double>({1, 3}), Tensor<double>({1, 3})};
+  rays.origins(0, 0) = 0.25;
+  rays.directions(0, 2) = 4;
   BasicOutput<double> out;
   Options options;
   options.background = {1, 0, 0};
-  forward_reference(convert<double>(s), origins, directions, options, out);
+  forward_reference(convert<double>(s), rays, options, out);
   const double alpha = 0.8 * std::exp(-0.125);
   EXPECT_NEAR(out.alpha[0], alpha, 1e-7);
   EXPECT_NEAR(out.distance[0], 0.5, 1e-12);
@@ -111,10 +156,10 @@ TEST(TraceReference, BlendsByDistanceWhateverTheOrderOfTheSurfels) {
     set_facing(s, i, depth[i], 1, 0.5F);
     for (int c = 0; c < 3; ++c) s.sh.row(i)[c] = static_cast<float>((c == i ? 0.5 : -0.5) / sh_c0);
   }
-  Tensor<double> origins({1, 3}), directions({1, 3});
-  directions(0, 2) = 1;
+  BasicRays<double> rays{Tensor<double>({1, 3}), Tensor<double>({1, 3})};
+  rays.directions(0, 2) = 1;
   BasicOutput<double> out;
-  forward_reference(convert<double>(s), origins, directions, {}, out);
+  forward_reference(convert<double>(s), rays, {}, out);
   EXPECT_NEAR(out.colour(0, 1), 0.5, 1e-7);
   EXPECT_NEAR(out.colour(0, 2), 0.25, 1e-7);
   EXPECT_NEAR(out.colour(0, 0), 0.125, 1e-7);
@@ -124,10 +169,10 @@ TEST(TraceReference, BlendsByDistanceWhateverTheOrderOfTheSurfels) {
 TEST(TraceReference, EndsBeforeTheTransmittanceFallsUnderTheMinimum) {
   PosedSurfels s = make_surfels(4, 0);
   for (int64_t i = 0; i < 4; ++i) set_facing(s, i, static_cast<float>(i + 1), 1, 0.95F);
-  Tensor<double> origins({1, 3}), directions({1, 3});
-  directions(0, 2) = 1;
+  BasicRays<double> rays{Tensor<double>({1, 3}), Tensor<double>({1, 3})};
+  rays.directions(0, 2) = 1;
   BasicOutput<double> out;
-  forward_reference(convert<double>(s), origins, directions, {}, out);
+  forward_reference(convert<double>(s), rays, {}, out);
   EXPECT_NEAR(out.alpha[0], 1 - 0.05 * 0.05 * 0.05, 1e-7);  // a fourth hit would leave 6e-6
 }
 
@@ -135,12 +180,12 @@ TEST(TraceReference, IgnoresHitsNearerThanTheMinimum) {
   PosedSurfels s = make_surfels(2, 0);
   set_facing(s, 0, 0.01F, 1, 0.5F);
   set_facing(s, 1, 1, 1, 0.25F);
-  Tensor<double> origins({1, 3}), directions({1, 3});
-  directions(0, 2) = 10;
+  BasicRays<double> rays{Tensor<double>({1, 3}), Tensor<double>({1, 3})};
+  rays.directions(0, 2) = 10;
   Options options;
   options.t_min = 0.02F;
   BasicOutput<double> out;
-  forward_reference(convert<double>(s), origins, directions, options, out);
+  forward_reference(convert<double>(s), rays, options, out);
   EXPECT_NEAR(out.alpha[0], 0.25, 1e-7);
 }
 

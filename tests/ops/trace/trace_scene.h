@@ -18,11 +18,12 @@ struct SceneOptions {
   double opacity_min = 0.1, opacity_max = 0.9;
   double box = 1;           // surfels lie in [-box, box]³
   double ray_distance = 3;  // rays start on a sphere of this radius and aim into the box
+  double width_max = 0;     // of the rays' cones, where they are any
 };
 
 struct TestScene {
   PosedSurfels surfels;
-  Tensor<float> origins, directions;
+  Rays rays;
 };
 
 inline void fill_surfel(PosedSurfels& s, int64_t i, Random& random, const SceneOptions& options) {
@@ -49,7 +50,7 @@ inline PosedSurfels make_surfels(int64_t count, int sh_degree) {
 
 // To be filled in: all zeros.
 inline TestScene blank_scene(int64_t surfels, int sh_degree, int64_t rays) {
-  return {make_surfels(surfels, sh_degree), Tensor<float>({rays, 3}), Tensor<float>({rays, 3})};
+  return {make_surfels(surfels, sh_degree), {Tensor<float>({rays, 3}), Tensor<float>({rays, 3})}};
 }
 
 inline Vec3<double> random_direction(Random& random) {
@@ -65,8 +66,13 @@ inline TestScene random_scene(uint64_t seed, const SceneOptions& options = {}) {
   for (int64_t r = 0; r < options.rays; ++r) {
     const Vec3<double> origin = options.ray_distance * random_direction(random);
     const Vec3<double> target = 0.6 * options.box * random_direction(random);
-    store3(scene.origins.row(r), origin);
-    store3(scene.directions.row(r), random.uniform(0.5, 2) * glm::normalize(target - origin));
+    store3(scene.rays.origins.row(r), origin);
+    store3(scene.rays.directions.row(r), random.uniform(0.5, 2) * glm::normalize(target - origin));
+  }
+  if (options.width_max > 0) {
+    scene.rays.widths = Tensor<float>({options.rays});
+    for (float& width : scene.rays.widths.values())
+      width = static_cast<float>(random.uniform(0, options.width_max));
   }
   return scene;
 }

@@ -20,12 +20,11 @@ void expect_matches_reference(const TestScene& scene) {
   options.alpha_min = 1e-6F;
   const Traced fast = trace(scene, options);
   const auto surfels = convert<double>(scene.surfels);
-  const auto origins = convert<double>(scene.origins), directions = convert<double>(scene.directions);
+  const auto rays = convert<double>(scene.rays);
   BasicOutput<double> output;
   BasicInputGradient<double> gradient;
-  forward_reference(surfels, origins, directions, options, output);
-  backward_reference(surfels, origins, directions, options, random_output_gradient(5, origins.dim(0)),
-                     gradient);
+  forward_reference(surfels, rays, options, output);
+  backward_reference(surfels, rays, options, random_output_gradient(5, rays.count()), gradient);
   for (int64_t i = 0; i < output.colour.size(); ++i)
     ASSERT_NEAR(fast.output.colour[i], output.colour[i], 1e-4);
   for (int64_t i = 0; i < output.distance.size(); ++i) {
@@ -34,9 +33,9 @@ void expect_matches_reference(const TestScene& scene) {
   for (int64_t i = 0; i < gradient.surfels.sh.size(); ++i) {
     ASSERT_NEAR(fast.gradient.surfels.sh[i], gradient.surfels.sh[i], 1e-4);
   }
-  for (int64_t i = 0; i < gradient.origins.size(); ++i) {
-    ASSERT_NEAR(fast.gradient.origins[i], gradient.origins[i], 1e-2);
-    ASSERT_NEAR(fast.gradient.directions[i], gradient.directions[i], 1e-2);
+  for (int64_t i = 0; i < gradient.rays.origins.size(); ++i) {
+    ASSERT_NEAR(fast.gradient.rays.origins[i], gradient.rays.origins[i], 1e-2);
+    ASSERT_NEAR(fast.gradient.rays.directions[i], gradient.rays.directions[i], 1e-2);
   }
 }
 
@@ -50,6 +49,8 @@ TEST(TraceTargets, EveryInstructionSetMatchesTheReference) {
       const SceneOptions o{.surfels = 100, .rays = 100, .sh_degree = degree, .opacity_max = 0.3};
       expect_matches_reference(random_scene(static_cast<uint64_t>(degree), o));
     }
+    expect_matches_reference(
+        random_scene(4, {.surfels = 100, .rays = 100, .opacity_max = 0.3, .width_max = 0.1}));
   }
 }
 

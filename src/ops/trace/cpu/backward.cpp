@@ -115,7 +115,7 @@ template <int degree>
 void backward_ray(const BackwardInput& input, int64_t r, const RayHits& hits, RayScratch& scratch,
                   InputGradient& gradient) {
   UnitRay ray;
-  make_unit_ray(input.origins.row(r), input.directions.row(r), ray);
+  make_unit_ray(RayView(input.rays), r, ray);
   const RaySums sums = replay(hits, scratch);
   const RayGradient grad(input.grad_output, r, ray.length);
   float basis[padded_basis];
@@ -127,8 +127,9 @@ void backward_ray(const BackwardInput& input, int64_t r, const RayHits& hits, Ra
       places_backward(input.frames.data(), ray,
                       {hits.surfel, scratch.row.data(), scratch.distance.data(), scratch.grad_exponent.data(),
                        scratch.grad_distance.data(), hits.count});
-  store3(gradient.origins.row(r), by_place.origin);
-  store3(gradient.directions.row(r),
+  if (!input.rays.widths.empty()) gradient.rays.widths[r] = by_place.width;
+  store3(gradient.rays.origins.row(r), by_place.origin);
+  store3(gradient.rays.directions.row(r),
          direction_backward(ray, by_colour + by_place.direction, grad.distance, sums.distance));
 }
 
@@ -255,18 +256,17 @@ void chunk_backward(const BackwardInput& input, std::span<const Group> groups, T
 
 }  // namespace
 
-void cpu::backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
-                   const Options& options, const Saved& saved, const OutputGradient& grad_output,
-                   InputGradient& gradient) {
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  require(static_cast<int64_t>(saved.order.ray.size()) == rays, "the hits were saved for these rays");
+void cpu::backward(const PosedSurfels& surfels, const Rays& rays, const Options& options, const Saved& saved,
+                   const OutputGradient& grad_output, InputGradient& gradient) {
+  require(static_cast<int64_t>(saved.order.ray.size()) == rays.count(), "the hits were saved for these rays");
   gradient.surfels.reset_like(surfels);
-  gradient.origins.place(Device::cpu).reset({rays, 3});
-  gradient.directions.place(Device::cpu).reset({rays, 3});
+  gradient.rays.origins.place(Device::cpu).reset({rays.count(), 3});
+  gradient.rays.directions.place(Device::cpu).reset({rays.count(), 3});
+  gradient.rays.widths.place(Device::cpu).reset(rays.widths.shape());
   gradient.position_gradient.place(Device::cpu).reset({surfels.count()});
   const std::vector<BackwardFrame> frames = make_backward_frames(surfels);
   std::vector<SurfelSums> sums(frames.size(), SurfelSums{});
-  const BackwardInput input{surfels, origins, directions, options, grad_output, frames, saved};
+  const BackwardInput input{surfels, rays, options, grad_output, frames, saved};
   const std::vector<Group> groups = make_groups(saved, surfels.count());
   Tensor<float> rows;
   for (size_t first = 0; first < groups.size();) {

@@ -24,17 +24,22 @@ struct DiskRules {
   BlendRules<float> blend;
   float log_alpha_min;
   float near;
-  size_t hits_per_look;  // hits gathered before it is asked whether a ray has ended
+  bool has_cones;         // whether rays may have widths
+  float cone_deviations;  // as many as a Gaussian has from its middle to where the faintest hit is cut off
+  size_t hits_per_look;   // hits gathered before it is asked whether a ray has ended
 
-  explicit DiskRules(const Options& o)
+  DiskRules(const Options& o, bool cones)
       : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
         log_alpha_min(std::log(o.alpha_min)),
         near(o.t_min),
+        has_cones(cones),
+        cone_deviations(1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)))),
         hits_per_look(static_cast<size_t>(o.hits_per_pass)) {}
 };
 
 struct RayVec {
   Vec ox, oy, oz, dx, dy, dz;
+  Vec width;
 };
 
 struct DiskHit {
@@ -60,8 +65,21 @@ HWY_INLINE DiskHit meet_disk(const RayVec& ray, const DiskRules& rules, Vec far,
   const Vec x = hn::MulAdd(t, ray.dx, qx), y = hn::MulAdd(t, ray.dy, qy), z = hn::MulAdd(t, ray.dz, qz);
   const Vec u = dot(load(leaf.u[0]), load(leaf.u[1]), load(leaf.u[2]), x, y, z);
   const Vec v = dot(load(leaf.v[0]), load(leaf.v[1]), load(leaf.v[2]), x, y, z);
-  const Vec radius2 = hn::MulAdd(u, u, hn::Mul(v, v));
-  const Vec exponent = hn::NegMulAdd(radius2, hn::Set(d, 0.5F), load(leaf.log_opacity));
+  const Vec half = hn::Set(d, 0.5F);
+  Vec radius2, exponent = load(leaf.log_opacity);
+  if (rules.has_cones) {
+    const Vec ux = load(leaf.u[0]), uy = load(leaf.u[1]), uz = load(leaf.u[2]);
+    const Vec vx = load(leaf.v[0]), vy = load(leaf.v[1]), vz = load(leaf.v[2]);
+    const Vec spread = hn::Mul(t, ray.width), spread2 = hn::Mul(spread, spread), one = hn::Set(d, 1.0F);
+    // By how much the disk's variances grow.
+    const Vec grown_u = hn::MulAdd(spread2, dot(ux, uy, uz, ux, uy, uz), one);
+    const Vec grown_v = hn::MulAdd(spread2, dot(vx, vy, vz, vx, vy, vz), one);
+    radius2 = hn::Add(hn::Div(hn::Mul(u, u), grown_u), hn::Div(hn::Mul(v, v), grown_v));
+    exponent = hn::NegMulAdd(half, hn::Log(d, hn::Mul(grown_u, grown_v)), exponent);
+  } else {
+    radius2 = hn::MulAdd(u, u, hn::Mul(v, v));
+  }
+  exponent = hn::NegMulAdd(radius2, half, exponent);
   const auto mask = hn::And(hn::Ge(exponent, hn::Set(d, rules.log_alpha_min)),
                             hn::And(hn::Ge(t, hn::Set(d, rules.near)), hn::Le(t, far)));
   return {t, exponent, mask};

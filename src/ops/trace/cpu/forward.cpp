@@ -164,13 +164,14 @@ HWY_INLINE void trace_together_or_alone(const BlockTask& task, const DiskRules& 
 template <int degree>
 void trace_block(const BlockTask& task) {
   thread_local Scratch scratch;
-  const DiskRules rules(task.options);
+  const DiskRules rules(task.options, !task.rays.widths.empty());
+  const RayView rays(task.rays);
   for (int64_t i = task.begin; i < task.end;) {
     Packet packet;
     for (; i < task.end && packet.count < packet_rays; ++i) {
       const int64_t r = task.order.ray[static_cast<size_t>(i)];
       UnitRay& ray = packet.rays[packet.count];
-      if (make_unit_ray(task.origins.row(r), task.directions.row(r), ray)) {
+      if (make_unit_ray(rays, r, ray)) {
         packet.index[packet.count++] = r;
       } else {
         write_ray(task, r, {}, {}, Vec3<float>(0));
@@ -207,23 +208,23 @@ int64_t cpu::blended_hits(const Saved& saved) {
   return sum;
 }
 
-void cpu::forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
-                  const Tensor<float>& directions, const Options& options, Output& output, Saved* saved) {
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  output.colour.place(Device::cpu).resize({rays, 3});
-  output.alpha.place(Device::cpu).resize({rays});
-  output.distance.place(Device::cpu).resize({rays});
+void cpu::forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays, const Options& options,
+                  Output& output, Saved* saved) {
+  const int64_t count = rays.count();
+  output.colour.place(Device::cpu).resize({count, 3});
+  output.alpha.place(Device::cpu).resize({count});
+  output.distance.place(Device::cpu).resize({count});
   RayOrder unsaved;
   RayOrder& order = saved ? saved->order : unsaved;
-  order_rays(bvh, origins, directions, order);
+  order_rays(bvh, rays, order);
   if (saved) {
-    saved->blocks.resize(static_cast<size_t>((rays + rays_per_block - 1) / rays_per_block));
+    saved->blocks.resize(static_cast<size_t>((count + rays_per_block - 1) / rays_per_block));
   }
-  parallel_blocks("trace forward", rays, rays_per_block, [&](int64_t begin, int64_t end) {
+  parallel_blocks("trace forward", count, rays_per_block, [&](int64_t begin, int64_t end) {
     SavedBlock* block = saved ? &saved->blocks[static_cast<size_t>(begin / rays_per_block)] : nullptr;
     if (block) block->clear();
     HWY_DYNAMIC_DISPATCH(trace_rays)
-    ({surfels, bvh, origins, directions, options, order, begin, end, output, block});
+    ({surfels, bvh, rays, options, order, begin, end, output, block});
   });
 }
 

@@ -77,10 +77,28 @@ struct HitGradients {
   size_t count;
 };
 
-// dL/d of a ray by the places of its hits; that to the direction as a change of a unit vector.
-struct RayPull {
-  Vec3<float> origin{0}, direction{0};
+// -dL/d(along t_u or t_v), and dL/d(scale), of a hit so far along that axis.
+struct AxisPull {
+  HitVec along, scale;
 };
+HWY_INLINE AxisPull pull_along(HitVec grad_exponent, HitVec along, HitVec inverse_scale) {
+  const HitVec u = hn::Mul(along, inverse_scale);
+  const HitVec pull = hn::Mul(hn::Mul(grad_exponent, u), inverse_scale);
+  return {pull, hn::Mul(pull, u)};
+}
+// The same of a disk that a cone widens by a Gaussian of variance `spread2`; adds to -2 dL/d(spread2).
+HWY_INLINE AxisPull pull_along_widened(HitVec grad_exponent, HitVec along, HitVec inverse_scale,
+                                       HitVec spread2, HitVec& by_spread2) {
+  const HitTag d;
+  const HitVec one = hn::Set(d, 1.0F), scale = hn::Div(one, inverse_scale);
+  const HitVec precision = hn::Div(one, hn::MulAdd(scale, scale, spread2));
+  const HitVec u = hn::Mul(along, precision);
+  // What widening takes from the exponent, twice: it lowers the peak and flattens the slope.
+  const HitVec lost = hn::Mul(grad_exponent, hn::NegMulAdd(u, u, precision));
+  by_spread2 = hn::Add(by_spread2, lost);
+  // The peak is as high as scale · √precision.
+  return {hn::Mul(grad_exponent, u), hn::NegMulAdd(scale, lost, hn::Mul(grad_exponent, inverse_scale))};
+}
 
 // Adds the parts of each hit, transposed four at a time, to its row.
 HWY_INLINE void add_parts(const HitVec (&parts)[12], float* const* rows, size_t count) {
@@ -107,34 +125,48 @@ HWY_INLINE RayPull places_backward(const BackwardFrame* frames, const UnitRay& r
   const HitTag d;
   const HitVec3 direction = spread(ray.direction), zero = spread(Vec3<float>(0));
   HitVec3 origin_sum = zero, direction_sum = zero;
+  HitVec width_sum = hn::Zero(d);
   for (size_t i = 0; i < hits.count; i += hit_lanes) {
     const size_t count = std::min(hit_lanes, hits.count - i);
     const HitFrames f(frames, hits.surfel + i, count);
     const auto used = hn::FirstN(d, count);
     const HitVec distance = hn::IfThenElseZero(used, hn::LoadU(d, hits.distance + i));
     const HitVec grad_exponent = hn::IfThenElseZero(used, hn::LoadU(d, hits.grad_exponent + i));
-    const HitVec grad_distance = hn::IfThenElseZero(used, hn::LoadU(d, hits.grad_distance + i));
+    HitVec grad_distance = hn::IfThenElseZero(used, hn::LoadU(d, hits.grad_distance + i));
     const HitVec3 from_centre{hn::Sub(hn::Set(d, ray.origin.x), f.position.x),
                               hn::Sub(hn::Set(d, ray.origin.y), f.position.y),
                               hn::Sub(hn::Set(d, ray.origin.z), f.position.z)};
     const HitVec3 x = add_scaled(from_centre, distance, direction);
     const HitVec along_u = dot(f.t_u, x), along_v = dot(f.t_v, x);
-    const HitVec u = hn::Mul(along_u, f.inverse_scale_u), v = hn::Mul(along_v, f.inverse_scale_v);
-    const HitVec pull_u = hn::Mul(hn::Mul(grad_exponent, u), f.inverse_scale_u);  // -dL/d(along t_u)
-    const HitVec pull_v = hn::Mul(hn::Mul(grad_exponent, v), f.inverse_scale_v);
+    AxisPull by_u, by_v;
+    if (ray.width > 0) {
+      const HitVec spread = hn::Mul(distance, hn::Set(d, ray.width));
+      HitVec by_spread2 = hn::Zero(d);
+      by_u =
+          pull_along_widened(grad_exponent, along_u, f.inverse_scale_u, hn::Mul(spread, spread), by_spread2);
+      by_v =
+          pull_along_widened(grad_exponent, along_v, f.inverse_scale_v, hn::Mul(spread, spread), by_spread2);
+      const HitVec by_spread = hn::IfThenElseZero(used, hn::Neg(hn::Mul(by_spread2, spread)));
+      grad_distance = hn::MulAdd(by_spread, hn::Set(d, ray.width), grad_distance);
+      width_sum = hn::MulAdd(by_spread, distance, width_sum);
+    } else {
+      by_u = pull_along(grad_exponent, along_u, f.inverse_scale_u);
+      by_v = pull_along(grad_exponent, along_v, f.inverse_scale_v);
+    }
+    const HitVec pull_u = by_u.along, pull_v = by_v.along;
     const HitVec3 grad_x = add_scaled(add_scaled(zero, hn::Neg(pull_u), f.t_u), hn::Neg(pull_v), f.t_v);
     const HitVec a = hn::Div(hn::Add(grad_distance, dot(grad_x, direction)), dot(f.normal, direction));
     const HitVec half_distance = hn::Mul(hn::Set(d, 0.5F), distance);
     add_parts({pull_u, pull_v, a, hn::Mul(a, along_v), hn::Neg(hn::Mul(a, along_u)),
-               hn::NegMulAdd(pull_u, along_v, hn::Mul(pull_v, along_u)), hn::Mul(pull_u, u),
-               hn::Mul(pull_v, v), hn::Mul(grad_exponent, f.inverse_opacity), hn::Mul(half_distance, pull_u),
+               hn::NegMulAdd(pull_u, along_v, hn::Mul(pull_v, along_u)), by_u.scale, by_v.scale,
+               hn::Mul(grad_exponent, f.inverse_opacity), hn::Mul(half_distance, pull_u),
                hn::Mul(half_distance, pull_v), hn::Mul(half_distance, a)},
               hits.row + i, count);
     const HitVec3 moved = keep_lanes(used, add_scaled(grad_x, hn::Neg(a), f.normal));
     origin_sum = add_scaled(origin_sum, hn::Set(d, 1.0F), moved);
     direction_sum = add_scaled(direction_sum, distance, moved);
   }
-  return {sum_lanes(origin_sum), sum_lanes(direction_sum)};
+  return {sum_lanes(origin_sum), sum_lanes(direction_sum), hn::GetLane(hn::SumOfLanes(d, width_sum))};
 }
 
 }  // namespace traceflow::trace::HWY_NAMESPACE

@@ -73,12 +73,15 @@ class PacketWalk {
         direction_[axis][lane] = ray.direction[axis];
         reciprocal_[axis][lane] = safe_reciprocal(ray.direction[axis]);
       }
+      width_[lane] = ray.width;
+      slope_[lane] = rules.cone_deviations * ray.width;
       far_[lane] = lane < count ? farthest_distance : -1.0F;
       transmittance_[lane] = 1;
       hits.rays[lane].count = 0;
       cut_at_[lane] = 0;
     }
     hits.candidates.clear();
+    beam_.widen(*std::max_element(slope_, slope_ + packet_rays));
   }
 
   // All hits of each ray up to where it ends for certain, in order.
@@ -104,8 +107,11 @@ class PacketWalk {
     if (hits_.candidates.size() - looked_ >= rules_.hits_per_look) look();
   }
 
-  // Bit l: ray l meets the leaf's box before it ends.
+  // Bit l: ray l meets the leaf's box before it ends, or its cone may.
   HWY_INLINE uint32_t meet_rays(const BvhLeaf& leaf) const {
+    return rules_.has_cones ? meet_cones(leaf) : meet_lines(leaf);
+  }
+  HWY_INLINE uint32_t meet_lines(const BvhLeaf& leaf) const {
     const Tag d;
     Vec enter = hn::Zero(d), leave = hn::Load(d, far_);
     for (int axis = 0; axis < 3; ++axis) {
@@ -118,10 +124,33 @@ class PacketWalk {
     return mask_bits(hn::Le(enter, hn::Mul(leave, hn::Set(d, 1.000001F))));
   }
 
+  // On each axis a cone is in front of the box until the side of it that goes there faster enters, and within
+  // until the slower one leaves, where that goes the same way.
+  HWY_INLINE uint32_t meet_cones(const BvhLeaf& leaf) const {
+    const Tag d;
+    const Vec slope = hn::Load(d, slope_), least = hn::Set(d, 1e-10F);
+    Vec enter = hn::Zero(d), leave = hn::Load(d, far_);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Vec origin = hn::Load(d, origin_[axis]), direction = hn::Load(d, direction_[axis]);
+      const Vec speed = hn::Abs(direction);
+      const Vec low = hn::Sub(hn::Set(d, leaf.lower[axis]), origin);
+      const Vec high = hn::Sub(hn::Set(d, leaf.upper[axis]), origin);
+      const auto backwards = hn::Lt(direction, hn::Zero(d));
+      const Vec first = hn::IfThenElse(backwards, hn::Neg(high), low);
+      const Vec last = hn::IfThenElse(backwards, hn::Neg(low), high);
+      const auto open = hn::Le(speed, slope);
+      enter = hn::Max(enter, hn::Div(first, hn::Max(hn::Add(speed, slope), least)));
+      leave =
+          hn::IfThenElse(open, leave, hn::Min(leave, hn::Div(last, hn::Max(hn::Sub(speed, slope), least))));
+    }
+    return mask_bits(hn::Le(enter, hn::Mul(leave, hn::Set(d, 1.000001F))));
+  }
+
   HWY_INLINE void meet_each_disk(const BvhLeaf& leaf, uint32_t disks) {
     const Tag d;
     const RayVec rays{hn::Load(d, origin_[0]),    hn::Load(d, origin_[1]),    hn::Load(d, origin_[2]),
-                      hn::Load(d, direction_[0]), hn::Load(d, direction_[1]), hn::Load(d, direction_[2])};
+                      hn::Load(d, direction_[0]), hn::Load(d, direction_[1]), hn::Load(d, direction_[2]),
+                      hn::Load(d, width_)};
     for (; disks; disks &= disks - 1) {
       const auto k = static_cast<size_t>(__builtin_ctz(disks));
       const DiskHit hit = meet_disk(
@@ -142,7 +171,8 @@ class PacketWalk {
       first[lane] = hits_.rays[lane].count;
       const RayVec ray{hn::Set(d, origin_[0][lane]),    hn::Set(d, origin_[1][lane]),
                        hn::Set(d, origin_[2][lane]),    hn::Set(d, direction_[0][lane]),
-                       hn::Set(d, direction_[1][lane]), hn::Set(d, direction_[2][lane])};
+                       hn::Set(d, direction_[1][lane]), hn::Set(d, direction_[2][lane]),
+                       hn::Set(d, width_[lane])};
       for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
         const DiskHit hit = meet_disk(
             ray, rules_, hn::Set(d, far_[lane]),
@@ -234,7 +264,7 @@ class PacketWalk {
   const float* sh_;
   size_t sh_row_;
   const DiskRules& rules_;
-  const Beam beam_;
+  Beam beam_;
   const size_t count_;
   PacketHits& hits_;
   HitSorter& sorter_;
@@ -243,6 +273,8 @@ class PacketWalk {
   HWY_ALIGN float origin_[3][packet_rays];
   HWY_ALIGN float direction_[3][packet_rays];
   HWY_ALIGN float reciprocal_[3][packet_rays];
+  HWY_ALIGN float width_[packet_rays];
+  HWY_ALIGN float slope_[packet_rays];  // of the cone's side: beyond it no hit counts
   HWY_ALIGN float far_[packet_rays];
   HWY_ALIGN float transmittance_[packet_rays];
   size_t cut_at_[packet_rays];

@@ -22,7 +22,8 @@ HWY_INLINE void meet_leaf(const BvhLeaf& leaf, const UnitRay& ray, const DiskRul
   const Tag d;
   const hn::RebindToUnsigned<Tag> du;
   const RayVec r{hn::Set(d, ray.origin.x),    hn::Set(d, ray.origin.y),    hn::Set(d, ray.origin.z),
-                 hn::Set(d, ray.direction.x), hn::Set(d, ray.direction.y), hn::Set(d, ray.direction.z)};
+                 hn::Set(d, ray.direction.x), hn::Set(d, ray.direction.y), hn::Set(d, ray.direction.z),
+                 hn::Set(d, ray.width)};
   for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
     const DiskHit hit = meet_disk(
         r, rules, hn::Set(d, far), [&](const float* row) HWY_ATTR { return hn::Load(d, row + i); }, leaf);
@@ -45,7 +46,9 @@ HWY_INLINE void find_hits(const Bvh& bvh, const UnitRay& ray, const DiskRules& r
   float far = farthest_distance;
   float transmittance = 1;
   size_t looked = 0;
-  walk_tree(bvh, BoxBeam(Beam(&ray, 1)), far, [&](const BvhLeaf& leaf) HWY_ATTR {
+  Beam beam(&ray, 1);
+  beam.widen(rules.cone_deviations * ray.width);
+  walk_tree(bvh, BoxBeam(beam), far, [&](const BvhLeaf& leaf) HWY_ATTR {
     meet_leaf(leaf, ray, rules, far, hits);
     if (hits.count - looked < rules.hits_per_look) return;
     for (; looked < hits.count; ++looked) transmittance *= 1 - hits.alpha[looked];

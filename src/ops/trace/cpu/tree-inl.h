@@ -55,6 +55,10 @@ struct Beam {
     origin_radius = (high_origin - origin) + Vec3<float>(2e-6F * std::max({reach.x, reach.y, reach.z}));
     direction_radius = count > 1 ? high_direction - direction + Vec3<float>(1e-6F) : Vec3<float>(0);
   }
+  // By cones about the rays, as far as so much from them at distance 1.
+  void widen(float slope) {
+    if (slope > 0) direction_radius += Vec3<float>(slope);
+  }
   float radius(float distance) const {
     return glm::length(origin_radius) + distance * glm::length(direction_radius);
   }

@@ -53,7 +53,7 @@ struct RayBackward {
   Vec3<float> grad_colour{0};
   float grad_alpha = 0, grad_distance = 0;  // the distance in scene units
   float behind = 0;                         // Σ over the hits behind of weight · dL/dweight
-  Vec3<float> origin{0}, direction{0};      // dL/d, by the places of the hits
+  RayPull pull;                             // dL/d, by the places of the hits
   float basis_pull[sh_coefficients(degree)] = {};
 
   __device__ void load(const BackwardTask& task, int64_t i, int64_t r) {
@@ -82,15 +82,15 @@ struct RayBackward {
     behind += weight * own;
     const float grad_exponent = hit.alpha >= task.rays.rules.blend.alpha_max ? 0 : grad * hit.alpha;
     place_backward(load_quads(task.frames[hit.name]), ray,
-                   {hit.distance, grad_exponent, weight * grad_distance / sums.alpha}, parts, origin,
-                   direction);
+                   {hit.distance, grad_exponent, weight * grad_distance / sums.alpha}, parts, pull);
   }
 
   __device__ void finish(const BackwardTask& task, int64_t r) const {
     const Vec3<float> by_colour = sh_basis_backward(degree, ray.direction, basis_pull);
-    store3(task.grad_origins + 3 * r, origin);
+    store3(task.grad_origins + 3 * r, pull.origin);
     store3(task.grad_directions + 3 * r,
-           direction_backward(ray, by_colour + direction, grad_distance, sums.distance));
+           direction_backward(ray, by_colour + pull.direction, grad_distance, sums.distance));
+    if (task.grad_widths) task.grad_widths[r] = pull.width;
   }
 };
 
@@ -154,7 +154,7 @@ __global__ void __launch_bounds__(backward_threads) backward_kernel(BackwardTask
   RayBackward<degree> ray;
   uint32_t last_head = exists ? task.last_head[i] : no_record;
   if (last_head != no_record) {
-    make_unit_ray(task.rays.origins + 3 * r, task.rays.directions + 3 * r, ray.ray);
+    make_unit_ray(task.rays.rays, r, ray.ray);
     sh_basis(degree, ray.ray.direction, basis);
     ray.load(task, i, r);
     for (int k = 0; in_order && k < sh_coefficients(degree); ++k) task.basis[16 * i + k] = basis[k];
@@ -180,6 +180,7 @@ __global__ void __launch_bounds__(backward_threads) backward_kernel(BackwardTask
   } else {
     store3(task.grad_origins + 3 * r, Vec3<float>(0));
     store3(task.grad_directions + 3 * r, Vec3<float>(0));
+    if (task.grad_widths) task.grad_widths[r] = 0;
   }
 }
 

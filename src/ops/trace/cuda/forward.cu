@@ -86,7 +86,7 @@ __global__ void __launch_bounds__(walk_threads)
   const bool exists = i < input.last;
   const int64_t r = exists ? input.callers(i) : 0;
   UnitRay ray;
-  bool goes_on = exists && make_unit_ray(input.origins + 3 * r, input.directions + 3 * r, ray);
+  bool goes_on = exists && make_unit_ray(input.rays, r, ray);
   goes_on = goes_on && input.nodes != nullptr;
   float basis[16];
   sh_basis(degree, ray.direction, basis);

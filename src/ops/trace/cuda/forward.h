@@ -33,12 +33,14 @@ struct WalkRules {
   BlendRules<float> blend;
   float log_alpha_min;
   float t_min;
+  float cone_deviations;  // as many as a Gaussian has from its middle to where the faintest hit is cut off
 
   WalkRules() = default;
   explicit WalkRules(const Options& o)
       : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
         log_alpha_min(std::log(o.alpha_min)),
-        t_min(o.t_min) {}
+        t_min(o.t_min),
+        cone_deviations(1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)))) {}
 };
 
 // Rays [first, last) in the tracer's order, and what is traced. `nodes` is null where there is nothing.
@@ -46,7 +48,7 @@ struct RayInput {
   const Node* nodes;
   const Disk* disks;
   const float* sh;
-  const float *origins, *directions;
+  RayView rays;
   const uint32_t* order;  // the caller's index of each ray; null where that is the tracer's
   int64_t first, last;
   WalkRules rules;
@@ -88,6 +90,7 @@ struct BackwardTask {
   const BackwardFrame* frames;
   const float *grad_colour, *grad_alpha, *grad_distance;  // null means zero
   float *grad_origins, *grad_directions;
+  float* grad_widths;  // null where rays have none
   // Sums of all hits, added to as they come ...
   SurfelSums* surfel_sums;
   float* grad_sh;

@@ -39,10 +39,10 @@ __device__ float find_median(Median& shared, float own, bool has) {
 __global__ void __launch_bounds__(samples) find_frame(RayInput input, int64_t surfels, float* frame) {
   __shared__ Median shared;
   const int64_t r = input.last * threadIdx.x / samples;
-  const bool traceable = is_traceable(input.origins + 3 * r, input.directions + 3 * r);
+  const bool traceable = is_traceable(input.rays.origins + 3 * r, input.rays.directions + 3 * r);
   Vec3<float> centre;
   for (int axis = 0; axis < 3; ++axis) {
-    centre[axis] = find_median(shared, input.origins[3 * r + axis], traceable);
+    centre[axis] = find_median(shared, input.rays.origins[3 * r + axis], traceable);
   }
   const DiskPlane disk = load_quads(input.disks[surfels * threadIdx.x / samples].plane);
   const float distance = glm::length(disk.position - centre);
@@ -56,7 +56,7 @@ __global__ void __launch_bounds__(order_threads)
     make_ray_keys(RayInput input, const float* frame, uint32_t* keys, uint32_t* indices) {
   const int64_t r = input.own();
   if (r >= input.last) return;
-  keys[r] = ray_key(input.origins + 3 * r, input.directions + 3 * r, load3<float>(frame), frame[3]);
+  keys[r] = ray_key(input.rays, r, load3<float>(frame), frame[3]);
   indices[r] = static_cast<uint32_t>(r);
 }
 

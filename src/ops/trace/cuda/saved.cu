@@ -67,7 +67,7 @@ void make_room(const Saved& saved, int64_t rays, SavedHits& hits) {
 }
 
 // All of the gradient is set, but for dL/dsh, which hits are added to, and tints, which no ray sees.
-void make_room(const PosedSurfels& surfels, int64_t rays, InputGradient& gradient) {
+void make_room(const PosedSurfels& surfels, const Rays& rays, InputGradient& gradient) {
   PosedSurfels& g = gradient.surfels;
   room(g.position, surfels.position.shape());
   room(g.scale, surfels.scale.shape());
@@ -77,8 +77,9 @@ void make_room(const PosedSurfels& surfels, int64_t rays, InputGradient& gradien
   room(g.tint, surfels.tint.shape());
   g.sh.zero();
   g.tint.zero();
-  room(gradient.origins, {rays, 3});
-  room(gradient.directions, {rays, 3});
+  room(gradient.rays.origins, {rays.count(), 3});
+  room(gradient.rays.directions, {rays.count(), 3});
+  room(gradient.rays.widths, rays.widths.shape());
   room(gradient.position_gradient, {surfels.count()});
 }
 
@@ -92,17 +93,15 @@ int64_t look_at_records(SavedHits& hits) {
   return hits.records_wanted;
 }
 
-RayInput input_of(const PosedSurfels& surfels, const Tree* tree, const Tensor<float>& origins,
-                  const Tensor<float>& directions, const Options& options) {
+RayInput input_of(const PosedSurfels& surfels, const Tree* tree, const Rays& rays, const Options& options) {
   const bool empty = tree == nullptr || tree->surfels == 0;
   return {empty ? nullptr : tree->nodes.data(),
           empty ? nullptr : tree->disks.data(),
           surfels.sh.data(),
-          origins.data(),
-          directions.data(),
+          RayView(rays),
           nullptr,
           0,
-          origins.empty() ? 0 : origins.dim(0),
+          rays.count(),
           WalkRules(options),
           options.background};
 }
@@ -132,8 +131,9 @@ class Backward {
     task_.grad_colour = data_or_null(grad.colour);
     task_.grad_alpha = data_or_null(grad.alpha);
     task_.grad_distance = data_or_null(grad.distance);
-    task_.grad_origins = gradient.origins.data();
-    task_.grad_directions = gradient.directions.data();
+    task_.grad_origins = gradient.rays.origins.data();
+    task_.grad_directions = gradient.rays.directions.data();
+    task_.grad_widths = gradient.rays.widths.empty() ? nullptr : gradient.rays.widths.data();
     task_.surfel_sums = hits.surfel_sums.data();
     task_.grad_sh = gradient.surfels.sh.data();
     task_.ray_bits = static_cast<int>(std::bit_width(static_cast<uint64_t>(hits.rays)));
@@ -202,18 +202,18 @@ int64_t blended_hits(const Saved& saved) {
   return std::accumulate(hits.values().begin(), hits.values().end(), int64_t{0});
 }
 
-void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
-             const Tensor<float>& directions, const Options& options, Output& output, Saved* saved) {
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0);
-  const RayOutput to{room(output.colour, {rays, 3}), room(output.alpha, {rays}),
-                     room(output.distance, {rays})};
-  RayInput input = input_of(surfels, bvh.on_device.get(), origins, directions, options);
-  const bool sorts = sorts_rays && rays > 0 && input.nodes != nullptr;
+void forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays, const Options& options,
+             Output& output, Saved* saved) {
+  const int64_t count = rays.count();
+  const RayOutput to{room(output.colour, {count, 3}), room(output.alpha, {count}),
+                     room(output.distance, {count})};
+  RayInput input = input_of(surfels, bvh.on_device.get(), rays, options);
+  const bool sorts = sorts_rays && count > 0 && input.nodes != nullptr;
   RecordStore store{};
   if (saved) {
     if (!saved->on_device) saved->on_device = std::make_shared<SavedHits>();
     SavedHits& hits = *saved->on_device;
-    make_room(*saved, rays, hits);
+    make_room(*saved, count, hits);
     hits.tree = bvh.on_device;
     hits.builds = bvh.on_device ? bvh.on_device->builds : 0;
     hits.is_sorted = sorts;
@@ -225,22 +225,21 @@ void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& o
   trace_rays(degree_of(surfels), input, to, store);
 }
 
-void backward(const PosedSurfels& surfels, const Tensor<float>& origins, const Tensor<float>& directions,
-              const Options& options, const Saved& saved, const OutputGradient& grad_output,
-              InputGradient& gradient) {
+void backward(const PosedSurfels& surfels, const Rays& rays, const Options& options, const Saved& saved,
+              const OutputGradient& grad_output, InputGradient& gradient) {
   SavedHits& hits = hits_of(saved);
-  const int64_t rays = origins.empty() ? 0 : origins.dim(0), count = surfels.count();
-  require(hits.rays == rays, "the hits were saved for these rays");
+  const int64_t count = surfels.count();
+  require(hits.rays == rays.count(), "the hits were saved for these rays");
   make_room(surfels, rays, gradient);
   room(hits.surfel_sums, {count});
   hits.surfel_sums.zero();
   parallel_for(Device::cuda, "trace: frames", count, MakeFrame{surfels, room(hits.frames, {count})});
   const int64_t allowed = allowed_records(saved), wanted = look_at_records(hits);
-  RayInput input = input_of(surfels, hits.tree.get(), origins, directions, options);
+  RayInput input = input_of(surfels, hits.tree.get(), rays, options);
   if (hits.is_sorted) input.order = hits.sorted.order.data();
   Backward pass(surfels, input, grad_output, hits, gradient);
   if (!hits.overwritten && wanted <= std::min(hits.records.size(), allowed)) {
-    pass.run(0, rays, wanted);
+    pass.run(0, rays.count(), wanted);
   } else {
     pass.trace_again(allowed);
   }

@@ -115,11 +115,10 @@ struct SavedHits {
 
 TRACEFLOW_WITH_CUDA void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh);
 TRACEFLOW_WITH_CUDA int64_t blended_hits(const Saved& saved);
-TRACEFLOW_WITH_CUDA void forward(const PosedSurfels& surfels, const Bvh& bvh, const Tensor<float>& origins,
-                                 const Tensor<float>& directions, const Options& options, Output& output,
-                                 Saved* saved);
-TRACEFLOW_WITH_CUDA void backward(const PosedSurfels& surfels, const Tensor<float>& origins,
-                                  const Tensor<float>& directions, const Options& options, const Saved& saved,
-                                  const OutputGradient& grad_output, InputGradient& gradient);
+TRACEFLOW_WITH_CUDA void forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays,
+                                 const Options& options, Output& output, Saved* saved);
+TRACEFLOW_WITH_CUDA void backward(const PosedSurfels& surfels, const Rays& rays, const Options& options,
+                                  const Saved& saved, const OutputGradient& grad_output,
+                                  InputGradient& gradient);
 
 }  // namespace traceflow::trace::cuda

@@ -97,20 +97,26 @@ class HeldHits {
 };
 
 // A ray prepared for boxes, which are taken to be wider by what rounding may move a hit of a far origin. It
-// passes a plane at t = plane · reciprocal - offset.
+// passes a plane at t = plane · reciprocal - offset. A cone enters by the side of it that goes that way
+// faster and leaves by the slower one; where that goes the other way it never leaves.
 struct BoxRay {
-  float reciprocal[3], near_offset[3], far_offset[3];
+  float near_reciprocal[3], far_reciprocal[3], near_offset[3], far_offset[3];
+  bool forwards[3], open[3];
 
-  __device__ explicit BoxRay(const UnitRay& ray) {
+  // slope: of the cone's side; beyond it no hit counts.
+  __device__ BoxRay(const UnitRay& ray, float slope) {
     const Vec3<float> o = glm::abs(ray.origin);
     const float radius = 2e-6F * std::fmax(o.x, std::fmax(o.y, o.z));
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
       const float d = ray.direction[axis];
       const float sign = std::copysign(1.0F, d);
-      reciprocal[axis] = sign / std::fmax(std::abs(d), 1e-10F);
-      near_offset[axis] = (ray.origin[axis] + sign * radius) * reciprocal[axis];
-      far_offset[axis] = (ray.origin[axis] - sign * radius) * reciprocal[axis];
+      forwards[axis] = sign > 0;
+      open[axis] = slope > 0 && std::abs(d) <= slope;
+      near_reciprocal[axis] = sign / std::fmax(std::abs(d) + slope, 1e-10F);
+      far_reciprocal[axis] = sign / std::fmax(std::abs(d) - slope, 1e-10F);
+      near_offset[axis] = (ray.origin[axis] + sign * radius) * near_reciprocal[axis];
+      far_offset[axis] = (ray.origin[axis] - sign * radius) * far_reciprocal[axis];
     }
   }
   // Where the ray enters the box of a node's child, at or after `near`; infinite where it leaves it before
@@ -121,9 +127,9 @@ struct BoxRay {
 #pragma unroll
     for (int axis = 0; axis < 3; ++axis) {
       const float lower = node.box[axis][2 * side], upper = node.box[axis][2 * side + 1];
-      const bool forwards = reciprocal[axis] > 0;
-      near = std::fmax(near, std::fma(forwards ? lower : upper, reciprocal[axis], -near_offset[axis]));
-      leave = std::fmin(leave, std::fma(forwards ? upper : lower, reciprocal[axis], -far_offset[axis]));
+      const float first = forwards[axis] ? lower : upper, last = forwards[axis] ? upper : lower;
+      near = std::fmax(near, std::fma(first, near_reciprocal[axis], -near_offset[axis]));
+      if (!open[axis]) leave = std::fmin(leave, std::fma(last, far_reciprocal[axis], -far_offset[axis]));
     }
     return near <= leave * 1.000001F ? near : INFINITY;
   }
@@ -145,7 +151,16 @@ __device__ inline void meet_disk(const Disk& disk, const UnitRay& ray, const Wal
   const Vec3<float> x(std::fma(t, ray.direction.x, q.x), std::fma(t, ray.direction.y, q.y),
                       std::fma(t, ray.direction.z, q.z));
   const float u = dot_fused(axes.u, x), v = dot_fused(axes.v, x);
-  const float exponent = std::fma(-std::fma(u, u, v * v), 0.5F, plane.log_opacity);
+  float radius2 = std::fma(u, u, v * v), top = plane.log_opacity;
+  if (ray.width > 0) {
+    // By how much the disk's variances grow.
+    const float spread = t * ray.width;
+    const float grown_u = std::fma(spread * spread, dot_fused(axes.u, axes.u), 1.0F);
+    const float grown_v = std::fma(spread * spread, dot_fused(axes.v, axes.v), 1.0F);
+    radius2 = u * u / grown_u + v * v / grown_v;
+    top = std::fma(-0.5F, std::log(grown_u * grown_v), top);
+  }
+  const float exponent = std::fma(-radius2, 0.5F, top);
   if (!(exponent >= rules.log_alpha_min)) return;
   hits.insert(t, plane.surfel, std::fmin(std::exp(exponent), rules.blend.alpha_max));
 }
@@ -175,7 +190,7 @@ class WalkStack {
 // Meets all disks of the tree that can have a hit for `hits`, none of which is before `near`; near boxes
 // first.
 __device__ inline void walk(const RayInput& input, const UnitRay& ray, float near, HeldHits& hits) {
-  const BoxRay box_ray(ray);
+  const BoxRay box_ray(ray, input.rules.cone_deviations * ray.width);
   WalkStack stack;
   for (uint32_t at = 0; at != no_child; at = stack.pop(hits.far())) {
     // Down to a disk. no_child has the disk's bit too.

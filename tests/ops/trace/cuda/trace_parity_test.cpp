@@ -22,6 +22,18 @@ TEST_F(TraceOnDevice, AgreesWithTheCpuAtEveryDegree) {
   }
 }
 
+TEST_F(TraceOnDevice, AgreesWithTheCpuWithCones) {
+  for (const double width : {0.02, 0.3}) {
+    TestScene scene = random_scene(
+        9, {.surfels = 120, .rays = 150, .sh_degree = 2, .opacity_max = 0.5, .width_max = width});
+    const Traced expected = trace(scene, smooth_options());
+    for (const bool in_order : {false, true}) {
+      const InOrder order(in_order);
+      expect_same(trace_on_device(scene, smooth_options()), expected);
+    }
+  }
+}
+
 // Whether single precision may take this ray either way: a hit near the cut-off, a ray near its end, or two
 // hits at almost one distance.
 bool is_at_boundary(const TestScene& scene, const Options& options, int64_t ray) {
@@ -29,8 +41,8 @@ bool is_at_boundary(const TestScene& scene, const Options& options, int64_t ray)
     double distance, alpha;
   };
   std::vector<Hit> hits;
-  const Vec3<double> origin = load3<double>(scene.origins.row(ray));
-  const Vec3<double> direction = glm::normalize(load3<double>(scene.directions.row(ray)));
+  const Vec3<double> origin = load3<double>(scene.rays.origins.row(ray));
+  const Vec3<double> direction = glm::normalize(load3<double>(scene.rays.directions.row(ray)));
   const auto surfels = convert<double>(scene.surfels);
   constexpr double near = 1e-4;
   for (int64_t i = 0; i < surfels.count(); ++i) {
@@ -54,7 +66,7 @@ bool is_at_boundary(const TestScene& scene, const Options& options, int64_t ray)
 // Rays that differ are few, and each is at a boundary.
 void expect_same_but_at_boundaries(const TestScene& scene, const Options& options) {
   const Traced expected = trace(scene, options), found = trace_on_device(scene, options);
-  const int64_t rays = scene.origins.dim(0);
+  const int64_t rays = scene.rays.count();
   int64_t different = 0;
   for (int64_t r = 0; r < rays; ++r) {
     bool same = std::abs(found.output.alpha[r] - expected.output.alpha[r]) < 1e-5F &&
@@ -98,9 +110,9 @@ TEST_F(TraceOnDevice, AnyNumberOfHits) {
     for (int c = 0; c < 3; ++c) scene.surfels.sh.row(i)[c] = static_cast<float>(random.normal());
   }
   for (int64_t r = 0; r < 40; ++r) {
-    scene.origins(r, 2) = r % 2 == 0 ? 0.0F : 20.0F;
-    scene.directions(r, 2) = r % 2 == 0 ? 1.0F : -1.0F;
-    scene.directions(r, 0) = 0.001F * static_cast<float>(r);
+    scene.rays.origins(r, 2) = r % 2 == 0 ? 0.0F : 20.0F;
+    scene.rays.directions(r, 2) = r % 2 == 0 ? 1.0F : -1.0F;
+    scene.rays.directions(r, 0) = 0.001F * static_cast<float>(r);
   }
   Options options;
   options.alpha_min = 1e-4F;
@@ -125,8 +137,8 @@ TEST_F(TraceOnDevice, HitsAtOneDistanceBlendInOrderOfIndex) {
     for (int c = 0; c < 3; ++c) scene.surfels.sh.row(i)[c] = static_cast<float>(5 * random.normal());
   }
   for (int64_t r = 0; r < 40; ++r) {
-    for (int k = 0; k < 2; ++k) scene.origins(r, k) = static_cast<float>(random.uniform(-0.5, 0.5));
-    scene.directions(r, 2) = 1;
+    for (int k = 0; k < 2; ++k) scene.rays.origins(r, k) = static_cast<float>(random.uniform(-0.5, 0.5));
+    scene.rays.directions(r, 2) = 1;
   }
   const Traced expected = trace(scene, smooth_options());
   EXPECT_EQ(expected.hits, count * 40);
@@ -171,16 +183,15 @@ TEST_F(TraceOnDevice, KeepsItsMemory) {
   Output output;
   InputGradient gradient;
   const PosedSurfels surfels[] = {large.surfels.on(Device::cuda), small.surfels.on(Device::cuda)};
-  const Tensor<float> origins[] = {large.origins.on(Device::cuda), small.origins.on(Device::cuda)};
-  const Tensor<float> directions[] = {large.directions.on(Device::cuda), small.directions.on(Device::cuda)};
+  const Rays rays[] = {large.rays.on(Device::cuda), small.rays.on(Device::cuda)};
   const OutputGradient grads[] = {on(to_float(random_output_gradient(5, 150)), Device::cuda),
                                   on(to_float(random_output_gradient(5, 50)), Device::cuda)};
   const InOrder order(true);
   for (size_t i = 0; i < 6; ++i) {
     const size_t k = i % 2;
     build(surfels[k], options, *bvh);
-    forward(surfels[k], *bvh, origins[k], directions[k], options, output, saved.get());
-    backward(surfels[k], origins[k], directions[k], options, *saved, grads[k], gradient);
+    forward(surfels[k], *bvh, rays[k], options, output, saved.get());
+    backward(surfels[k], rays[k], options, *saved, grads[k], gradient);
     if (i == 2) free_bytes = memory::device_bytes();
     if (i > 2) {
       EXPECT_EQ(memory::device_bytes(), free_bytes);
@@ -201,14 +212,14 @@ TEST_F(TraceOnDevice, GradientsOfSomeOutputsOnly) {
   Traced found, expected;
   for (const Device device : {Device::cpu, Device::cuda}) {
     const PosedSurfels surfels = scene.surfels.on(device);
-    const Tensor<float> origins = scene.origins.on(device), directions = scene.directions.on(device);
+    const Rays rays = scene.rays.on(device);
     Traced& to = device == Device::cpu ? expected : found;
     build(surfels, options, *bvh);
-    forward(surfels, *bvh, origins, directions, options, to.output, saved.get());
+    forward(surfels, *bvh, rays, options, to.output, saved.get());
     Output alone;
-    forward(surfels, *bvh, origins, directions, options, alone, nullptr);
+    forward(surfels, *bvh, rays, options, alone, nullptr);
     EXPECT_TRUE(same_bytes(on(alone, Device::cpu), on(to.output, Device::cpu)));
-    backward(surfels, origins, directions, options, *saved, on(grad, device), to.gradient);
+    backward(surfels, rays, options, *saved, on(grad, device), to.gradient);
     to = {on(to.output, Device::cpu), on(to.gradient, Device::cpu), blended_hits(*saved)};
   }
   expect_same(found, expected);
