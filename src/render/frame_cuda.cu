@@ -10,6 +10,8 @@ template void cuda::sum_each_index<LargestSquare>(const char*, int64_t, const Sq
 template void cuda::for_each_index(const char*, int64_t, const AddNumbers&);
 template void cuda::for_each_index(const char*, int64_t, const AddBehind&);
 template void cuda::for_each_index(const char*, int64_t, const AddBehindBackward&);
+template void cuda::for_each_index(const char*, int64_t, const ConeWidths&);
+template void cuda::for_each_index(const char*, int64_t, const ConeWidthsBackward&);
 template void cuda::for_each_index(const char*, int64_t, const PlaceSignal&);
 template void cuda::for_each_index(const char*, int64_t, const IsCarried&);
 template void cuda::for_each_index(const char*, int64_t, const FlagNonZero&);

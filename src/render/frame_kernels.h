@@ -64,6 +64,25 @@ struct AddBehindBackward {
   }
 };
 
+// The width of a traced pixel's cone: the mean roughness of what is blended there (method §4.5).
+struct ConeWidths {
+  const int32_t* pixels;
+  const float *roughness, *alpha;
+  float* widths;
+  TRACEFLOW_HD void operator()(int64_t i) const { widths[i] = roughness[pixels[i]] / alpha[pixels[i]]; }
+};
+// Adds to the gradient of the roughness and, unless it is null, to that of alpha.
+struct ConeWidthsBackward {
+  const int32_t* pixels;
+  const float *alpha, *widths, *grad_widths;
+  float *grad_roughness, *grad_alpha;
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    const float gradient = grad_widths[i] / alpha[pixels[i]];
+    grad_roughness[pixels[i]] += gradient;
+    if (grad_alpha != nullptr) grad_alpha[pixels[i]] -= gradient * widths[i];
+  }
+};
+
 // Density control's signals of the drawn surfels, at the places of the stored ones.
 struct PlaceSignal {
   StoredRow row;

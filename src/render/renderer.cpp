@@ -184,7 +184,8 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
   MirroredRays& mirrored = frame_.mirrored;
   for (Tensor<float>* values : {&mirrored.rays.origins, &mirrored.rays.directions})
     values->place(device).resize({0, 3});
-  for (Tensor<float>* values : {&mirrored.alpha, &mirrored.distance}) values->place(device).resize({0});
+  for (Tensor<float>* values : {&mirrored.rays.widths, &mirrored.alpha, &mirrored.distance})
+    values->place(device).resize({0});
   if (reflects(scene, request)) {
     forward_specular(scene, request, keep_for_backward);
   }
@@ -216,6 +217,12 @@ void Renderer::forward_specular(const Scene& scene, const FrameRequest& request,
     return;
   }
   pose_environment(scene, request, keep_for_backward);
+  if (frame_.main.has_roughness()) {
+    rays.widths.resize({rays.count()});
+    parallel_for(scene.device(), "render: cone widths", rays.count(),
+                 ConeWidths{frame_.traced.pixel.data(), drawn().roughness.data(), drawn().alpha.data(),
+                            rays.widths.data()});
+  }
   trace::forward(frame_.environment, *bvh_, rays, trace_options(scene), trace_output_,
                  keep_for_backward ? trace_saved_.get() : nullptr);
   if (scene.environment_map) {
@@ -260,8 +267,11 @@ void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGra
   }
   raster::OutputGradient& grad = grad_drawn();
   grad.tint.place(device).reset(drawn().tint.shape());
+  grad.roughness.place(device).reset(drawn().roughness.shape());
   if (!with_geometry || frame_.traced.pixel.empty()) return;
   // Mirrored rays will add to these.
+  if (frame_.main.has_roughness() && grad.alpha.empty())
+    grad.alpha.place(device).reset(drawn().alpha.shape());
   if (grad.normal.empty()) grad.normal.place(device).reset(drawn().normal.shape());
   for (Tensor<float>* depth : {&grad.depth, &grad.median_depth})
     if (depth->empty()) depth->place(device).reset(drawn().depth.shape());
@@ -352,8 +362,14 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
                        field && trainable.environment_field ? &gradient.environment_field : nullptr);
     }
   }
-  if (!trainable.main) return;
   raster::OutputGradient& grad = grad_drawn();
+  if (!rays.widths.empty()) {
+    parallel_for(scene.device(), "render: cone widths backward", rays.count(),
+                 ConeWidthsBackward{frame_.traced.pixel.data(), drawn().alpha.data(), rays.widths.data(),
+                                    grad_trace_input_.rays.widths.data(), grad.roughness.data(),
+                                    trainable.main ? grad.alpha.data() : nullptr});
+  }
+  if (!trainable.main) return;
   surface::reflection_rays_backward(camera_of_samples(request), frame_.traced.pixel, drawn().depth,
                                     drawn().median_depth, drawn().normal, options_.depth_ratio, *grad_origins,
                                     *grad_directions, grad.depth, grad.median_depth, grad.normal,

@@ -86,6 +86,7 @@ void average(const raster::Output& samples, int per_side, raster::Output& pictur
   average(samples.alpha, per_side, picture.alpha);
   average(samples.tint, per_side, picture.tint);
   average(samples.silhouette, per_side, picture.silhouette);
+  average(samples.roughness, per_side, picture.roughness);
   average(samples.normal, per_side, picture.normal);
   average(samples.distortion, per_side, picture.distortion);
   const Device device = samples.alpha.device();
@@ -104,6 +105,7 @@ void average_backward(const raster::Output& samples, const raster::Output& pictu
   spread_layer(device, grad_picture.colour, per_side, grad_samples.colour);
   spread_layer(device, grad_picture.tint, per_side, grad_samples.tint);
   spread_layer(device, grad_picture.silhouette, per_side, grad_samples.silhouette);
+  spread_layer(device, grad_picture.roughness, per_side, grad_samples.roughness);
   spread_layer(device, grad_picture.normal, per_side, grad_samples.normal);
   spread_layer(device, grad_picture.distortion, per_side, grad_samples.distortion);
   spread_layer(device, grad_picture.alpha, per_side, grad_samples.alpha);

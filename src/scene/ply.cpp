@@ -121,6 +121,7 @@ std::vector<std::string> written_properties(const Surfels& surfels) {
   for (const char* name : {"opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3"})
     names.emplace_back(name);
   if (surfels.has_tint()) names.emplace_back("tint");
+  if (surfels.has_roughness()) names.emplace_back("roughness");
   return names;
 }
 
@@ -138,6 +139,7 @@ void append_row(const Surfels& s, int64_t i, std::vector<float>& out) {
   out.insert(out.end(), s.log_scale.row(i), s.log_scale.row(i) + 2);
   out.insert(out.end(), s.rotation.row(i), s.rotation.row(i) + 4);
   if (s.has_tint()) out.push_back(s.tint_logit[i]);
+  if (s.has_roughness()) out.push_back(s.roughness_logit[i]);
 }
 
 }  // namespace
@@ -173,10 +175,13 @@ PlyScene read_ply(const std::filesystem::path& path) {
       plan.add_one("f_rest_" + std::to_string(channel * (k - 1) + c - 1), s.sh, 3 * c + channel);
     }
   }
-  if (header.find("tint") != nullptr) {
-    s.tint_logit = Tensor<float>(Shape{n});
-    plan.add({"tint"}, s.tint_logit);
-  }
+  const auto add_where_there_is = [&](const char* name, Tensor<float>& logit) {
+    if (header.find(name) == nullptr) return;
+    logit = Tensor<float>(Shape{n});
+    plan.add({name}, logit);
+  };
+  add_where_there_is("tint", s.tint_logit);
+  add_where_there_is("roughness", s.roughness_logit);
   read_rows(file, header, plan.columns());
   return scene;
 }

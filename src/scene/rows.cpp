@@ -48,6 +48,7 @@ Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
                  edited_rows(surfels.rotation, edit, false), edited_rows(surfels.opacity_logit, edit, false),
                  edited_rows(surfels.sh, edit, false),       {}};
   if (surfels.has_tint()) result.tint_logit = edited_rows(surfels.tint_logit, edit, false);
+  if (surfels.has_roughness()) result.roughness_logit = edited_rows(surfels.roughness_logit, edit, false);
   if (!surfels.body.empty()) result.body = take_rows(surfels.body, edit, false);
   return result;
 }

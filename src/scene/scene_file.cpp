@@ -87,6 +87,8 @@ Surfels get_surfels(const std::string& prefix, const Safetensors& file) {
   surfels.rotation = take(file, prefix + "rotation", {n, 4});
   surfels.opacity_logit = take(file, prefix + "opacity_logit", {n});
   if (file.has(prefix + "tint_logit")) surfels.tint_logit = take(file, prefix + "tint_logit", {n});
+  if (file.has(prefix + "roughness_logit"))
+    surfels.roughness_logit = take(file, prefix + "roughness_logit", {n});
   return surfels;
 }
 

@@ -11,7 +11,7 @@ namespace traceflow {
 template <class T>
 struct BasicPosedSurfelsView {
   T *position, *scale, *rotation, *opacity, *sh;
-  T *tint, *carried;  // null: there is none
+  T *tint, *carried, *roughness;  // null: there is none
   int64_t count;
   int64_t sh_row;  // numbers of harmonics a surfel
   int sh_degree;
@@ -30,6 +30,7 @@ View view_of(Surfels& s) {
           s.sh.data(),
           s.has_tint() ? s.tint.data() : nullptr,
           s.carried.empty() ? nullptr : s.carried.data(),
+          s.has_roughness() ? s.roughness.data() : nullptr,
           count,
           count > 0 ? s.sh.row_size() : 0,
           count > 0 ? sh_degree(s.sh.dim(1)) : 0};

@@ -20,15 +20,17 @@ struct BasicSurfels {
   // N, the body that carries it (scene/motion.h), or one of the two above; empty where there are no bodies.
   // Not trained: gradients and moments have none.
   Tensor<int32_t> body{};
+  Tensor<T> roughness_logit{};  // N, of what it mirrors; empty: all are perfect mirrors, or none mirrors
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint_logit.empty(); }
+  bool has_roughness() const { return !roughness_logit.empty(); }
 
   Device device() const { return position.device(); }
   // The same set on a device.
   BasicSurfels on(Device device) const {
     return {position.on(device), log_scale.on(device),  rotation.on(device), opacity_logit.on(device),
-            sh.on(device),       tint_logit.on(device), body.on(device)};
+            sh.on(device),       tint_logit.on(device), body.on(device),     roughness_logit.on(device)};
   }
 
   // The shapes of another set, on its device, in the memory that is there.
@@ -40,9 +42,10 @@ struct BasicSurfels {
     opacity_logit.place(device).resize(other.opacity_logit.shape());
     sh.place(device).resize(other.sh.shape());
     tint_logit.place(device).resize(other.tint_logit.shape());
+    roughness_logit.place(device).resize(other.roughness_logit.shape());
   }
 
-  // f(name, tensor) for every group, in the order above. An environment has no tint group.
+  // f(name, tensor) for every group, in the order above. An environment has neither tint nor roughness.
   template <class F>
   void for_each(F&& f) {
     visit(*this, f);
@@ -61,6 +64,7 @@ struct BasicSurfels {
     f("opacity_logit", self.opacity_logit);
     f("sh", self.sh);
     if (!self.tint_logit.empty()) f("tint_logit", self.tint_logit);
+    if (!self.roughness_logit.empty()) f("roughness_logit", self.roughness_logit);
   }
 };
 using Surfels = BasicSurfels<float>;
@@ -77,15 +81,19 @@ struct BasicPosedSurfels {
   Tensor<T> tint;      // M, in (0, 1); empty for the environment
   Tensor<T> carried;   // M, 1 where a body carries the surfel, else 0; empty where no silhouette is drawn.
                        // Has no gradient
+  // M, in (0, 1): standard deviation of the directions that a surfel mirrors one into, as a tangent (method
+  // §4.5); empty where all are 0.
+  Tensor<T> roughness{};
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint.empty(); }
+  bool has_roughness() const { return !roughness.empty(); }
 
   Device device() const { return position.device(); }
   // The same set on a device.
   BasicPosedSurfels on(Device device) const {
     return {position.on(device), scale.on(device), rotation.on(device), opacity.on(device),
-            sh.on(device),       tint.on(device),  carried.on(device)};
+            sh.on(device),       tint.on(device),  carried.on(device),  roughness.on(device)};
   }
 
   // Zeros in the shapes of another set and on its device: how a gradient starts. Without `carried`.
@@ -98,6 +106,7 @@ struct BasicPosedSurfels {
     opacity.place(device).reset(other.opacity.shape());
     sh.place(device).reset(other.sh.shape());
     tint.place(device).reset(other.tint.shape());
+    roughness.place(device).reset(other.roughness.shape());
   }
 };
 using PosedSurfels = BasicPosedSurfels<float>;
@@ -105,10 +114,15 @@ using PosedSurfels = BasicPosedSurfels<float>;
 // Zeros in the shapes of another set, on its device.
 template <class To, class From>
 BasicSurfels<To> zeros_like(const BasicSurfels<From>& s) {
-  const Device device = s.device();
-  return {Tensor<To>(s.position.shape(), device), Tensor<To>(s.log_scale.shape(), device),
-          Tensor<To>(s.rotation.shape(), device), Tensor<To>(s.opacity_logit.shape(), device),
-          Tensor<To>(s.sh.shape(), device),       Tensor<To>(s.tint_logit.shape(), device)};
+  const auto zeros = [&](const Tensor<From>& like) { return Tensor<To>(like.shape(), s.device()); };
+  return {zeros(s.position),
+          zeros(s.log_scale),
+          zeros(s.rotation),
+          zeros(s.opacity_logit),
+          zeros(s.sh),
+          zeros(s.tint_logit),
+          {},
+          zeros(s.roughness_logit)};
 }
 template <class To, class From>
 BasicSurfels<To> convert(const BasicSurfels<From>& s) {
@@ -118,12 +132,13 @@ BasicSurfels<To> convert(const BasicSurfels<From>& s) {
           convert<To>(s.opacity_logit),
           convert<To>(s.sh),
           convert<To>(s.tint_logit),
-          s.body};
+          s.body,
+          convert<To>(s.roughness_logit)};
 }
 template <class To, class From>
 BasicPosedSurfels<To> convert(const BasicPosedSurfels<From>& s) {
   return {convert<To>(s.position), convert<To>(s.scale), convert<To>(s.rotation), convert<To>(s.opacity),
-          convert<To>(s.sh),       convert<To>(s.tint),  convert<To>(s.carried)};
+          convert<To>(s.sh),       convert<To>(s.tint),  convert<To>(s.carried),  convert<To>(s.roughness)};
 }
 
 }  // namespace traceflow

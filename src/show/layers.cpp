@@ -59,6 +59,9 @@ Tensor<float> layer_values(const Frame& frame, Layer layer, double scale, const 
       return frame.specular_image().on(Device::cpu);
     case Layer::tint:
       return frame.raster.tint.on(Device::cpu);
+    case Layer::roughness:
+      return frame.raster.roughness.empty() ? Tensor<float>(frame.raster.alpha.shape())
+                                            : frame.raster.roughness.on(Device::cpu);
     case Layer::alpha:
       return frame.raster.alpha.on(Device::cpu);
     case Layer::normal:

@@ -15,6 +15,7 @@ enum class Layer {
   diffuse,
   specular,
   tint,
+  roughness,
   alpha,
   normal,
   depth,
@@ -23,9 +24,9 @@ enum class Layer {
   surfels,
   tracks
 };
-inline constexpr std::array<const char*, 11> layer_names = {
-    "rgb",   "diffuse",      "specular",   "tint",    "alpha", "normal",
-    "depth", "median-depth", "distortion", "surfels", "tracks"};
+inline constexpr std::array<const char*, 12> layer_names = {
+    "rgb",    "diffuse", "specular",     "tint",       "roughness", "alpha",
+    "normal", "depth",   "median-depth", "distortion", "surfels",   "tracks"};
 inline const char* to_string(Layer layer) { return layer_names[static_cast<size_t>(layer)]; }
 
 // Whether a layer's numbers are colours or normals (H×W×3), not one number a pixel.

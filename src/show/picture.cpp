@@ -84,6 +84,7 @@ Tensor<uint8_t> Painter::paint(Layer layer, const Tensor<float>& values) {
     case Layer::distortion:
       return mapped(values, followed(distortion_, values), true);
     case Layer::tint:
+    case Layer::roughness:
     case Layer::alpha:
       return options_.map ? mapped(values, {0, 1}, false) : to_8bit(values);
     case Layer::rgb:

@@ -100,7 +100,7 @@ Subject read_ply_subject(const std::filesystem::path& path, const std::filesyste
   }
   if (!reflected.empty()) {
     subject.scene.environment = read_ply(reflected).surfels;
-    subject.scene.environment.tint_logit = Tensor<float>();
+    subject.scene.environment.tint_logit = subject.scene.environment.roughness_logit = Tensor<float>();
     subject.scene.specular = Specular::environment_gaussians;
     if (!subject.scene.main.has_tint()) {
       subject.warning = path.string() + " has no tint: pictures are without reflections";

@@ -163,6 +163,10 @@ Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& opt
   }
   s.opacity_logit.fill(logit(options.opacity));
   s.tint_logit.fill(logit(options.tint));
+  if (options.roughness > 0) {
+    s.roughness_logit.reset({s.count()});
+    s.roughness_logit.fill(logit(options.roughness));
+  }
   return s;
 }
 
@@ -215,7 +219,7 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   InitialOptions as_environment = options;
   as_environment.sh_degree = options.environment_sh_degree;
   Surfels s = surfels_at_points(thinned(points, limit, random), as_environment, random);
-  s.tint_logit = {};
+  s.tint_logit = s.roughness_logit = {};
   // What the camera sees beside the object is also what the object mirrors.
   const Sightings sightings = look_at(s, earliest_photographs(capture));
   set_colours(s, sightings);

@@ -35,7 +35,7 @@ struct SetShape {
 };
 
 int64_t bytes_per_surfel(const SetShape& set) {
-  const int64_t numbers = 3 + 2 + 4 + 1 + 1 + 3 * sh_coefficients(set.degree);
+  const int64_t numbers = 3 + 2 + 4 + 1 + 1 + 1 + 3 * sh_coefficients(set.degree);
   const int64_t posed = 2 * numbers;
   const int64_t screen = 128;
   const int64_t encoding = set.has_field ? set.network.encoding_size() : 0;

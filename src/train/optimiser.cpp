@@ -97,6 +97,7 @@ void SurfelMoments::reset_like(const Surfels& surfels) {
   opacity_logit = zero_state(surfels.opacity_logit);
   sh = zero_state(surfels.sh);
   tint_logit = zero_state(surfels.tint_logit);
+  roughness_logit = zero_state(surfels.roughness_logit);
 }
 
 SurfelMoments SurfelMoments::edited(const PlacedEdit& edit) const {
@@ -104,8 +105,8 @@ SurfelMoments SurfelMoments::edited(const PlacedEdit& edit) const {
     if (from.first.empty()) return {};
     return {edited_rows(from.first, edit, true), edited_rows(from.second, edit, true), from.step};
   };
-  return {state(position),      state(log_scale), state(rotation),
-          state(opacity_logit), state(sh),        state(tint_logit)};
+  return {state(position), state(log_scale),  state(rotation),       state(opacity_logit),
+          state(sh),       state(tint_logit), state(roughness_logit)};
 }
 
 Optimiser::Optimiser(const Scene& scene) {
@@ -136,6 +137,10 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
   if (trainable.main) step_surfels(step, "main", scene.main, gradient.main, main_, position_rate, rates);
   if (trainable.tint && scene.main.has_tint()) {
     step("main.tint_logit", scene.main.tint_logit, gradient.main.tint_logit, main_.tint_logit, rates.tint);
+  }
+  if (trainable.tint && scene.main.has_roughness()) {
+    step("main.roughness_logit", scene.main.roughness_logit, gradient.main.roughness_logit,
+         main_.roughness_logit, rates.roughness);
   }
   if (trainable.main_field && scene.main_field) {
     step_field(step, "main_field", *scene.main_field, gradient.main_field, main_field_, field_rate);

@@ -13,7 +13,7 @@ namespace traceflow {
 
 // Adam's state for every group of one set of surfels.
 struct SurfelMoments {
-  optimize::AdamState position, log_scale, rotation, opacity_logit, sh, tint_logit;
+  optimize::AdamState position, log_scale, rotation, opacity_logit, sh, tint_logit, roughness_logit;
 
   // f(name, state) in the order of Surfels::for_each.
   template <class F>
@@ -24,6 +24,7 @@ struct SurfelMoments {
     f("opacity_logit", opacity_logit);
     f("sh", sh);
     f("tint_logit", tint_logit);
+    f("roughness_logit", roughness_logit);
   }
   void reset_like(const Surfels& surfels);
   // Fresh rows get zero moments (method §7.7).

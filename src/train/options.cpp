@@ -127,6 +127,7 @@ void RateOptions::validate() const {
                                     {log_scale, "rates.log_scale"},
                                     {rotation, "rates.rotation"},
                                     {tint, "rates.tint"},
+                                    {roughness, "rates.roughness"},
                                     {camera, "rates.camera"}}) {
     check_not_negative(value, name);
   }
@@ -228,6 +229,7 @@ void InitialOptions::validate() const {
     check_option(value > 0 && value < 1, name, value, "between 0 and 1");
   }
   check_option(tint_in_mask >= 0 && tint_in_mask < 1, "initial.tint_in_mask", tint_in_mask, "0 to under 1");
+  check_option(roughness >= 0 && roughness < 1, "initial.roughness", roughness, "0 to under 1");
   check_option(environment_cells >= 1 && environment_cells <= 128, "initial.environment_cells",
                environment_cells, "1 to 128");
   check_option(environment_per_cell >= 1, "initial.environment_per_cell", environment_per_cell, "1 or more");

@@ -61,6 +61,7 @@ struct RateOptions {
   float log_scale = 5e-3F;
   float rotation = 1e-3F;
   float tint = 0.01F;
+  float roughness = 0.01F;
   float field = 8e-4F;
   float field_end = 1.6e-6F;
   float motion = 5e-4F;
@@ -83,6 +84,7 @@ struct RateOptions {
     v.field("log_scale", log_scale, "", "Log-scales.");
     v.field("rotation", rotation, "", "Quaternions.");
     v.field("tint", tint, "", "Specular-tint logits.");
+    v.field("roughness", roughness, "", "Logits of the roughness (initial.roughness).");
     v.field("field", field, "", "Residual fields, first iteration.");
     v.field("field_end", field_end, "", "Residual fields, last iteration (log-linear between).");
     v.field("motion", motion, "radians", "Poses of bodies, first iteration; shifts in extents.");
@@ -336,6 +338,7 @@ struct InitialOptions {
   float tint = 0.001F;
   float tint_in_mask = 0;
   float tint_outside_mask = 0.001F;
+  float roughness = 0;
   bool colours_from_views = true;
   bool normals_from_points = true;
   int environment_cells = 32;
@@ -357,6 +360,10 @@ struct InitialOptions {
         "tint_in_mask", tint_in_mask, "",
         "First tint of surfels that the capture's masks show on the moving object; 0: masks do not matter.");
     v.field("tint_outside_mask", tint_outside_mask, "", "Then the first tint of the others.");
+    v.field(
+        "roughness", roughness, "",
+        "First roughness of mirrors: the standard deviation of the directions that one is mirrored into, as "
+        "a tangent. 0: all are perfect mirrors, as in the paper (method §4.5).");
     v.field("colours_from_views", colours_from_views, "",
             "First colours from photographs near time 0, else grey.");
     v.field("normals_from_points", normals_from_points, "",

@@ -220,8 +220,10 @@ Surfels Trainer::new_surface(int64_t key) const {
   const InitialOptions& initial = options_.initial;
   const float tint = initial.tint_in_mask > 0 ? initial.tint_in_mask : initial.tint;
   Motion motion = scene_.main_motion->on(Device::cpu);
-  return make_tracker().new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, tint,
-                                    memory_.caps.main - scene_.main.count());
+  Surfels made = make_tracker().new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, tint,
+                                            memory_.caps.main - scene_.main.count());
+  if (made.has_roughness()) made.roughness_logit.fill(logit(initial.roughness));
+  return made;
 }
 
 void Trainer::let_strays_go(int64_t key) {

@@ -18,6 +18,8 @@ void check(const Surfels& s, size_t file_bytes) {
           "every surfel has everything");
   promise(k == 1 || k == 4 || k == 9 || k == 16, "harmonics are of a degree");
   promise(s.tint_logit.empty() || s.tint_logit.shape() == Shape{n}, "every surfel has a tint or none has");
+  promise(s.roughness_logit.empty() || s.roughness_logit.shape() == Shape{n},
+          "every surfel has a roughness or none has");
   promise(n * (10 + 3 * k) <= static_cast<int64_t>(file_bytes), "no more surfels than the file can hold");
 }
 

@@ -39,6 +39,8 @@ void check(const Surfels& s) {
               s.sh.shape() == Shape{n, s.sh.dim(1), 3},
           "every surfel has everything");
   promise(s.tint_logit.empty() || s.tint_logit.shape() == Shape{n}, "every surfel has a tint or none has");
+  promise(s.roughness_logit.empty() || s.roughness_logit.shape() == Shape{n},
+          "every surfel has a roughness or none has");
   const int64_t k = s.sh.dim(1);
   promise(k == 1 || k == 4 || k == 9 || k == 16, "harmonics are of a degree");
 }

@@ -115,6 +115,9 @@ class Graph {
     pixels_ = all_pixels(camera);
     surface::reflection_rays(camera, tensor_of(pixels_), sampled_.depth, sampled_.median_depth,
                              sampled_.normal, s_.depth_ratio, rays_.origins, rays_.directions);
+    if (!main_.has_roughness()) return;
+    rays_.widths = sampled_.roughness;
+    for (int64_t i = 0; i < rays_.count(); ++i) rays_.widths[i] /= sampled_.alpha[i];
   }
   const Tensor<double>& directions() const { return rays_.directions; }
 
@@ -214,6 +217,14 @@ class Graph {
                                  s_.environment_points, s_.time, input.surfels, g.environment,
                                  s_.deform ? &g.environment_field : nullptr);
       for (int64_t i = 0; i < by_behind.size(); ++i) input.rays.directions[i] += by_behind[i];
+    }
+    if (!input.rays.widths.empty()) {
+      grad_sampled_.roughness.reset(sampled_.alpha.shape());
+      for (int64_t i = 0; i < rays_.count(); ++i) {
+        const double by_width = input.rays.widths[i] / sampled_.alpha[i];
+        grad_sampled_.roughness[i] = by_width;
+        grad_sampled_.alpha[i] -= by_width * rays_.widths[i];
+      }
     }
     surface::reflection_rays_backward(camera_of_samples(p_.camera, s_.samples), tensor_of(pixels_),
                                       sampled_.depth, sampled_.median_depth, sampled_.normal, s_.depth_ratio,

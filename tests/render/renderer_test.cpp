@@ -38,6 +38,30 @@ TEST(Renderer, CullingChangesNoPixel) {
   expect_equal(depth, culled.raster.depth, "depth");
 }
 
+// A mirror of sheet metal shows the mean of what a perfect one shows round about: bright and dark spots fade.
+TEST(Renderer, RoughMirrorsBlur) {
+  Fixture f;
+  const auto spread_of = [&] {
+    Renderer renderer(RenderOptions{});
+    const Tensor<float>& seen = renderer.forward(f.scene, f.request).specular_rays;
+    double sum = 0, squares = 0;
+    for (const float v : seen.values()) {
+      sum += v;
+      squares += double{v} * v;
+    }
+    const auto n = static_cast<double>(seen.size());
+    EXPECT_GT(n, 300);
+    return squares / n - sum * sum / (n * n);
+  };
+  f.scene.environment.log_scale.fill(std::log(0.1F));
+  const double perfect = spread_of();
+  f.scene.main.roughness_logit.reset({f.scene.main.count()});
+  f.scene.main.roughness_logit.fill(-6);
+  EXPECT_NEAR(spread_of(), perfect, 0.05 * perfect);
+  f.scene.main.roughness_logit.fill(-1);
+  EXPECT_LT(spread_of(), 0.5 * perfect);
+}
+
 // Below a pixel a surfel shows as far as its low pass does.
 TEST(Renderer, CullingKeepsWhatIsSmallerThanAPixel) {
   Fixture f;
@@ -58,6 +82,7 @@ void expect_same_frame(const Frame& found, const Frame& expected) {
   expect_equal(found.colour, expected.colour, "colour");
   expect_equal(found.raster.colour, expected.raster.colour, "diffuse");
   expect_equal(found.raster.tint, expected.raster.tint, "tint");
+  expect_equal(found.raster.roughness, expected.raster.roughness, "roughness");
   expect_equal(found.raster.normal, expected.raster.normal, "normal");
   expect_equal(found.raster.depth, expected.raster.depth, "depth");
   expect_equal(found.raster.distortion, expected.raster.distortion, "distortion");

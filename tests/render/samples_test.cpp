@@ -16,7 +16,8 @@ using testing::random_tensor;
 constexpr int per_side = 3;
 
 std::vector<Tensor<float>*> layers_of(auto& o) {
-  return {&o.colour, &o.alpha, &o.tint, &o.silhouette, &o.normal, &o.depth, &o.median_depth, &o.distortion};
+  return {&o.colour, &o.alpha, &o.tint,         &o.silhouette, &o.roughness,
+          &o.normal, &o.depth, &o.median_depth, &o.distortion};
 }
 
 raster::Output random_layers(int64_t height, int64_t width, Random& random) {

@@ -23,6 +23,7 @@ Surfels wall_of_surfels(int count, float distance, float spread, float scale, bo
   s.opacity_logit.reset({count});
   s.sh.reset({count, 9, 3});
   if (tint) s.tint_logit.reset({count});
+  if (tint) s.roughness_logit.reset({count});
   for (int64_t i = 0; i < count; ++i) {
     const float depth = distance + 0.21F * static_cast<float>(i);
     store3(s.position.row(i), Vec3<float>(spread * random.normal(), spread * random.normal(), depth));
@@ -33,6 +34,7 @@ Surfels wall_of_surfels(int count, float distance, float spread, float scale, bo
     s.opacity_logit[i] = static_cast<float>(random.uniform(-0.8, 0.3));
     for (int64_t k = 0; k < 27; ++k) s.sh.row(i)[k] = 0.25F * static_cast<float>(random.normal());
     if (tint) s.tint_logit[i] = 0.3F * static_cast<float>(random.normal());
+    if (tint) s.roughness_logit[i] = -2.5F + 0.3F * static_cast<float>(i % 5);
   }
   return s;
 }

@@ -49,6 +49,7 @@ Surfels random_surfels(int64_t n, int64_t coefficients, bool tint) {
   s.opacity_logit = Tensor<float>(Shape{n});
   s.sh = Tensor<float>(Shape{n, coefficients, 3});
   if (tint) s.tint_logit = Tensor<float>(Shape{n});
+  if (tint && coefficients > 1) s.roughness_logit = Tensor<float>(Shape{n});
   s.for_each([&](const char*, Tensor<float>& t) {
     for (float& v : t.values()) v = static_cast<float>(random.normal());
   });
@@ -65,6 +66,7 @@ void expect_equal(const Surfels& a, const Surfels& b) {
   EXPECT_TRUE(equal(a.opacity_logit, b.opacity_logit));
   EXPECT_TRUE(equal(a.sh, b.sh));
   EXPECT_TRUE(equal(a.tint_logit, b.tint_logit));
+  EXPECT_TRUE(equal(a.roughness_logit, b.roughness_logit));
 }
 
 // A body of `count` floats 0, 1, 2, … after a header with these property lines.
@@ -108,10 +110,10 @@ TEST_F(Ply, WritesTheAttributesOf2dgsInTheirOrder) {
                                  "property float nx\nproperty float ny\nproperty float nz\n"
                                  "property float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\n"
                                  "property float f_rest_0\n"));
-  EXPECT_THAT(bytes(),
-              HasSubstr("property float f_rest_8\nproperty float opacity\nproperty float scale_0\n"
-                        "property float scale_1\nproperty float rot_0\nproperty float rot_1\n"
-                        "property float rot_2\nproperty float rot_3\nproperty float tint\nend_header\n"));
+  EXPECT_THAT(bytes(), HasSubstr("property float f_rest_8\nproperty float opacity\nproperty float scale_0\n"
+                                 "property float scale_1\nproperty float rot_0\nproperty float rot_1\n"
+                                 "property float rot_2\nproperty float rot_3\nproperty float tint\nproperty "
+                                 "float roughness\nend_header\n"));
 }
 
 TEST_F(Ply, HarmonicsStandChannelAfterChannel) {

@@ -26,6 +26,7 @@ Surfels random_surfels(int64_t count, bool tint, Random& random) {
   s.opacity_logit = noise({count}, random);
   s.sh = noise({count, 4, 3}, random);
   if (tint) s.tint_logit = noise({count}, random);
+  if (tint) s.roughness_logit = noise({count}, random);
   return s;
 }
 

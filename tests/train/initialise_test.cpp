@@ -63,6 +63,20 @@ TEST(Initialise, OpacityAndTintAreAsTheOptionsSay) {
   const Surfels s = surfels_at_points(plane.points, options, random);
   EXPECT_NEAR(1 / (1 + std::exp(-s.opacity_logit[4])), 0.25F, 1e-6F);
   EXPECT_NEAR(1 / (1 + std::exp(-s.tint_logit[4])), 0.002F, 1e-6F);
+  EXPECT_FALSE(s.has_roughness()) << "mirrors are perfect";
+}
+
+TEST(Initialise, OnlyWhatMirrorsHasARoughness) {
+  TrainOptions options = small_run(1);
+  options.initial.roughness = 0.2F;
+  options.initial.environment_points = 500;
+  Random random(1);
+  const Scene scene = initial_scene(load_capture(capture_folder(), {}), options, random).scene;
+  ASSERT_EQ(scene.main.roughness_logit.size(), scene.main.count());
+  for (const float logit : scene.main.roughness_logit.values())
+    EXPECT_NEAR(1 / (1 + std::exp(-logit)), 0.2F, 1e-6F);
+  ASSERT_GT(scene.environment.count(), 0);
+  EXPECT_FALSE(scene.environment.has_roughness());
 }
 
 TEST(Initialise, CoincidentAndSinglePointsStayFinite) {

@@ -147,9 +147,10 @@ void add_render(CLI::App& program) {
   verb->add_option("-o,--output", a->output, "Folder for LAYER/NAME.png or .npy");
   verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
   add_shot_arguments(*verb, a->shots);
-  verb->add_option("--layers", a->layers,
-                   "Of rgb, diffuse, specular, tint, alpha, normal, depth, median-depth, distortion, "
-                   "surfels, tracks, with commas between; or all")
+  verb->add_option(
+          "--layers", a->layers,
+          "Of rgb, diffuse, specular, tint, roughness, alpha, normal, depth, median-depth, distortion, "
+          "surfels, tracks, with commas between; or all")
       ->capture_default_str();
   verb->add_option("--format", a->format, "png for the eye or npy (float32)")
       ->check(CLI::IsMember({"png", "npy"}))

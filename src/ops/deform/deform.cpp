@@ -35,6 +35,7 @@ void resize(const Surfels& stored, int64_t count, int sh_degree, PosedSurfels& p
   posed.opacity.place(device).resize({count});
   posed.sh.place(device).resize({count, sh_coefficients(sh_degree), 3});
   posed.tint.place(device).resize(stored.has_tint() ? Shape{count} : Shape{});
+  posed.roughness.place(device).resize(stored.has_roughness() ? Shape{count} : Shape{});
   require(posed.sh.size() <= std::numeric_limits<uint32_t>::max(), "posed numbers are counted in 32 bits",
           posed.sh.shape().to_string());
 }

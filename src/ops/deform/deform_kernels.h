@@ -23,10 +23,11 @@ struct StoredAddresses {
         opacity_logit(s.opacity_logit.data()),
         sh(s.sh.data()),
         tint_logit(s.has_tint() ? s.tint_logit.data() : nullptr),
+        roughness_logit(s.has_roughness() ? s.roughness_logit.data() : nullptr),
         sh_row(s.sh.row_size()) {}
 
   T *position, *log_scale, *rotation, *opacity_logit, *sh;
-  T* tint_logit;  // null: the environment
+  T *tint_logit, *roughness_logit;  // null: the environment has neither
   int64_t sh_row;
 };
 template <class T>
@@ -39,10 +40,11 @@ struct PosedAddresses {
         opacity(p.opacity.data()),
         sh(p.sh.data()),
         tint(p.has_tint() ? p.tint.data() : nullptr),
+        roughness(p.has_roughness() ? p.roughness.data() : nullptr),
         sh_row(p.sh.row_size()) {}
 
   T *position, *scale, *rotation, *opacity, *sh;
-  T* tint;  // null: the environment
+  T *tint, *roughness;  // null: the environment has neither
   int64_t sh_row;
 };
 
@@ -192,6 +194,7 @@ struct Pose {
     if (posed.tint != nullptr) {
       posed.tint[i] = sigmoid(finite.see(stored.tint_logit[from] + r[residual::tint]));
     }
+    if (posed.roughness != nullptr) posed.roughness[i] = sigmoid(finite.see(stored.roughness_logit[from]));
     return finite.holds() && extended;
   }
   // What stands in the place of a surfel that cannot be used: finite everywhere and invisible.
@@ -202,6 +205,7 @@ struct Pose {
     posed.opacity[i] = 0;
     for (int64_t k = 0; k < posed.sh_row; ++k) posed.sh[i * posed.sh_row + k] = 0;
     if (posed.tint != nullptr) posed.tint[i] = 0;
+    if (posed.roughness != nullptr) posed.roughness[i] = 0;
   }
 };
 
@@ -275,6 +279,11 @@ struct PoseBackward {
       grad[residual::tint] = grad_posed.tint[i] * sigmoid_derivative(posed.tint[i]);
     }
     add_to_grad_stored(grad, rows.at(i));
+    // No field moves it.
+    if (posed.roughness != nullptr) {
+      add_to_grad_stored.stored.roughness_logit[rows.at(i)] +=
+          grad_posed.roughness[i] * sigmoid_derivative(posed.roughness[i]);
+    }
     grad_residuals.store(i, grad);
   }
 };

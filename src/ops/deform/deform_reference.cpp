@@ -24,7 +24,7 @@ struct Moved {
   double rotation[4];
   double log_scale[2];
   double opacity_logit;
-  double tint_logit = 0;
+  double tint_logit = 0, roughness_logit = 0;
 };
 
 Moved move(const BasicSurfels<double>& stored, int64_t i, const Residuals& r) {
@@ -34,11 +34,13 @@ Moved move(const BasicSurfels<double>& stored, int64_t i, const Residuals& r) {
   for (int k = 0; k < 2; ++k) m.log_scale[k] = stored.log_scale(i, k) + r.value[residual::log_scale + k];
   m.opacity_logit = stored.opacity_logit[i] + r.value[residual::opacity];
   if (stored.has_tint()) m.tint_logit = stored.tint_logit[i] + r.value[residual::tint];
+  if (stored.has_roughness()) m.roughness_logit = stored.roughness_logit[i];
   return m;
 }
 
 bool usable(const Moved& m, const double* sh, int64_t sh_values) {
-  bool finite = std::isfinite(m.opacity_logit) && std::isfinite(m.tint_logit);
+  bool finite =
+      std::isfinite(m.opacity_logit) && std::isfinite(m.tint_logit) && std::isfinite(m.roughness_logit);
   for (const double v : m.position) finite = finite && std::isfinite(v);
   for (const double v : m.rotation) finite = finite && std::isfinite(v);
   for (const double v : m.log_scale) finite = finite && std::isfinite(std::exp(v)) && std::exp(v) > 0;
@@ -75,6 +77,7 @@ void forward_reference(const BasicSurfels<double>& stored, const BasicField<doub
   posed.opacity.reset({n});
   posed.sh.reset({n, coefficients, 3});
   posed.tint.reset(stored.has_tint() ? Shape{n} : Shape{});
+  posed.roughness.reset(stored.has_roughness() ? Shape{n} : Shape{});
   const Tensor<double> residuals = evaluate(field, field_points, time);
   for (int64_t i = 0; i < n; ++i) {
     posed.scale(i, 0) = posed.scale(i, 1) = 1;
@@ -86,6 +89,7 @@ void forward_reference(const BasicSurfels<double>& stored, const BasicField<doub
     for (int k = 0; k < 2; ++k) posed.scale(i, k) = std::exp(m.log_scale[k]);
     posed.opacity[i] = sigmoid(m.opacity_logit);
     if (stored.has_tint()) posed.tint[i] = sigmoid(m.tint_logit);
+    if (stored.has_roughness()) posed.roughness[i] = sigmoid(m.roughness_logit);
     for (int64_t k = 0; k < 3 * coefficients; ++k) posed.sh.row(i)[k] = stored.sh.row(i)[k];
   }
 }
@@ -115,6 +119,10 @@ void backward_reference(const BasicSurfels<double>& stored, const BasicField<dou
     for (int k = 0; k < 2; ++k) grad_stored.log_scale(i, k) += grad[residual::log_scale + k];
     grad_stored.opacity_logit[i] += grad[residual::opacity];
     if (stored.has_tint()) grad_stored.tint_logit[i] += grad[residual::tint];
+    if (stored.has_roughness()) {
+      grad_stored.roughness_logit[i] +=
+          grad_posed.roughness[i] * sigmoid_derivative(sigmoid(m.roughness_logit));
+    }
     for (int64_t k = 0; k < sh_values; ++k) grad_stored.sh.row(i)[k] += grad_posed.sh.row(i)[k];
     for (int64_t k = 0; field_moves(stored, i) && k < grad_residuals.row_size() && k < residual::main_outputs;
          ++k) {

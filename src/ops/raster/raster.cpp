@@ -39,6 +39,8 @@ void check_input(const PosedSurfels& surfels, const Camera<float>& camera) {
           "sh is N×K×3", surfels.sh.shape().to_string());
   require(!surfels.has_tint() || surfels.tint.size() == n, "a tint for every surfel",
           surfels.tint.shape().to_string());
+  require(!surfels.has_roughness() || surfels.roughness.size() == n, "a roughness for every surfel",
+          surfels.roughness.shape().to_string());
   require(surfels.carried.empty() || surfels.carried.size() == n, "whether each surfel is carried",
           surfels.carried.shape().to_string());
   require(camera.width >= 0 && camera.height >= 0 && camera.width < (1 << 20) && camera.height < (1 << 20),
@@ -46,7 +48,8 @@ void check_input(const PosedSurfels& surfels, const Camera<float>& camera) {
 }
 
 void check_gradient(const OutputGradient& g, int64_t pixels) {
-  for (const auto* tensor : {&g.alpha, &g.tint, &g.silhouette, &g.depth, &g.median_depth, &g.distortion}) {
+  for (const auto* tensor :
+       {&g.alpha, &g.tint, &g.silhouette, &g.roughness, &g.depth, &g.median_depth, &g.distortion}) {
     require(tensor->empty() || tensor->size() == pixels, "a gradient for every pixel",
             tensor->shape().to_string());
   }

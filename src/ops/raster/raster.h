@@ -55,6 +55,7 @@ struct BasicOutput {
   Tensor<T> alpha;         // H×W, Σ w
   Tensor<T> tint;          // H×W, Σ w s_tint (α_spec); zero when the surfels have no tint
   Tensor<T> silhouette;    // H×W, Σ w s_carried; empty when the surfels do not say what is carried
+  Tensor<T> roughness;     // H×W, Σ w s_roughness; empty when the surfels have none
   Tensor<T> normal;        // H×W×3, world axes, Σ w n with n turned to the camera; not renormalised
   Tensor<T> depth;         // H×W, expected camera z: Σ w z / Σ w; 0 where alpha is 0
   Tensor<T> median_depth;  // H×W, camera z of the hit where the transmittance crosses 0.5; 0 where none does
@@ -65,7 +66,7 @@ using Output = BasicOutput<float>;
 // dL/doutput. An empty tensor means zero.
 template <class T>
 struct BasicOutputGradient {
-  Tensor<T> colour, alpha, tint, silhouette, normal, depth, median_depth, distortion;
+  Tensor<T> colour, alpha, tint, silhouette, roughness, normal, depth, median_depth, distortion;
 };
 using OutputGradient = BasicOutputGradient<float>;
 

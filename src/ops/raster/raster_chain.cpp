@@ -54,6 +54,7 @@ void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved
   g.opacity.place(device).resize(surfels.opacity.shape());
   g.sh.place(device).resize(surfels.sh.shape());
   g.tint.place(device).resize(surfels.tint.shape());
+  g.roughness.place(device).resize(surfels.roughness.shape());
   gradient.screen_gradient.place(device).resize({n});
 
   const uint32_t tiles_walked =

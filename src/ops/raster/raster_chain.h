@@ -53,6 +53,7 @@ struct Chain {
     for (int64_t k = 0; k < to.sh_row; ++k) to.sh[to.sh_row * i + k] = 0;
     to.opacity[i] = 0;
     if (to.tint != nullptr) to.tint[i] = 0;
+    if (to.roughness != nullptr) to.roughness[i] = 0;
     screen_gradient[i] = 0;
   }
 
@@ -108,6 +109,7 @@ struct Chain {
     for (int a = 0; a < 4; ++a) to.rotation[4 * i + a] = static_cast<float>(q[a]);
     to.opacity[i] = sums.log_opacity / surfels.opacity[i];
     if (to.tint != nullptr) to.tint[i] = sums.tint;
+    if (to.roughness != nullptr) to.roughness[i] = sums.roughness;
     camera_gradient.camera_from_world = g.camera_from_world;
     camera_gradient.position = -g.from_camera;
   }

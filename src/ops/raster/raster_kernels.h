@@ -40,8 +40,11 @@ struct alignas(16) Splat {
   // points of its quadratic form along vertical lines: y - ellipse_y = slope_y (x - ellipse_x).
   float ellipse_x, ellipse_y;
   float slope_x, slope_y;
-  float carried;  // what it adds to the silhouette
+  float signed_roughness;  // below zero, -0 too, where a body carries the surfel
 
+  // What it adds to the silhouette.
+  TRACEFLOW_HD float carried() const { return std::signbit(signed_roughness) ? 1.0F : 0.0F; }
+  TRACEFLOW_HD float roughness() const { return std::abs(signed_roughness); }
   static constexpr float far_away = 1e15F;
   TRACEFLOW_HD bool has_low_pass() const { return centre_x < far_away; }
 };
@@ -73,7 +76,8 @@ struct SplatGradient {
   float colour[3];
   float tint;
   float normal[3];
-  float unused[3];
+  float roughness;
+  float unused[2];
 };
 static_assert(sizeof(SplatGradient) == 24 * sizeof(float));
 
@@ -96,7 +100,7 @@ struct Saved {
   int width = 0, height = 0;
   int tile_columns = 0, tile_rows = 0;
   int64_t count = 0;
-  bool has_silhouette = false;
+  bool has_silhouette = false, has_roughness = false;
   float rho_per_pixel2 = 2;  // of the low-pass: ρ over the squared distance to the centre
 
   Tensor<Splat> splats;          // by surfel; unspecified where the bounds are empty

@@ -134,7 +134,8 @@ class Prepare {
     return s.opacity[i] >= alpha_min_ && s.scale[2 * i] > 0 && s.scale[2 * i + 1] > 0 &&
            all_finite(s.position + 3 * i, 3) && all_finite(s.scale + 2 * i, 2) &&
            all_finite(s.rotation + 4 * i, 4) && std::isfinite(s.opacity[i]) &&
-           (s.tint == nullptr || std::isfinite(s.tint[i]));
+           (s.tint == nullptr || std::isfinite(s.tint[i])) &&
+           (s.roughness == nullptr || std::isfinite(s.roughness[i]));
   }
 
   // Where a surfel stands and how far it reaches.
@@ -244,7 +245,10 @@ class Prepare {
     store3(splat.colour, finite ? colour : Vec3<float>(std::numeric_limits<float>::quiet_NaN()));
     store3(splat.normal, normal * (dot(normal, from_camera) > 0 ? -1.0 : 1.0));
     splat.tint = surfels_.tint != nullptr ? surfels_.tint[i] : 0;
-    splat.carried = surfels_.carried != nullptr ? surfels_.carried[i] : 0;
+    const float carried = surfels_.carried != nullptr ? surfels_.carried[i] : 0;
+    const float roughness = surfels_.roughness != nullptr ? surfels_.roughness[i] : 0;
+    // What is not finite stays so.
+    splat.signed_roughness = std::copysign(roughness + 0 * carried, carried != 0 ? -1.0F : 1.0F);
   }
 
   TRACEFLOW_HD static void store_ellipse(const Vec2<double>& centre, Splat& s) {

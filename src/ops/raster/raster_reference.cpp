@@ -31,7 +31,7 @@ struct Prepared {
   Vector2 pixel;      // the projected centre, where has_low_pass
   Vector3 direction;  // unit, from the camera to the centre
   Vector3 colour;
-  double opacity, tint, carried;
+  double opacity, tint, carried, roughness;
 };
 
 // A surfel met by a pixel's ray.
@@ -103,7 +103,7 @@ class Scene {
     return all_finite(s.position.row(i), 3) && all_finite(s.scale.row(i), 2) &&
            all_finite(s.rotation.row(i), 4) && std::isfinite(s.opacity[i]) &&
            all_finite(s.sh.row(i), s.sh.row_size()) && (!s.has_tint() || std::isfinite(s.tint[i])) &&
-           s.scale(i, 0) > 0 && s.scale(i, 1) > 0;
+           (!s.has_roughness() || std::isfinite(s.roughness[i])) && s.scale(i, 0) > 0 && s.scale(i, 1) > 0;
   }
 
   Prepared prepare(int64_t i) const {
@@ -127,6 +127,7 @@ class Scene {
     p.colour = sh_colour<double>(sh_degree(), s.sh.row(i), p.direction);
     p.opacity = s.opacity[i];
     p.tint = s.has_tint() ? s.tint[i] : 0;
+    p.roughness = s.has_roughness() ? s.roughness[i] : 0;
     p.carried = s.carried.empty() ? 0 : s.carried[i];
     return p;
   }
@@ -187,6 +188,7 @@ void resize(const Surfels& surfels, const Camera<double>& camera, BasicOutput<do
     tensor->reset(plane);
   }
   output.silhouette.reset(surfels.carried.empty() ? Shape{0} : plane);
+  output.roughness.reset(surfels.has_roughness() ? plane : Shape{0});
   output.colour.reset(vectors);
   output.normal.reset(vectors);
 }
@@ -201,6 +203,7 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
     normal += b.weight * p.normal;
     output.tint[index] += b.weight * p.tint;
     if (!output.silhouette.empty()) output.silhouette[index] += b.weight * p.carried;
+    if (!output.roughness.empty()) output.roughness[index] += b.weight * p.roughness;
     for (const Blended& nearer :
          std::span(pixel.blended.data(), static_cast<size_t>(&b - pixel.blended.data()))) {
       output.distortion[index] += b.weight * nearer.weight * (b.m - nearer.m) * (b.m - nearer.m);
@@ -216,7 +219,7 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
 // dL/doutput at one pixel; an absent tensor means zero.
 struct PixelGradient {
   Vector3 colour{0.0}, normal{0.0};
-  double alpha = 0, tint = 0, silhouette = 0, depth = 0, median_depth = 0, distortion = 0;
+  double alpha = 0, tint = 0, silhouette = 0, roughness = 0, depth = 0, median_depth = 0, distortion = 0;
 
   PixelGradient(const BasicOutputGradient<double>& g, int64_t index) {
     if (!g.colour.empty()) colour = load3<double>(&g.colour[3 * index]);
@@ -224,6 +227,7 @@ struct PixelGradient {
     if (!g.alpha.empty()) alpha = g.alpha[index];
     if (!g.tint.empty()) tint = g.tint[index];
     if (!g.silhouette.empty()) silhouette = g.silhouette[index];
+    if (!g.roughness.empty()) roughness = g.roughness[index];
     if (!g.depth.empty()) depth = g.depth[index];
     if (!g.median_depth.empty()) median_depth = g.median_depth[index];
     if (!g.distortion.empty()) distortion = g.distortion[index];
@@ -235,7 +239,7 @@ struct PreparedGradient {
   SurfelHitGradient<double> frame;
   Vector3 normal{0.0}, colour{0.0}, centre{0.0};
   Vector2 pixel{0.0};
-  double opacity = 0, tint = 0;
+  double opacity = 0, tint = 0, roughness = 0;
 };
 
 class Backward {
@@ -276,7 +280,8 @@ class Backward {
     const double from_depth = g.depth * (b.hit.z - pixel.depth()) / pixel.alpha();
     const double from_distortion = b.m * b.m * pixel.alpha() + pixel.m2_sum - 2 * b.m * pixel.m_sum;
     return dot(g.colour, p.colour - Vector3(options_.background)) + dot(g.normal, p.normal) +
-           g.tint * p.tint + g.silhouette * p.carried + g.alpha + from_depth + g.distortion * from_distortion;
+           g.tint * p.tint + g.silhouette * p.carried + g.roughness * p.roughness + g.alpha + from_depth +
+           g.distortion * from_distortion;
   }
 
   double depth_gradient(const Pixel& pixel, const Blended& b, const PixelGradient& g) const {
@@ -290,6 +295,7 @@ class Backward {
     to.colour += b.weight * g.colour;
     to.normal += b.weight * g.normal;
     to.tint += b.weight * g.tint;
+    to.roughness += b.weight * g.roughness;
   }
 
   // From dL/d(o·G) and dL/dz of one hit.
@@ -338,6 +344,7 @@ class Backward {
     for (int k = 0; k < 4; ++k) to.rotation(i, k) = grad_rotation[k];
     to.opacity[i] = g.opacity;
     if (surfels_.has_tint()) to.tint[i] = g.tint;
+    if (surfels_.has_roughness()) to.roughness[i] = g.roughness;
   }
 
   const Surfels& surfels_;

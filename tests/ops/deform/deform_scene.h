@@ -16,6 +16,7 @@ inline Surfels random_surfels(int64_t count, bool tint, uint64_t seed = 11) {
   s.opacity_logit = random_tensor<float>({count}, random, -3, 3);
   s.sh = random_tensor<float>({count, 16, 3}, random, -1, 1);
   if (tint) s.tint_logit = random_tensor<float>({count}, random, -3, 3);
+  if (tint) s.roughness_logit = random_tensor<float>({count}, random, -3, 0);
   return s;
 }
 
@@ -29,7 +30,8 @@ BasicPosedSurfels<T> random_gradient_like(const BasicPosedSurfels<T>& posed, uin
           fill(posed.opacity),
           fill(posed.sh),
           fill(posed.tint),
-          {}};
+          {},
+          fill(posed.roughness)};
 }
 
 // f(name, tensor) for every group of posed surfels.
@@ -41,12 +43,13 @@ void for_each_posed(Posed& posed, F&& f) {
   f("opacity", posed.opacity);
   f("sh", posed.sh);
   if (posed.has_tint()) f("tint", posed.tint);
+  if (posed.has_roughness()) f("roughness", posed.roughness);
 }
 
 template <class T>
 double dot(const BasicPosedSurfels<T>& a, const BasicPosedSurfels<T>& b) {
   return dot(a.position, b.position) + dot(a.scale, b.scale) + dot(a.rotation, b.rotation) +
-         dot(a.opacity, b.opacity) + dot(a.sh, b.sh) + dot(a.tint, b.tint);
+         dot(a.opacity, b.opacity) + dot(a.sh, b.sh) + dot(a.tint, b.tint) + dot(a.roughness, b.roughness);
 }
 
 }  // namespace traceflow::testing

@@ -21,6 +21,7 @@ struct SceneOptions {
   double opacity_min = 0.2, opacity_max = 0.9;
   bool has_tint = true;
   bool says_carried = true;
+  bool has_roughness = true;
   bool rotated_camera = true;
 };
 
@@ -59,6 +60,7 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
   s.sh = Tensor<double>({o.count, k, 3});
   if (o.has_tint) s.tint = Tensor<double>({o.count});
   if (o.says_carried) s.carried = Tensor<double>({o.count});
+  if (o.has_roughness) s.roughness = Tensor<double>({o.count});
   for (int64_t i = 0; i < o.count; ++i) {
     const double z = random.uniform(o.depth_min, o.depth_max);
     const Vec3<double> in_camera(z * random.uniform(-o.spread, o.spread),
@@ -72,6 +74,8 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
     for (int64_t c = 0; c < 3 * k; ++c) s.sh.row(i)[c] = (c < 3 ? 0.8 : 0.2) * random.normal();
     if (o.has_tint) s.tint[i] = random.uniform();
     if (o.says_carried) s.carried[i] = i % 3 == 0 ? 1 : 0;
+    // Not drawn, so that the rest of a scene is as it is without.
+    if (o.has_roughness) s.roughness[i] = 0.05 + 0.07 * static_cast<double>(i % 5);
   }
   return scene;
 }
@@ -121,16 +125,16 @@ TestScene<To> convert_scene(const TestScene<From>& scene) {
 // The outputs by their place, for loops over all of them.
 template <class Output>
 auto outputs_of(Output& o) {
-  return std::array{&o.colour, &o.alpha,        &o.tint,       &o.normal,
-                    &o.depth,  &o.median_depth, &o.distortion, &o.silhouette};
+  return std::array{&o.colour,       &o.alpha,      &o.tint,       &o.normal,   &o.depth,
+                    &o.median_depth, &o.distortion, &o.silhouette, &o.roughness};
 }
-inline constexpr std::array output_names{"colour", "alpha",        "tint",       "normal",
-                                         "depth",  "median_depth", "distortion", "silhouette"};
+inline constexpr std::array output_names{"colour",       "alpha",      "tint",       "normal",   "depth",
+                                         "median_depth", "distortion", "silhouette", "roughness"};
 
 // A linear loss Σ g·output with random g for the outputs named by `mask` (bit i: output i), absent for the
 // others.
 template <class T>
-BasicOutputGradient<T> random_output_gradient(uint64_t seed, int width, int height, unsigned mask = 0xff) {
+BasicOutputGradient<T> random_output_gradient(uint64_t seed, int width, int height, unsigned mask = 0x1ff) {
   Random random(seed);
   BasicOutputGradient<T> g;
   const auto tensors = outputs_of(g);
@@ -152,6 +156,7 @@ void for_each_group(Surfels& s, F&& f) {
   f("opacity", s.opacity);
   f("sh", s.sh);
   f("tint", s.tint);
+  f("roughness", s.roughness);
 }
 // And the others.
 template <class Surfels, class F>

@@ -21,6 +21,7 @@ struct BlockState {
   alignas(64) float normal[3][pixels_per_block];
   alignas(64) float tint[pixels_per_block];
   alignas(64) float silhouette[pixels_per_block];
+  alignas(64) float roughness[pixels_per_block];
   alignas(64) float z[pixels_per_block];         // dL/d(Σ w z)
   alignas(64) float constant[pixels_per_block];  // the part of dL/dw that all hits share
   alignas(64) float median[pixels_per_block];
@@ -44,6 +45,7 @@ HWY_INLINE void load_pixel(const OutputGradient& g, const Vec3<float>& backgroun
   }
   state.tint[i] = value(g.tint, pixel);
   state.silhouette[i] = value(g.silhouette, pixel);
+  state.roughness[i] = value(g.roughness, pixel);
   state.median[i] = value(g.median_depth, pixel);
   state.distortion[i] = value(g.distortion, pixel);
   // The expected depth is Σ w z / Σ w; the background shines with 1 - Σ w.
@@ -70,7 +72,7 @@ HWY_INLINE void load_block(const OutputGradient& g, const Vec3<float>& backgroun
 
 // Which outputs a gradient is asked by: what nobody asks is left out of the loops.
 enum class Asked {
-  colour,    // colour, tint, silhouette and alpha
+  colour,    // colour, tint, silhouette, roughness and alpha
   geometry,  // and normal and expected depth
   all        // and median depth and distortion
 };
@@ -78,14 +80,14 @@ enum class Asked {
 // The sums of a surfel over pixels, lane by lane, in the order of SplatGradient.
 template <class D>
 struct Sums {
-  static constexpr int used = 21;
+  static constexpr int used = 22;
   static constexpr int padded = 24;
   V<D> u_x, u_y, u_1, v_x, v_y, v_1, w_x, w_y, w_1, z_plane, centre_x, centre_y, z_centre, log_opacity;
-  V<D> red, green, blue, tint, normal_x, normal_y, normal_z;
+  V<D> red, green, blue, tint, normal_x, normal_y, normal_z, roughness;
 
   HWY_INLINE explicit Sums(D d) {
     u_x = u_y = u_1 = v_x = v_y = v_1 = w_x = w_y = w_1 = z_plane = centre_x = centre_y = z_centre =
-        log_opacity = red = green = blue = tint = normal_x = normal_y = normal_z = hn::Zero(d);
+        log_opacity = red = green = blue = tint = normal_x = normal_y = normal_z = roughness = hn::Zero(d);
   }
 
   // Adds one hit per lane; moves the state in front of it.
@@ -118,7 +120,8 @@ struct Sums {
     own = hn::MulAdd(set(s.colour[1]), load(state.colour[1]), own);
     own = hn::MulAdd(set(s.colour[2]), load(state.colour[2]), own);
     own = hn::MulAdd(set(s.tint), load(state.tint), own);
-    own = hn::MulAdd(set(s.carried), load(state.silhouette), own);
+    own = hn::MulAdd(set(s.carried()), load(state.silhouette), own);
+    own = hn::MulAdd(set(s.roughness()), load(state.roughness), own);
     if constexpr (asked != Asked::colour) {
       own = hn::MulAdd(set(s.normal[0]), load(state.normal[0]), own);
       own = hn::MulAdd(set(s.normal[1]), load(state.normal[1]), own);
@@ -151,6 +154,7 @@ struct Sums {
     green = hn::MulAdd(weight, load(state.colour[1]), green);
     blue = hn::MulAdd(weight, load(state.colour[2]), blue);
     tint = hn::MulAdd(weight, load(state.tint), tint);
+    roughness = hn::MulAdd(weight, load(state.roughness), roughness);
 
     // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero where α is clamped.
     const auto is_free = hn::And(hit, hn::Lt(f.opacity, alpha_max));
@@ -197,7 +201,7 @@ struct Sums {
     const auto zero = hn::Zero(d);
     V<D> v[padded] = {u_x,  u_y,     u_1,      v_x,      v_y,      v_1,         w_x,  w_y,
                       w_1,  z_plane, centre_x, centre_y, z_centre, log_opacity, red,  green,
-                      blue, tint,    normal_x, normal_y, normal_z, zero,        zero, zero};
+                      blue, tint,    normal_x, normal_y, normal_z, roughness,   zero, zero};
     const size_t count = add_crosswise(d, v);
     HWY_ALIGN float sums[padded + pixels_per_block];
     for (size_t i = 0; i < count; ++i) hn::StoreU(v[i], d, sums + i * hn::Lanes(d));

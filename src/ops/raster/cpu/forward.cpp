@@ -21,6 +21,7 @@ struct BlockSums {
   alignas(64) float normal[3][pixels_per_block];
   alignas(64) float tint[pixels_per_block];
   alignas(64) float silhouette[pixels_per_block];
+  alignas(64) float roughness[pixels_per_block];
   alignas(64) float median_depth[pixels_per_block];
   alignas(64) float distortion[pixels_per_block];
 };
@@ -38,6 +39,7 @@ class Blend {
         blue_(hn::Zero(d)),
         tint_(hn::Zero(d)),
         silhouette_(hn::Zero(d)),
+        roughness_(hn::Zero(d)),
         normal_x_(hn::Zero(d)),
         normal_y_(hn::Zero(d)),
         normal_z_(hn::Zero(d)),
@@ -84,7 +86,8 @@ class Blend {
     green_ = hn::MulAdd(weight, set(s.colour[1]), green_);
     blue_ = hn::MulAdd(weight, set(s.colour[2]), blue_);
     tint_ = hn::MulAdd(weight, set(s.tint), tint_);
-    silhouette_ = hn::MulAdd(weight, set(s.carried), silhouette_);
+    silhouette_ = hn::MulAdd(weight, set(s.carried()), silhouette_);
+    roughness_ = hn::MulAdd(weight, set(s.roughness()), roughness_);
     normal_x_ = hn::MulAdd(weight, set(s.normal[0]), normal_x_);
     normal_y_ = hn::MulAdd(weight, set(s.normal[1]), normal_y_);
     normal_z_ = hn::MulAdd(weight, set(s.normal[2]), normal_z_);
@@ -107,6 +110,7 @@ class Blend {
     hn::StoreU(normal_z_, d, sums.normal[2] + lane);
     hn::StoreU(tint_, d, sums.tint + lane);
     hn::StoreU(silhouette_, d, sums.silhouette + lane);
+    hn::StoreU(roughness_, d, sums.roughness + lane);
     hn::StoreU(hn::IfThenElseZero(has_median, median_depth_), d, sums.median_depth + lane);
     hn::StoreU(transmittance_, d, saved.transmittance + lane);
     hn::StoreU(alpha_, d, saved.alpha + lane);
@@ -127,7 +131,7 @@ class Blend {
 
  private:
   M<D> live_;
-  V<D> transmittance_, alpha_, red_, green_, blue_, tint_, silhouette_;
+  V<D> transmittance_, alpha_, red_, green_, blue_, tint_, silhouette_, roughness_;
   V<D> normal_x_, normal_y_, normal_z_, depth_, m_, m2_;
   V<D> first_inverse_z_, median_depth_;
   V<Int<D>> next_, last_, median_;  // places in the list
@@ -147,6 +151,7 @@ HWY_INLINE void write_row(const SavedBlock& saved, const BlockSums& sums, int be
   copy(saved.alpha, output.alpha);
   copy(sums.tint, output.tint);
   if (!output.silhouette.empty()) copy(sums.silhouette, output.silhouette);
+  if (!output.roughness.empty()) copy(sums.roughness, output.roughness);
   copy(saved.depth, output.depth);
   copy(sums.median_depth, output.median_depth);
   copy(sums.distortion, output.distortion);
@@ -283,6 +288,7 @@ void blend(const Options& options, Output& output, Saved& saved) {
     tensor->place(Device::cpu).resize(plane);
   }
   output.silhouette.place(Device::cpu).resize(saved.has_silhouette ? plane : Shape{0});
+  output.roughness.place(Device::cpu).resize(saved.has_roughness ? plane : Shape{0});
   output.colour.place(Device::cpu).resize(vectors);
   output.normal.place(Device::cpu).resize(vectors);
   saved.touched.resize({saved.entries.size()});

@@ -7,20 +7,20 @@ namespace traceflow::raster::cuda_stage {
 namespace {
 
 constexpr int backward_batch = 32;
-constexpr int sums_used = 21;
+constexpr int sums_used = 22;
 constexpr int sums_stored = sizeof(SplatGradient) / sizeof(float);
 static_assert(sums_stored <= cuda::warp_lanes && backward_batch == cuda::warp_lanes);
 
 // Which outputs a gradient is asked by: what nobody asks is left out of the loops.
 enum class Asked {
-  colour,    // colour, tint, silhouette and alpha
+  colour,    // colour, tint, silhouette, roughness and alpha
   geometry,  // and normal and expected depth
   all        // and median depth and distortion
 };
 
 // Addresses; null where nothing is asked.
 struct GradientView {
-  const float *colour, *alpha, *tint, *silhouette, *normal, *depth, *median_depth, *distortion;
+  const float *colour, *alpha, *tint, *silhouette, *roughness, *normal, *depth, *median_depth, *distortion;
 };
 struct KeptPixels {
   const float *transmittance, *alpha, *depth, *m, *m2, *inverse_z;
@@ -31,7 +31,7 @@ struct KeptPixels {
 template <Asked asked>
 struct PixelGradient {
   Vec3<float> colour{0.0F}, normal{0.0F};
-  float tint = 0, silhouette = 0;
+  float tint = 0, silhouette = 0, roughness = 0;
   float z = 0;         // dL/d(Σ w z)
   float constant = 0;  // the part of dL/dw that all hits share
   float median = 0, distortion = 0;
@@ -44,6 +44,7 @@ struct PixelGradient {
     if (g.colour != nullptr) colour = load3<float>(g.colour + 3 * i);
     tint = value(g.tint);
     silhouette = value(g.silhouette);
+    roughness = value(g.roughness);
     alpha = left.alpha[i];
     last = left.last[i];
     constant = value(g.alpha) - dot(colour, background);
@@ -66,7 +67,8 @@ struct PixelGradient {
 
   // dL/dw of a hit at depth z_hit.
   __device__ float by_weight(const KernelOptions& o, const Splat& s, const PixelFootprint& f) const {
-    float own = constant + dot(load3<float>(s.colour), colour) + s.tint * tint + s.carried * silhouette;
+    float own = constant + dot(load3<float>(s.colour), colour) + s.tint * tint + s.carried() * silhouette +
+                s.roughness() * roughness;
     if constexpr (asked != Asked::colour) own += f.z(s) * z + dot(load3<float>(s.normal), normal);
     if constexpr (asked == Asked::all) {
       // dL/dw_i = g (m² A + M2 - 2 m M1)
@@ -120,6 +122,7 @@ struct PixelGradient {
     for (int c = 0; c < 3; ++c) sums[14 + c] += weight * colour[c];
     sums[17] += weight * tint;
     for (int c = 0; c < 3; ++c) sums[18 + c] += weight * normal[c];
+    sums[21] += weight * roughness;
   }
 };
 
@@ -286,8 +289,9 @@ void unblend(const Options& options, const Saved& saved, const GradientView& gra
 
 void blend_backward(const Options& options, const Saved& saved, const OutputGradient& g) {
   const auto asked = [](const Tensor<float>& tensor) { return tensor.empty() ? nullptr : tensor.data(); };
-  const GradientView grad{asked(g.colour), asked(g.alpha), asked(g.tint),         asked(g.silhouette),
-                          asked(g.normal), asked(g.depth), asked(g.median_depth), asked(g.distortion)};
+  const GradientView grad{asked(g.colour),     asked(g.alpha),        asked(g.tint),
+                          asked(g.silhouette), asked(g.roughness),    asked(g.normal),
+                          asked(g.depth),      asked(g.median_depth), asked(g.distortion)};
   if (!g.median_depth.empty() || !g.distortion.empty()) {
     unblend<Asked::all>(options, saved, grad);
   } else if (!g.normal.empty() || !g.depth.empty()) {

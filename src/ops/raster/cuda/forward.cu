@@ -11,7 +11,7 @@ static_assert(forward_batch <= pixels_per_tile);
 
 struct OutputView {
   float *colour, *alpha, *tint, *normal, *depth, *median_depth, *distortion;
-  float* silhouette;  // null where nobody asks
+  float *silhouette, *roughness;  // null where nobody asks
 };
 struct LeftPixels {
   float *transmittance, *alpha, *depth, *m, *m2, *inverse_z;
@@ -45,7 +45,8 @@ class Blend {
     alpha_ += weight;
     colour_ += weight * load3<float>(s.colour);
     tint_ += weight * s.tint;
-    silhouette_ += weight * s.carried;
+    silhouette_ += weight * s.carried();
+    roughness_ += weight * s.roughness();
     normal_ += weight * load3<float>(s.normal);
     depth_ += weight * z;
     transmittance_ -= weight;
@@ -65,6 +66,7 @@ class Blend {
     out.alpha[i] = alpha_;
     out.tint[i] = tint_;
     if (out.silhouette != nullptr) out.silhouette[i] = silhouette_;
+    if (out.roughness != nullptr) out.roughness[i] = roughness_;
     out.depth[i] = depth;
     out.median_depth[i] = has_median ? median_depth_ : 0.0F;
     out.distortion[i] = higher(alpha_ * m2 - m * m, 0.0F);
@@ -79,7 +81,8 @@ class Blend {
   }
 
  private:
-  float transmittance_ = 1, alpha_ = 0, tint_ = 0, silhouette_ = 0, depth_ = 0, m_ = 0, m2_ = 0;
+  float transmittance_ = 1, alpha_ = 0, tint_ = 0, silhouette_ = 0, roughness_ = 0, depth_ = 0, m_ = 0,
+        m2_ = 0;
   float first_inverse_z_ = 0, median_depth_ = 0;
   Vec3<float> colour_{0.0F}, normal_{0.0F};
   int last_ = -1, median_ = -1;
@@ -161,12 +164,17 @@ void blend(const Options& options, Output& output, Saved& saved) {
     tensor.place(Device::cuda).resize(shape);
     return tensor.data();
   };
-  const OutputView out{
-      resized(output.colour, vectors),   resized(output.alpha, plane),
-      resized(output.tint, plane),       resized(output.normal, vectors),
-      resized(output.depth, plane),      resized(output.median_depth, plane),
-      resized(output.distortion, plane), saved.has_silhouette ? resized(output.silhouette, plane) : nullptr};
+  const OutputView out{resized(output.colour, vectors),
+                       resized(output.alpha, plane),
+                       resized(output.tint, plane),
+                       resized(output.normal, vectors),
+                       resized(output.depth, plane),
+                       resized(output.median_depth, plane),
+                       resized(output.distortion, plane),
+                       saved.has_silhouette ? resized(output.silhouette, plane) : nullptr,
+                       saved.has_roughness ? resized(output.roughness, plane) : nullptr};
   if (!saved.has_silhouette) resized(output.silhouette, Shape{0});
+  if (!saved.has_roughness) resized(output.roughness, Shape{0});
   Saved::Pixels& p = saved.pixels;
   const LeftPixels left{resized(p.transmittance, plane),
                         resized(p.alpha, plane),
