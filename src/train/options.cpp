@@ -32,6 +32,7 @@ TrainOptions cpu_preset() {
   o.initial.opacity = 0.7F;
   o.initial.tint = 0.1F;
   o.initial.tint_in_mask = 0.9F;
+  o.initial.roughness = 0.1F;
   o.initial.environment_sh_degree = 1;
   o.initial.environment_cells = 10;
   o.initial.environment_points = 6000;

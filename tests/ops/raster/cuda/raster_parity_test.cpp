@@ -151,15 +151,15 @@ TEST_P(RasterOnDevice, AgreesWithTheCpu) {
   o.count = 150;
   o.scale_min = 0.03;
   o.scale_max = 0.4;
-  expect_same_gradients(scene_of(1, 45, 37, o), options(), 0xff);
+  expect_same_gradients(scene_of(1, 45, 37, o), options(), 0x1ff);
 }
 
 TEST_P(RasterOnDevice, AgreesWithTheCpuForFewerOutputs) {
   SceneOptions o;
   o.count = 60;
   o.sh_degree = 1;
-  expect_same_gradients(scene_of(2, 33, 20, o), options(), 0x07);  // colour, alpha, tint
-  expect_same_gradients(scene_of(3, 33, 20, o), options(), 0x1f);  // and normal and depth
+  expect_same_gradients(scene_of(2, 33, 20, o), options(), 0x107);  // colour, alpha, tint, roughness
+  expect_same_gradients(scene_of(3, 33, 20, o), options(), 0x11f);  // and normal and depth
 }
 
 TEST_P(RasterOnDevice, AgreesWithTheCpuWhereSurfelsReachBehindTheCamera) {
@@ -168,7 +168,7 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuWhereSurfelsReachBehindTheCamera) {
   o.depth_min = -1;
   o.depth_max = 3;
   o.scale_max = 1.5;
-  expect_same_gradients(scene_of(4, 40, 30, o), options(), 0xff);
+  expect_same_gradients(scene_of(4, 40, 30, o), options(), 0x1ff);
 }
 
 TEST_P(RasterOnDevice, AgreesWithTheCpuWhereTheLowPassIsWide) {
@@ -178,7 +178,7 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuWhereTheLowPassIsWide) {
   o.scale_max = 0.2;
   Options blurred = options();
   blurred.low_pass = 2.5F;
-  expect_same_gradients(scene_of(11, 45, 37, o), blurred, 0xff);
+  expect_same_gradients(scene_of(11, 45, 37, o), blurred, 0x1ff);
 }
 
 // More surfels in a tile than a batch holds, and pixels that end before the list does.
@@ -190,13 +190,13 @@ TEST_P(RasterOnDevice, AgreesWithTheCpuInLongLists) {
   o.opacity_min = 0.02;
   o.opacity_max = 0.95;
   o.spread = 0.2;
-  expect_same_gradients(scene_of(5, 20, 18, o), options(), 0xff);
+  expect_same_gradients(scene_of(5, 20, 18, o), options(), 0x1ff);
 }
 
 // Surfels of one tile and of all of them in the same warp, in more than one warp, of which the last is not
 // full.
 TEST_P(RasterOnDevice, AgreesWithTheCpuForSurfelsOfManySizes) {
-  expect_same_gradients(convert_scene<float>(scene_of_sizes(10, 48)), options(), 0xff);
+  expect_same_gradients(convert_scene<float>(scene_of_sizes(10, 48)), options(), 0x1ff);
 }
 
 TEST_P(RasterOnDevice, HostileSurfelsAreNotDrawn) {
@@ -215,7 +215,7 @@ TEST_P(RasterOnDevice, HostileSurfelsAreNotDrawn) {
   s.opacity[30] = 0;
   s.sh.row(35)[1] = nan;
   s.tint[40] = infinity;
-  expect_same_gradients(scene, options(), 0xff);
+  expect_same_gradients(scene, options(), 0x1ff);
 }
 
 TEST_P(RasterOnDevice, NothingIsTheBackground) {
