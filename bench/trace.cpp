@@ -145,10 +145,18 @@ BENCHMARK_CAPTURE(against_embree, opaque, opaque, 0.0)->Unit(benchmark::kMillise
 
 #endif
 
-void forward(benchmark::State& state, const Setting& setting, double unevenness) {
+// Rays, or cones of that width.
+Rays reflect_cones(double unevenness, float width) {
+  Rays rays = reflect_off_ball(256, unevenness);
+  if (width > 0) rays.widths = Tensor<float>({rays.count()});
+  for (float& w : rays.widths.values()) w = width;
+  return rays;
+}
+
+void forward(benchmark::State& state, const Setting& setting, double unevenness, float width = 0) {
   set_threads(1);
   const PosedSurfels surfels = make_shell(setting);
-  const Rays rays = reflect_off_ball(256, unevenness);
+  const Rays rays = reflect_cones(unevenness, width);
   trace::Options options;
   options.hits_per_pass = static_cast<int>(state.range(0));
   const trace::BvhPtr bvh = trace::make_bvh();
@@ -166,6 +174,8 @@ BENCHMARK_CAPTURE(forward, faint, faint, 0.0)
     ->Arg(16)
     ->Arg(64);
 BENCHMARK_CAPTURE(forward, faint_uneven, faint, 0.2)->Unit(benchmark::kMillisecond)->Arg(16);
+BENCHMARK_CAPTURE(forward, narrow_cones, opaque, 0.0, 0.02F)->Unit(benchmark::kMillisecond)->Arg(64);
+BENCHMARK_CAPTURE(forward, wide_cones, opaque, 0.0, 0.1F)->Unit(benchmark::kMillisecond)->Arg(64);
 BENCHMARK_CAPTURE(forward, opaque, opaque, 0.0)
     ->Unit(benchmark::kMillisecond)
     ->Arg(4)
@@ -173,10 +183,10 @@ BENCHMARK_CAPTURE(forward, opaque, opaque, 0.0)
     ->Arg(16)
     ->Arg(64);
 
-void backward(benchmark::State& state, const Setting& setting, double unevenness) {
+void backward(benchmark::State& state, const Setting& setting, double unevenness, float width = 0) {
   set_threads(1);
   const PosedSurfels surfels = make_shell(setting);
-  const Rays rays = reflect_off_ball(256, unevenness);
+  const Rays rays = reflect_cones(unevenness, width);
   const trace::Options options;
   const trace::BvhPtr bvh = trace::make_bvh();
   const trace::SavedPtr saved = trace::make_saved();
@@ -192,6 +202,8 @@ void backward(benchmark::State& state, const Setting& setting, double unevenness
 }
 BENCHMARK_CAPTURE(backward, faint, faint, 0.0)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(backward, faint_uneven, faint, 0.2)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(backward, narrow_cones, opaque, 0.0, 0.02F)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(backward, wide_cones, opaque, 0.0, 0.1F)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(backward, opaque, opaque, 0.0)->Unit(benchmark::kMillisecond);
 
 void build(benchmark::State& state) {
@@ -234,7 +246,7 @@ class OnDevice {
   bench::Floor backward_floor() const {
     return {bench::bytes(surfels_) + bench::bytes(gradient_.surfels) +
                 bench::bytes(rays_.origins, rays_.directions, grad_.colour, grad_.alpha, grad_.distance) +
-                bench::bytes(gradient_.origins, gradient_.directions, gradient_.position_gradient),
+                bench::bytes(gradient_.rays.origins, gradient_.rays.directions, gradient_.position_gradient),
             400 * hits()};
   }
 

@@ -82,7 +82,8 @@ MalformedKind malformed_arrays() {
        {"another kind of file", trace, put(rays, "ply\n"),
         "rays.npy: found a file that does not start as one, expected a .npy array; save the array again"},
        {"rays of three numbers", trace, put(rays, npy("'<f4'", "(2, 3)", 24)),
-        "rays.npy: shape: found 2x3, expected Nx6: origin and direction of each ray; or Nx7: the width of its cone too"},
+        "rays.npy: shape: found 2x3, expected Nx6: origin and direction of each ray; or Nx7: the width of "
+        "its cone too"},
        {"points in the plane", inspect_capture, put(points, npy("'<f4'", "(3, 2)", 24)),
         "capture/points.npy: shape: found 3x2, expected P×3"},
        {"priors for another number of views", inspect_capture,

@@ -66,7 +66,8 @@ HWY_INLINE DiskHit meet_disk(const RayVec& ray, const DiskRules& rules, Vec far,
   const Vec u = dot(load(leaf.u[0]), load(leaf.u[1]), load(leaf.u[2]), x, y, z);
   const Vec v = dot(load(leaf.v[0]), load(leaf.v[1]), load(leaf.v[2]), x, y, z);
   const Vec half = hn::Set(d, 0.5F);
-  Vec radius2, exponent = load(leaf.log_opacity);
+  const Vec least = hn::Set(d, rules.log_alpha_min);
+  Vec radius2 = hn::MulAdd(u, u, hn::Mul(v, v)), grown = hn::Set(d, 1.0F);
   if (rules.has_cones) {
     const Vec ux = load(leaf.u[0]), uy = load(leaf.u[1]), uz = load(leaf.u[2]);
     const Vec vx = load(leaf.v[0]), vy = load(leaf.v[1]), vz = load(leaf.v[2]);
@@ -75,13 +76,15 @@ HWY_INLINE DiskHit meet_disk(const RayVec& ray, const DiskRules& rules, Vec far,
     const Vec grown_u = hn::MulAdd(spread2, dot(ux, uy, uz, ux, uy, uz), one);
     const Vec grown_v = hn::MulAdd(spread2, dot(vx, vy, vz, vx, vy, vz), one);
     radius2 = hn::Add(hn::Div(hn::Mul(u, u), grown_u), hn::Div(hn::Mul(v, v), grown_v));
-    exponent = hn::NegMulAdd(half, hn::Log(d, hn::Mul(grown_u, grown_v)), exponent);
-  } else {
-    radius2 = hn::MulAdd(u, u, hn::Mul(v, v));
+    grown = hn::Mul(grown_u, grown_v);
   }
-  exponent = hn::NegMulAdd(radius2, half, exponent);
-  const auto mask = hn::And(hn::Ge(exponent, hn::Set(d, rules.log_alpha_min)),
-                            hn::And(hn::Ge(t, hn::Set(d, rules.near)), hn::Le(t, far)));
+  Vec exponent = hn::NegMulAdd(radius2, half, load(leaf.log_opacity));
+  auto mask = hn::And(hn::Ge(exponent, least), hn::And(hn::Ge(t, hn::Set(d, rules.near)), hn::Le(t, far)));
+  // The peak is lower. Most disks are out of the question before it is known by how much.
+  if (rules.has_cones && !hn::AllFalse(d, mask)) {
+    exponent = hn::NegMulAdd(half, hn::Log(d, grown), exponent);
+    mask = hn::And(mask, hn::Ge(exponent, least));
+  }
   return {t, exponent, mask};
 }
 

@@ -27,14 +27,14 @@ struct PacketHits {
   std::vector<uint32_t> candidates;  // surfels
 };
 
-// A sphere around each disk against the beam: bit k if a ray may come within the radius of disk k.
+// A sphere around each disk against the beam: bit k if a ray or a cone may come within the radius of disk k.
 HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
   const Tag d;
   const Vec dx = hn::Set(d, beam.direction.x), dy = hn::Set(d, beam.direction.y),
             dz = hn::Set(d, beam.direction.z);
   const Vec inverse_length2 = hn::Set(d, 1 / glm::dot(beam.direction, beam.direction));
   const Vec start = hn::Set(d, glm::length(beam.origin_radius)),
-            spread = hn::Set(d, glm::length(beam.direction_radius));
+            spread = hn::Set(d, glm::length(beam.direction_radius) + beam.slope);
   uint32_t bits = 0;
   for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
     const Vec qx = hn::Sub(hn::Load(d, leaf.position[0] + i), hn::Set(d, beam.origin.x));
@@ -75,13 +75,18 @@ class PacketWalk {
       }
       width_[lane] = ray.width;
       slope_[lane] = rules.cone_deviations * ray.width;
+      for (int axis = 0; axis < 3; ++axis) {
+        const float speed = std::abs(ray.direction[axis]);
+        near_reciprocal_[axis][lane] = 1 / std::max(speed + slope_[lane], 1e-10F);
+        far_reciprocal_[axis][lane] = 1 / std::max(speed - slope_[lane], 1e-10F);
+      }
       far_[lane] = lane < count ? farthest_distance : -1.0F;
       transmittance_[lane] = 1;
       hits.rays[lane].count = 0;
       cut_at_[lane] = 0;
     }
     hits.candidates.clear();
-    beam_.widen(*std::max_element(slope_, slope_ + packet_rays));
+    beam_.slope = *std::max_element(slope_, slope_ + packet_rays);
   }
 
   // All hits of each ray up to where it ends for certain, in order.
@@ -128,20 +133,19 @@ class PacketWalk {
   // until the slower one leaves, where that goes the same way.
   HWY_INLINE uint32_t meet_cones(const BvhLeaf& leaf) const {
     const Tag d;
-    const Vec slope = hn::Load(d, slope_), least = hn::Set(d, 1e-10F);
+    const Vec slope = hn::Load(d, slope_);
     Vec enter = hn::Zero(d), leave = hn::Load(d, far_);
     for (int axis = 0; axis < 3; ++axis) {
       const Vec origin = hn::Load(d, origin_[axis]), direction = hn::Load(d, direction_[axis]);
-      const Vec speed = hn::Abs(direction);
       const Vec low = hn::Sub(hn::Set(d, leaf.lower[axis]), origin);
       const Vec high = hn::Sub(hn::Set(d, leaf.upper[axis]), origin);
       const auto backwards = hn::Lt(direction, hn::Zero(d));
       const Vec first = hn::IfThenElse(backwards, hn::Neg(high), low);
       const Vec last = hn::IfThenElse(backwards, hn::Neg(low), high);
-      const auto open = hn::Le(speed, slope);
-      enter = hn::Max(enter, hn::Div(first, hn::Max(hn::Add(speed, slope), least)));
-      leave =
-          hn::IfThenElse(open, leave, hn::Min(leave, hn::Div(last, hn::Max(hn::Sub(speed, slope), least))));
+      const auto open = hn::Le(hn::Abs(direction), slope);
+      enter = hn::Max(enter, hn::Mul(first, hn::Load(d, near_reciprocal_[axis])));
+      const Vec out = hn::Mul(last, hn::Load(d, far_reciprocal_[axis]));
+      leave = hn::IfThenElse(open, leave, hn::Min(leave, out));
     }
     return mask_bits(hn::Le(enter, hn::Mul(leave, hn::Set(d, 1.000001F))));
   }
@@ -273,6 +277,8 @@ class PacketWalk {
   HWY_ALIGN float origin_[3][packet_rays];
   HWY_ALIGN float direction_[3][packet_rays];
   HWY_ALIGN float reciprocal_[3][packet_rays];
+  HWY_ALIGN float near_reciprocal_[3][packet_rays];  // of the cones' sides
+  HWY_ALIGN float far_reciprocal_[3][packet_rays];
   HWY_ALIGN float width_[packet_rays];
   HWY_ALIGN float slope_[packet_rays];  // of the cone's side: beyond it no hit counts
   HWY_ALIGN float far_[packet_rays];

@@ -34,10 +34,11 @@ HWY_INLINE uint32_t mask_bits(hn::Mask<Tag> mask) {
 HWY_INLINE float safe_reciprocal(float d) { return std::copysign(1.0F, d) / std::max(std::abs(d), 1e-10F); }
 
 // Rays that at distance t lie within origin_radius + t · direction_radius of origin + t · direction, axis by
-// axis.
+// axis, and cones about them, as far as t · slope from their rays to all sides.
 struct Beam {
   Vec3<float> origin{0}, direction{0};
   Vec3<float> origin_radius{0}, direction_radius{0};
+  float slope = 0;
 
   Beam(const UnitRay* rays, size_t count) {
     Vec3<float> low_origin = rays[0].origin, high_origin = low_origin;
@@ -55,10 +56,6 @@ struct Beam {
     origin_radius = (high_origin - origin) + Vec3<float>(2e-6F * std::max({reach.x, reach.y, reach.z}));
     direction_radius = count > 1 ? high_direction - direction + Vec3<float>(1e-6F) : Vec3<float>(0);
   }
-  // By cones about the rays, as far as so much from them at distance 1.
-  void widen(float slope) {
-    if (slope > 0) direction_radius += Vec3<float>(slope);
-  }
   float radius(float distance) const {
     return glm::length(origin_radius) + distance * glm::length(direction_radius);
   }
@@ -75,7 +72,7 @@ struct BoxBeam {
 
   explicit BoxBeam(const Beam& beam) {
     for (int axis = 0; axis < 3; ++axis) {
-      const float d = beam.direction[axis], spread = beam.direction_radius[axis];
+      const float d = beam.direction[axis], spread = beam.direction_radius[axis] + beam.slope;
       const float sign = std::signbit(d) ? -1.0F : 1.0F;
       backwards[axis] = sign < 0;
       open[axis] = std::abs(d) <= spread;
