@@ -26,4 +26,22 @@ TRACEFLOW_HD T logit(T y) {
   return std::log(y) - std::log1p(-y);
 }
 
+// A roughness is at most so much. Cones much wider than that show next to nothing that harmonics do not, and
+// cost the tracer dearly.
+inline constexpr double largest_roughness = 0.25;
+
+// largest_roughness · σ(x), its derivative from the value, and its inverse for y in (0, largest_roughness).
+template <class T>
+TRACEFLOW_HD T roughness_of(T x) {
+  return T(largest_roughness) * sigmoid(x);
+}
+template <class T>
+TRACEFLOW_HD T roughness_derivative(T y) {
+  return y * (T(1) - y / T(largest_roughness));
+}
+template <class T>
+TRACEFLOW_HD T roughness_logit(T y) {
+  return logit(y / T(largest_roughness));
+}
+
 }  // namespace traceflow

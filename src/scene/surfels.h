@@ -81,7 +81,7 @@ struct BasicPosedSurfels {
   Tensor<T> tint;      // M, in (0, 1); empty for the environment
   Tensor<T> carried;   // M, 1 where a body carries the surfel, else 0; empty where no silhouette is drawn.
                        // Has no gradient
-  // M, in (0, 1): standard deviation of the directions that a surfel mirrors one into, as a tangent (method
+  // M, in (0, ¼): standard deviation of the directions that a surfel mirrors one into, as a tangent (method
   // §4.5); empty where all are 0.
   Tensor<T> roughness{};
 

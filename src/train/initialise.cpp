@@ -165,7 +165,7 @@ Surfels surfels_at_points(const Tensor<float>& points, const InitialOptions& opt
   s.tint_logit.fill(logit(options.tint));
   if (options.roughness > 0) {
     s.roughness_logit.reset({s.count()});
-    s.roughness_logit.fill(logit(options.roughness));
+    s.roughness_logit.fill(roughness_logit(options.roughness));
   }
   return s;
 }

@@ -1,5 +1,7 @@
 #include "train/options.h"
 
+#include "math/activation.h"
+
 namespace traceflow {
 
 namespace {
@@ -32,7 +34,6 @@ TrainOptions cpu_preset() {
   o.initial.opacity = 0.7F;
   o.initial.tint = 0.1F;
   o.initial.tint_in_mask = 0.9F;
-  o.initial.roughness = 0.1F;
   o.initial.environment_sh_degree = 1;
   o.initial.environment_cells = 10;
   o.initial.environment_points = 6000;
@@ -230,7 +231,8 @@ void InitialOptions::validate() const {
     check_option(value > 0 && value < 1, name, value, "between 0 and 1");
   }
   check_option(tint_in_mask >= 0 && tint_in_mask < 1, "initial.tint_in_mask", tint_in_mask, "0 to under 1");
-  check_option(roughness >= 0 && roughness < 1, "initial.roughness", roughness, "0 to under 1");
+  check_option(roughness >= 0 && roughness < static_cast<float>(largest_roughness), "initial.roughness",
+               roughness, "0 to under 0.25");
   check_option(environment_cells >= 1 && environment_cells <= 128, "initial.environment_cells",
                environment_cells, "1 to 128");
   check_option(environment_per_cell >= 1, "initial.environment_per_cell", environment_per_cell, "1 or more");

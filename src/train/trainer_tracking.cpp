@@ -222,7 +222,7 @@ Surfels Trainer::new_surface(int64_t key) const {
   Motion motion = scene_.main_motion->on(Device::cpu);
   Surfels made = make_tracker().new_surface(scene_.main.on(Device::cpu), motion, key, scene_.extent, tint,
                                             memory_.caps.main - scene_.main.count());
-  if (made.has_roughness()) made.roughness_logit.fill(logit(initial.roughness));
+  if (made.has_roughness()) made.roughness_logit.fill(roughness_logit(initial.roughness));
   return made;
 }
 

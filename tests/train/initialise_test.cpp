@@ -74,7 +74,7 @@ TEST(Initialise, OnlyWhatMirrorsHasARoughness) {
   const Scene scene = initial_scene(load_capture(capture_folder(), {}), options, random).scene;
   ASSERT_EQ(scene.main.roughness_logit.size(), scene.main.count());
   for (const float logit : scene.main.roughness_logit.values())
-    EXPECT_NEAR(1 / (1 + std::exp(-logit)), 0.2F, 1e-6F);
+    EXPECT_NEAR(0.25F / (1 + std::exp(-logit)), 0.2F, 1e-6F);
   ASSERT_GT(scene.environment.count(), 0);
   EXPECT_FALSE(scene.environment.has_roughness());
 }

@@ -52,6 +52,7 @@ inline std::unique_ptr<Trainer> followed(SynthOptions capture, int iterations, c
 inline TrainOptions small_run(int iterations) {
   TrainOptions o = preset("demo");
   o.deform.kind = "network";
+  o.initial.roughness = 0.05F;
   o.iterations = iterations;
   o.schedule.length = 40;
   o.schedule.deform_from = 4;

@@ -65,6 +65,18 @@ TEST(Trainer, PhasesAndDensityControlAreToldAndTheCapsHold) {
   EXPECT_LE(largest_environment, 260);
 }
 
+TEST(Trainer, RoughnessTrainsWithTheTint) {
+  Trainer trainer = make_trainer(small_run(20), "roughness");
+  const auto range = [&] {
+    const auto [low, high] = std::ranges::minmax(trainer.scene().main.roughness_logit.values());
+    return high - low;
+  };
+  while (trainer.iteration() < 10) trainer.step();
+  EXPECT_EQ(range(), 0) << "nothing is mirrored in the diffuse phase";
+  while (trainer.iteration() < 14) trainer.step();
+  EXPECT_GT(range(), 0.01F);
+}
+
 // Steps are measured without turning the profile on for anybody else, and every iteration is in one account.
 TEST(Trainer, TellsWhereTheTimeWentPhaseByPhase) {
   for (const bool profiled : {false, true}) {

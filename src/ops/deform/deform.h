@@ -6,7 +6,7 @@
 // Stored surfels → surfels at time t (method §1.2, §1.3): residuals add to the stored values, then
 // activations.
 //   position p + Δp · rotation q + Δr (not normalised here) · scale exp(log s + Δs) · opacity σ(o + Δo) ·
-//   tint σ(τ + Δτ), roughness σ(r)
+//   tint σ(τ + Δτ), roughness σ(r) / 4
 // Where there are bodies (scene/motion.h) the field moves what Surfels::body says; other residuals are zero.
 // Differentiable: every stored value and the field's parameters. The position enters the field detached. Runs
 // where the stored surfels are; the field is there too.

@@ -194,7 +194,8 @@ struct Pose {
     if (posed.tint != nullptr) {
       posed.tint[i] = sigmoid(finite.see(stored.tint_logit[from] + r[residual::tint]));
     }
-    if (posed.roughness != nullptr) posed.roughness[i] = sigmoid(finite.see(stored.roughness_logit[from]));
+    if (posed.roughness != nullptr)
+      posed.roughness[i] = roughness_of(finite.see(stored.roughness_logit[from]));
     return finite.holds() && extended;
   }
   // What stands in the place of a surfel that cannot be used: finite everywhere and invisible.
@@ -282,7 +283,7 @@ struct PoseBackward {
     // No field moves it.
     if (posed.roughness != nullptr) {
       add_to_grad_stored.stored.roughness_logit[rows.at(i)] +=
-          grad_posed.roughness[i] * sigmoid_derivative(posed.roughness[i]);
+          grad_posed.roughness[i] * roughness_derivative(posed.roughness[i]);
     }
     grad_residuals.store(i, grad);
   }

@@ -89,7 +89,7 @@ void forward_reference(const BasicSurfels<double>& stored, const BasicField<doub
     for (int k = 0; k < 2; ++k) posed.scale(i, k) = std::exp(m.log_scale[k]);
     posed.opacity[i] = sigmoid(m.opacity_logit);
     if (stored.has_tint()) posed.tint[i] = sigmoid(m.tint_logit);
-    if (stored.has_roughness()) posed.roughness[i] = sigmoid(m.roughness_logit);
+    if (stored.has_roughness()) posed.roughness[i] = largest_roughness * sigmoid(m.roughness_logit);
     for (int64_t k = 0; k < 3 * coefficients; ++k) posed.sh.row(i)[k] = stored.sh.row(i)[k];
   }
 }
@@ -121,7 +121,7 @@ void backward_reference(const BasicSurfels<double>& stored, const BasicField<dou
     if (stored.has_tint()) grad_stored.tint_logit[i] += grad[residual::tint];
     if (stored.has_roughness()) {
       grad_stored.roughness_logit[i] +=
-          grad_posed.roughness[i] * sigmoid_derivative(sigmoid(m.roughness_logit));
+          grad_posed.roughness[i] * largest_roughness * sigmoid_derivative(sigmoid(m.roughness_logit));
     }
     for (int64_t k = 0; k < sh_values; ++k) grad_stored.sh.row(i)[k] += grad_posed.sh.row(i)[k];
     for (int64_t k = 0; field_moves(stored, i) && k < grad_residuals.row_size() && k < residual::main_outputs;
