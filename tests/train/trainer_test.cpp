@@ -66,7 +66,7 @@ TEST(Trainer, PhasesAndDensityControlAreToldAndTheCapsHold) {
 }
 
 TEST(Trainer, RoughnessTrainsWithTheTint) {
-  Trainer trainer = make_trainer(small_run(20), "roughness");
+  Trainer trainer = make_trainer(small_run(40), "roughness");
   const auto range = [&] {
     const auto [low, high] = std::ranges::minmax(trainer.scene().main.roughness_logit.values());
     return high - low;
