@@ -114,7 +114,7 @@ void normal_prior_on_device(benchmark::State& state) {
   if (bench::no_device(state)) return;
   measure_on_device(state, 3, floor_of(4, 10),
                     [](const auto& normal, const auto& prior, auto& gradient, auto&, const auto& slot) {
-                      loss::normal_prior(normal, prior, 0.05, gradient, slot);
+                      loss::normal_prior(normal, prior, {}, 1, 0.05, gradient, slot);
                     });
 }
 
