@@ -73,6 +73,12 @@ struct UnitRay {
   float width = 0;   // of its cone, at distance 1
 };
 
+// How many standard deviations from its middle the faintest hit that counts can lie; beyond so many widths of
+// a cone none does. A little more, for rounding.
+inline float cone_deviations(const Options& o) {
+  return 1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)));
+}
+
 // Addresses of rays, on any device. widths: null where all are 0.
 struct RayView {
   const float *origins = nullptr, *directions = nullptr, *widths = nullptr;

@@ -24,16 +24,16 @@ struct DiskRules {
   BlendRules<float> blend;
   float log_alpha_min;
   float near;
-  bool has_cones;         // whether rays may have widths
-  float cone_deviations;  // as many as a Gaussian has from its middle to where the faintest hit is cut off
-  size_t hits_per_look;   // hits gathered before it is asked whether a ray has ended
+  bool has_cones;        // whether rays may have widths
+  float deviations;      // cone_deviations()
+  size_t hits_per_look;  // hits gathered before it is asked whether a ray has ended
 
   DiskRules(const Options& o, bool cones)
       : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
         log_alpha_min(std::log(o.alpha_min)),
         near(o.t_min),
         has_cones(cones),
-        cone_deviations(1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)))),
+        deviations(cone_deviations(o)),
         hits_per_look(static_cast<size_t>(o.hits_per_pass)) {}
 };
 

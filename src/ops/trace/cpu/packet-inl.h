@@ -74,7 +74,7 @@ class PacketWalk {
         reciprocal_[axis][lane] = safe_reciprocal(ray.direction[axis]);
       }
       width_[lane] = ray.width;
-      slope_[lane] = rules.cone_deviations * ray.width;
+      slope_[lane] = rules.deviations * ray.width;
       for (int axis = 0; axis < 3; ++axis) {
         const float speed = std::abs(ray.direction[axis]);
         near_reciprocal_[axis][lane] = 1 / std::max(speed + slope_[lane], 1e-10F);

@@ -47,7 +47,7 @@ HWY_INLINE void find_hits(const Bvh& bvh, const UnitRay& ray, const DiskRules& r
   float transmittance = 1;
   size_t looked = 0;
   Beam beam(&ray, 1);
-  beam.slope = rules.cone_deviations * ray.width;
+  beam.slope = rules.deviations * ray.width;
   walk_tree(bvh, BoxBeam(beam), far, [&](const BvhLeaf& leaf) HWY_ATTR {
     meet_leaf(leaf, ray, rules, far, hits);
     if (hits.count - looked < rules.hits_per_look) return;

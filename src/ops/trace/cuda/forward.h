@@ -33,14 +33,14 @@ struct WalkRules {
   BlendRules<float> blend;
   float log_alpha_min;
   float t_min;
-  float cone_deviations;  // as many as a Gaussian has from its middle to where the faintest hit is cut off
+  float deviations;  // cone_deviations()
 
   WalkRules() = default;
   explicit WalkRules(const Options& o)
       : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
         log_alpha_min(std::log(o.alpha_min)),
         t_min(o.t_min),
-        cone_deviations(1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)))) {}
+        deviations(cone_deviations(o)) {}
 };
 
 // Rays [first, last) in the tracer's order, and what is traced. `nodes` is null where there is nothing.

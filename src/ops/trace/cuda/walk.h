@@ -190,7 +190,7 @@ class WalkStack {
 // Meets all disks of the tree that can have a hit for `hits`, none of which is before `near`; near boxes
 // first.
 __device__ inline void walk(const RayInput& input, const UnitRay& ray, float near, HeldHits& hits) {
-  const BoxRay box_ray(ray, input.rules.cone_deviations * ray.width);
+  const BoxRay box_ray(ray, input.rules.deviations * ray.width);
   WalkStack stack;
   for (uint32_t at = 0; at != no_child; at = stack.pop(hits.far())) {
     // Down to a disk. no_child has the disk's bit too.
