@@ -45,6 +45,7 @@ Edited edited(Device device) {
       random_tensor<float>({count, 3}, random, -1, 1),    random_tensor<float>({count, 2}, random, -7, 0),
       random_tensor<float>({count, 4}, random, -1, 1),    random_tensor<float>({count}, random, -4, 4),
       random_tensor<float>({count, 4, 3}, random, -1, 1), random_tensor<float>({count}, random, -1, 1)};
+  s.roughness_logit = random_tensor<float>({count}, random, -1, 1);
   Edited e;
   e.surfels = s.on(device);
   e.moments.reset_like(e.surfels);
