@@ -487,6 +487,9 @@ int64_t Tracker::part_bodies(Surfels& main, int64_t points, Motion& motion, int6
       Refollowed apart =
           follow_again(parted, with_part(motion, body, parts[p], parted), key, motion.bodies(), extent);
       if (!(together - apart.cost > least_gain * apart.pixels)) continue;
+      // Poses that are solved again gain by that alone.
+      const double as_one = follow_again(main, motion, key, body, extent).cost;
+      if (!(as_one - apart.cost > least_gain * apart.pixels)) continue;
       // What lay behind the thing gains as much where nothing carries it.
       Surfels without = main;
       for (const int64_t row : parts[p]) without.body[row] = moved_by_field;
