@@ -13,6 +13,8 @@ void TracksOptions::validate() const {
 void RenderOptions::validate() const {
   check_option(depth_ratio >= 0 && depth_ratio <= 1, "render.depth_ratio", depth_ratio, "0 to 1");
   check_option(samples >= 1 && samples <= 4, "render.samples", samples, "1 to 4");
+  check_option(trace_alpha_min > 0 && trace_alpha_min < alpha_max, "render.trace_alpha_min", trace_alpha_min,
+               "more than 0 and less than render.alpha_max");
   select.validate();
   tracks.validate();
   raster_options(1).validate();
@@ -35,7 +37,7 @@ raster::Options RenderOptions::raster_options(float extent) const {
 trace::Options RenderOptions::trace_options(float extent) const {
   trace::Options options;
   options.t_min = trace_from * extent;
-  options.alpha_min = alpha_min;
+  options.alpha_min = trace_alpha_min;
   options.alpha_max = alpha_max;
   options.transmittance_min = transmittance_min;
   options.hits_per_pass = hits_per_pass;

@@ -31,6 +31,7 @@ struct RenderOptions {
   float transmittance_min = 1e-4F;
   float depth_ratio = 0;
   float trace_from = 1e-3F;
+  float trace_alpha_min = 1.0F / 255;
   int hits_per_pass = 64;
   Vec3<float> background{0};
   Vec3<float> specular_background{0};
@@ -53,6 +54,8 @@ struct RenderOptions {
             "Surface depth from expected (0) to median (1) depth (method §4.1).");
     v.field("trace_from", trace_from, "extents",
             "Reflected hits nearer than this are ignored (method §5.2).");
+    v.field("trace_alpha_min", trace_alpha_min, "",
+            "Opacity under which a reflected hit is skipped (method §5.1).");
     v.field("hits_per_pass", hits_per_pass, "hits",
             "Hits held at a time by the tracer; changes speed, not the image.");
     v.field("background", background, "", "Colour behind the main surfels (method §3.5).");

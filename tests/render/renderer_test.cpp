@@ -415,6 +415,29 @@ TEST(Renderer, ARayMayGoOnForAsLongAsNumbersReach) {
   }
 }
 
+// What is drawn keeps its own threshold.
+TEST(Renderer, FaintReflectedHitsAreSkippedByTheirOwnThreshold) {
+  Fixture f;
+  RenderOptions options;
+  const Frame all = Renderer(options).forward(f.scene, f.request);
+  options.trace_alpha_min = 0.1F;
+  options.validate();
+  const Frame fewer = Renderer(options).forward(f.scene, f.request);
+  expect_equal(all.raster.colour, fewer.raster.colour, "diffuse");
+  const Tensor<float>&before = all.mirrored.alpha, &after = fewer.mirrored.alpha;
+  ASSERT_EQ(before.size(), after.size());
+  int64_t less = 0;
+  for (int64_t i = 0; i < before.size(); ++i) {
+    EXPECT_LE(after[i], before[i] + options.transmittance_min);
+    less += after[i] < before[i] - 0.01F ? 1 : 0;
+  }
+  EXPECT_GT(less, before.size() / 10);
+  for (const float refused : {0.0F, options.alpha_max, std::nanf("")}) {
+    options.trace_alpha_min = refused;
+    EXPECT_THROW(options.validate(), InputError);
+  }
+}
+
 TEST(Renderer, AnEmptyViewIsBackground) {
   Fixture f;
   f.request.camera.position = {0, 0, 50};
