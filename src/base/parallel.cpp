@@ -13,7 +13,7 @@ int chosen_threads = 0;
 
 void set_threads(int count) { chosen_threads = std::max(0, count); }
 
-int thread_count() { return chosen_threads > 0 ? chosen_threads : omp_get_num_procs(); }
+int thread_count() { return chosen_threads > 0 ? chosen_threads : omp_get_max_threads(); }
 
 #ifdef __SANITIZE_THREAD__
 

@@ -15,7 +15,7 @@
 
 namespace traceflow {
 
-// Number of threads that parallel loops use. 0 chooses the machine's cores.
+// Number of threads that parallel loops use. 0: OMP_NUM_THREADS, or else all cores.
 void set_threads(int count);
 int thread_count();
 // Whether the caller is inside a loop that several threads share.

@@ -39,7 +39,7 @@ void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
                    "Print every option of a training, with its value in each preset, and exit");
   program
       .add_option("--threads", arguments.threads,
-                  "Threads to use; 0 for all cores. The results do not depend on it")
+                  "Threads to use; 0 for OMP_NUM_THREADS or all cores. The results do not depend on it")
       ->check(CLI::Range(0, 4096))
       ->option_text("N");
   constexpr auto names = enum_names(Instructions{});
