@@ -363,9 +363,8 @@ struct InitialOptions {
     v.field(
         "roughness", roughness, "",
         "First roughness of mirrors: the standard deviation of the directions that one is mirrored into, as "
-        "a tangent; under 0.25. 0: all are perfect mirrors, as in the paper. An environment map takes no "
-        "notice "
-        "(method §4.5).");
+        "a tangent; under 0.25. 0: all are perfect mirrors, as in the paper. With "
+        "specular=environment-map it has no effect (method §4.5).");
     v.field("colours_from_views", colours_from_views, "",
             "First colours from photographs near time 0, else grey.");
     v.field("normals_from_points", normals_from_points, "",

@@ -73,8 +73,9 @@ struct UnitRay {
   float width = 0;   // of its cone, at distance 1
 };
 
-// How many standard deviations from its middle the faintest hit that counts can lie; beyond so many widths of
-// a cone none does. A little more, for rounding.
+// Standard deviations at which a Gaussian of opacity 1 falls to alpha_min, with a margin for rounding. A cone
+// can only hit a surfel that its axis passes within this many of the surfel's standard deviation plus its
+// own.
 inline float cone_deviations(const Options& o) {
   return 1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)));
 }

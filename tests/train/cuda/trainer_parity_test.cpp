@@ -192,7 +192,7 @@ TEST_F(TrainerOnDevice, AnIterationInItsStrideAsksForNoMemory) {
 }
 
 // Each costs the host a few microseconds, and what it reads stops the device. With the paper's depth of
-// networks and its losses, all of them at work.
+// networks and its losses, all of them at work, and with roughness.
 TEST_F(TrainerOnDevice, AnIterationIsFewKernelsAndFewerReads) {
   TrainOptions options = small_run(40);
   options.density.until = options.environment_density.until = 0;
