@@ -1,9 +1,12 @@
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "base/random.h"
 #include "capture/synth/synth.h"
 #include "cli/program_call.h"
 #include "cli/terminal/error_boundary.h"
@@ -76,6 +79,30 @@ TEST_F(InspectVerb, says_them_for_programs) {
   const Json paper = Json::parse(run_with({"inspect", "-d", capture(), "--json", "--quick"}).out);
   EXPECT_LT(small["memory"]["training_cpu_bytes"], report["memory"]["training_cpu_bytes"]);
   EXPECT_GT(paper["memory"]["training_cuda_bytes"], report["memory"]["training_cuda_bytes"]);
+}
+
+TEST_F(InspectVerb, tells_the_noise_all_over_and_in_masks) {
+  // Grey pictures with noise of 4 levels and, in the masks of their left half, of 12.
+  Random random(2);
+  Tensor<uint8_t> picture({24, 40, 3}), mask({24, 40});
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "capture/rgb/1x")) {
+    for (int64_t i = 0; i < mask.size(); ++i) {
+      mask[i] = i % 40 < 16 ? 255 : 0;
+      for (int64_t c = 0; c < 3; ++c)
+        picture[3 * i + c] = static_cast<uint8_t>(128.5 + (mask[i] != 0 ? 12 : 4) * random.normal());
+    }
+    write_png(entry.path(), picture);
+    const std::string name = entry.path().filename().string();
+    if (name != "000002_left.png") write_png(folder_ / "capture/mask/1x" / (name + ".png"), mask);
+  }
+  const Json noise = Json::parse(run_with({"inspect", "-d", capture(), "--json"}).out)["decoded"];
+  EXPECT_NEAR(255 * noise["masked_noise"].get<double>(), 12, 1.5);
+  EXPECT_GT(255 * noise["noise"].get<double>(), 4);
+  EXPECT_LT(255 * noise["noise"].get<double>(), 8);
+  const double decibels = -20 * std::log10(noise["masked_noise"].get<double>());
+  EXPECT_THAT(run_with({"inspect", "-d", capture()}).out,
+              AllOf(HasSubstr("\nnoise           up to "),
+                    HasSubstr(fmt::format(" dB, {:.1f} in the masks\n", decibels))));
 }
 
 TEST_F(InspectVerb, says_that_a_budget_does_not_even_hold_the_images) {

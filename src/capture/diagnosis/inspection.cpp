@@ -138,6 +138,12 @@ double mean(const std::vector<double>& values) {
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
 }
 
+double root_mean_square(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v * v;
+  return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+}
+
 Inspection::Pixels sum_up(const std::vector<ViewFacts>& facts) {
   const auto colours = values_of(facts, [](const ViewFacts& v) { return std::optional(v.mean_colour); });
   Inspection::Pixels pixels;
@@ -145,6 +151,8 @@ Inspection::Pixels sum_up(const std::vector<ViewFacts>& facts) {
   pixels.mean_colour = mean(colours);
   pixels.masked = mean(values_of(facts, [](const ViewFacts& v) { return v.masked; }));
   pixels.with_prior = mean(values_of(facts, [](const ViewFacts& v) { return v.with_prior; }));
+  pixels.noise = root_mean_square(values_of(facts, [](const ViewFacts& v) { return v.noise; }));
+  pixels.masked_noise = root_mean_square(values_of(facts, [](const ViewFacts& v) { return v.masked_noise; }));
   pixels.prior_angle = median(values_of(facts, [](const ViewFacts& v) { return v.prior_angle; }));
   return pixels;
 }

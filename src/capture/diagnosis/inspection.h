@@ -23,6 +23,8 @@ struct Inspection {
     double mean_colour = 0;  // in [0, 1]
     double masked = 0;
     double with_prior = 0;
+    // Standard deviations in 8-bit levels, root mean square over the views; 0: not known.
+    double noise = 0, masked_noise = 0;
     double prior_angle =
         0;  // degrees, median over the views, against planes through the points; 0: not known
   };

@@ -7,6 +7,7 @@
 #include "capture/decode.h"
 #include "capture/image_cache.h"
 #include "capture/lens/resample.h"
+#include "capture/noise.h"
 #include "capture/sharpness.h"
 #include "files/png.h"
 
@@ -40,9 +41,8 @@ Tensor<uint8_t> thumbnail_of(const Tensor<uint8_t>& grey) {
   return result;
 }
 
-void measure_colour(const ViewSource& source, ViewFacts& facts) {
+void measure_colour(const Tensor<uint8_t>& colour, ViewFacts& facts) {
   constexpr double least_contrast = 1;  // squares of 8-bit levels
-  const Tensor<uint8_t> colour = decode_colour(source).colour;
   int64_t sum = 0;
   for (const uint8_t v : colour.values()) sum += v;
   facts.mean_colour = static_cast<double>(sum) / 255 / static_cast<double>(colour.size());
@@ -79,10 +79,13 @@ void measure_prior(const Capture& capture, const Tensor<uint8_t>& mask, const Su
 
 void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& facts) {
   const ViewSource& source = capture.images->source(facts.view->id);
-  measure_colour(source, facts);
+  const Tensor<uint8_t> colour = decode_colour(source).colour;
   Tensor<uint8_t> mask;
+  measure_colour(colour, facts);
+  facts.noise = noise_deviation(colour, mask);
   if (source.mask) {
     mask = decode_mask(source).mask;
+    facts.masked_noise = noise_deviation(colour, mask);
     const auto on = std::count(mask.data(), mask.data() + mask.size(), uint8_t{1});
     facts.masked = static_cast<double>(on) / static_cast<double>(mask.size());
   }

@@ -17,7 +17,8 @@ struct ViewFacts {
   std::optional<double> exposure;  // stops: mean log₂ of the luminance of what is not black
   double sharpness = 0;       // variance of the Laplacian over that of the picture: light does not change it
   Tensor<uint8_t> thumbnail;  // grey, H×W
-  std::optional<double> masked, with_prior;  // shares of the pixels
+  std::optional<double> masked, with_prior;   // shares of the pixels
+  std::optional<double> noise, masked_noise;  // standard deviations in 8-bit levels, all over and in the mask
   std::optional<double> prior_angle;  // degrees: mean, outside the mask, from planes through the points
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -60,6 +61,18 @@ void print_images(const Inspection& found) {
                       found.resampled_views > 0 ? fmt::format(", {} straightened (zoom up to {:.3f})",
                                                               found.resampled_views, found.largest_zoom)
                                                 : ""));
+}
+
+// What a render that is right but for the noise would have.
+double noise_limit_db(double deviation) { return 20 * std::log10(255 / deviation); }
+
+void print_noise(const Inspection::Pixels& pixels) {
+  if (!(pixels.noise > 0)) return;
+  std::string text = fmt::format("up to {:.1f} of 255 levels: a render without noise has {:.1f} dB",
+                                 pixels.noise, noise_limit_db(pixels.noise));
+  if (pixels.masked_noise > 0)
+    text += fmt::format(", {:.1f} in the masks", noise_limit_db(pixels.masked_noise));
+  row("noise", text);
 }
 
 void print_geometry(const Capture& capture, const Inspection& found) {
@@ -161,6 +174,8 @@ nlohmann::json decoded_json(const Inspection::Pixels& pixels) {
           {"mean_colour", pixels.mean_colour},
           {"masked", pixels.masked},
           {"with_prior", pixels.with_prior},
+          {"noise", pixels.noise > 0 ? nlohmann::json(pixels.noise / 255) : nullptr},
+          {"masked_noise", pixels.masked_noise > 0 ? nlohmann::json(pixels.masked_noise / 255) : nullptr},
           {"prior_angle_degrees", pixels.prior_angle > 0 ? nlohmann::json(pixels.prior_angle) : nullptr}};
 }
 
@@ -187,6 +202,7 @@ void print_report(const Capture& capture, const Inspection& found, const MemoryN
   row("train", found.train);
   row("test", found.test);
   print_images(found);
+  print_noise(found.pixels);
   print_geometry(capture, found);
   print_extras(capture, found);
   row("memory", fmt::format("{} of decoded images, {} of them kept", bytes_text(found.decoded_bytes),
