@@ -29,7 +29,7 @@ class OnDevice {
     deform::forward(stored_, field(), 0.5F, {}, 3, precision, posed_, &saved_);
   }
   void backward() {
-    deform::backward(stored_, field(), 0.5F, {}, posed_, saved_, grad_posed_, grad_stored_,
+    deform::backward(stored_, field(), 0.5F, {}, posed_, saved_, grad_posed_, {}, grad_stored_,
                      bits_ != 0 ? &grad_field_ : nullptr);
   }
 

@@ -72,6 +72,7 @@ struct FrameGradient {
   Tensor<float> depth;          // H×W
   Tensor<float> silhouette;     // H×W
   Tensor<float> main_position;  // M×3, of the posed main surfels
+  Tensor<float> environment_residuals;  // N×outputs, of the environment's field
 };
 
 // Which parts of a scene a backward pass must reach. What is off is left at zero and its work is skipped

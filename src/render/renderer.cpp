@@ -289,7 +289,7 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
                   frame_.specular_rays, has_several() ? grad_sample_colour_ : grad_frame.colour, grad.colour,
                   grad.tint, grad_trace_.colour);
   // Trace and reflect.
-  if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, gradient);
+  if (!frame_.traced.pixel.empty()) backward_specular(scene, request, trainable, grad_frame, gradient);
   if (frame_.main.count() == 0 || !(trainable.main || trainable.tint || trainable.main_field ||
                                     trainable.main_motion || trainable.main_nodes))
     return;
@@ -322,12 +322,12 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
                     grad_raster_input_.surfels, trainable.main_nodes ? &gradient.main_nodes : nullptr);
   }
   deform::backward(scene.main, field, request.time, frame_.subset, frame_.main, main_saved_,
-                   grad_raster_input_.surfels, gradient.main,
+                   grad_raster_input_.surfels, {}, gradient.main,
                    field && trainable.main_field ? &gradient.main_field : nullptr);
 }
 
 void Renderer::backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
-                                 SceneGradient& gradient) {
+                                 const FrameGradient& grad_frame, SceneGradient& gradient) {
   const trace::Rays& rays = frame_.mirrored.rays;
   Tensor<float>* grad_origins = &grad_trace_input_.rays.origins;
   Tensor<float>* grad_directions = &grad_trace_input_.rays.directions;
@@ -358,7 +358,7 @@ void Renderer::backward_specular(const Scene& scene, const FrameRequest& request
                  FlagNonZero{gradient.environment_signal.data(), gradient.environment_visible.data()});
     if (trainable.environment) {
       deform::backward(scene.environment, field, request.time, {}, frame_.environment, environment_saved_,
-                       grad_trace_input_.surfels, gradient.environment,
+                       grad_trace_input_.surfels, grad_frame.environment_residuals, gradient.environment,
                        field && trainable.environment_field ? &gradient.environment_field : nullptr);
     }
   }

@@ -35,6 +35,10 @@ class Renderer {
   void backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                 const FrameGradient& grad_frame, SceneGradient& gradient);
 
+  // What the environment's field added to its surfels in the last forward() with keep_for_backward that
+  // traced, N×outputs; empty where no field moves them.
+  const Tensor<float>& environment_residuals() const { return environment_saved_.residuals; }
+
  private:
   // How a set was posed.
   struct Pose {
@@ -62,7 +66,7 @@ class Renderer {
   void begin_raster_gradient(const FrameRequest& request, const FrameGradient& grad_frame, bool with_geometry,
                              CameraGradient<float>* grad_camera);
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
-                         SceneGradient& gradient);
+                         const FrameGradient& grad_frame, SceneGradient& gradient);
   bool reflects(const Scene& scene, const FrameRequest& request) const;
   trace::Options trace_options(const Scene& scene) const;
 

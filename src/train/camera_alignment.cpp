@@ -25,7 +25,7 @@ Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const Frame
                              const CameraAlignment& options) {
   LossOptions photometric = loss;
   photometric.normal = photometric.normal_prior = photometric.distortion = photometric.silhouette = 0;
-  photometric.lpips = photometric.rigidity = 0;
+  photometric.lpips = photometric.rigidity = photometric.environment_residual = 0;
   FrameRequest moving = request;
   FrameGradient by_frame;
   SceneGradient gradient;

@@ -30,9 +30,9 @@ loss::MeanSlot LossMeans::add(Term term, double weight) {
 LossTerms LossMeans::read() const {
   LossTerms terms;
   const Tensor<loss::Mean> means = means_.on(Device::cpu);
-  const std::array<double*, squared_error> values{&terms.l1,           &terms.ssim,       &terms.normal,
-                                                  &terms.normal_prior, &terms.distortion, &terms.lpips,
-                                                  &terms.rigidity,     &terms.silhouette};
+  const std::array<double*, squared_error> values{
+      &terms.l1,    &terms.ssim,     &terms.normal,     &terms.normal_prior,        &terms.distortion,
+      &terms.lpips, &terms.rigidity, &terms.silhouette, &terms.environment_residual};
   for (size_t term = 0; term < values.size(); ++term) {
     if (!weight_[term]) continue;
     *values[term] = means[static_cast<int64_t>(term)].value;

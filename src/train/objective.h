@@ -21,6 +21,7 @@ struct LossTerms {
   double distortion = 0;
   double rigidity = 0;
   double silhouette = 0;
+  double environment_residual = 0;
   double lpips = 0;
   // dB, of the image as it is, not rounded; absent where nothing of the photograph is known.
   std::optional<double> psnr;
@@ -40,6 +41,7 @@ class LossMeans {
     lpips,
     rigidity,
     silhouette,
+    environment_residual,
     squared_error,
     term_count
   };

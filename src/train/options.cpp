@@ -56,6 +56,7 @@ TrainOptions cpu_preset() {
   o.loss.normal_prior = 0.3F;
   o.loss.normal_prior_on_mirrors = 7;
   o.loss.rigidity = 0.05F;
+  o.loss.environment_residual = 0.03F;
   o.rates.position = 1.5e-3F;
   o.rates.position_end = 1.5e-5F;
   o.rates.tint = 0.003F;
@@ -150,6 +151,7 @@ void LossOptions::validate() const {
   // Its square is divided by, in single precision.
   check_option(rigidity_strain >= 1e-6F, "loss.rigidity_strain", rigidity_strain, "1e-6 or more");
   check_not_negative(silhouette, "loss.silhouette");
+  check_not_negative(environment_residual, "loss.environment_residual");
   check_not_negative(lpips, "loss.lpips");
   check_not_negative(lpips_from, "loss.lpips_from");
   if (lpips > 0 && lpips_weights.empty()) {

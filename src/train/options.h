@@ -114,6 +114,7 @@ struct LossOptions {
   float rigidity = 0;
   float rigidity_strain = 0.2F;
   float silhouette = 0.3F;
+  float environment_residual = 0;
   float lpips = 0;
   int lpips_from = 45000;
   std::string lpips_weights;
@@ -134,6 +135,9 @@ struct LossOptions {
             "Relative stretch from which neighbours count as parted.");
     v.field("silhouette", silhouette, "",
             "Bodies cover what the capture's masks cover (deform.kind = nodes; not in the paper).");
+    v.field("environment_residual", environment_residual, "",
+            "The environment stays as it is where no photograph needs it to change: the mean norm of what its "
+            "field adds to a surfel (not in the paper).");
     v.field("lpips", lpips, "", "Perceptual distance LPIPS, late in training (method §7.4).");
     v.field("lpips_from", lpips_from, "iteration", "Where that starts.");
     v.field("lpips_weights", lpips_weights, "",

@@ -8,6 +8,7 @@
 #include "base/parallel.h"
 #include "base/version.h"
 #include "ops/lighting/lighting.h"
+#include "ops/loss/loss.h"
 #include "ops/loss/rigidity.h"
 #include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
@@ -221,12 +222,14 @@ LossTerms Trainer::step() {
   const Frame& frame = renderer_.forward(scene_, request, true);
   take_unknown(frame.colour, target);
   grad_frame_.main_position.place(device_).resize({0});
+  grad_frame_.environment_residuals.place(device_).resize({0});
   grad_rest_.place(device_).resize({0});
   evaluate_objective(frame, target, options_.loss, normal_losses(trainable, now), grad_frame_, means_,
                      schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
   leave_unknown(target, grad_frame_.colour);
   if (review_) review_(frame, target, grad_frame_);
   if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
+  if (trainable.environment_field && options_.loss.environment_residual > 0) add_environment_residual();
   const LossTerms terms = means_.read();
   const bool learns = std::isfinite(terms.total);
   if (learns) learn(view, frame, request, trainable);
@@ -295,6 +298,15 @@ void Trainer::add_rigidity(const Frame& frame) {
                  means_.add(LossMeans::rigidity, options_.loss.rigidity));
 }
 
+void Trainer::add_environment_residual() {
+  const Tensor<float>& residuals = renderer_.environment_residuals();
+  if (residuals.empty()) return;
+  const double weight = options_.loss.environment_residual;
+  grad_frame_.environment_residuals.reset(residuals.shape());
+  loss::row_norm(residuals, weight, grad_frame_.environment_residuals,
+                 means_.add(LossMeans::environment_residual, weight));
+}
+
 void Trainer::control_density(int done, const Surfels& new_surface) {
   // Where memory runs out in an update, that set is as it was; what follows an update asks for none.
   const auto tell = [&](events::DensityChanged change, bool reset) {
@@ -349,7 +361,8 @@ events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
                  {"normal_prior", terms.normal_prior},
                  {"distortion", terms.distortion},
                  {"rigidity", terms.rigidity},
-                 {"silhouette", terms.silhouette}};
+                 {"silhouette", terms.silhouette},
+                 {"environment_residual", terms.environment_residual}};
   if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
   event.psnr = health_.smoothed_psnr();
   event.seconds = seconds_;

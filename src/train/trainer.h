@@ -152,8 +152,10 @@ class Trainer {
   const View& draw_view();
   FrameRequest request_for(const View& view);
   NormalLosses normal_losses(const Trainable& trainable, const Tracking& now) const;
-  // Adds the term on the main surfels' rigidity (loss.rigidity), with its gradient.
+  // Add the terms on the main surfels' rigidity (loss.rigidity) and on what the environment's field adds
+  // (loss.environment_residual), with their gradients.
   void add_rigidity(const Frame& frame);
+  void add_environment_residual();
   // Refines the camera of a training view by the gradient of its picture.
   void refine_camera(const View& view);
   void set_refined_cameras();

@@ -31,6 +31,9 @@ inline double normal_prior(const Tensor<float>& normal, const Tensor<float>& pri
 inline double distortion(const Tensor<float>& map, double weight, Tensor<float>& grad_map) {
   return value_of(map.device(), [&](const MeanSlot& slot) { distortion(map, weight, grad_map, slot); });
 }
+inline double row_norm(const Tensor<float>& rows, double weight, Tensor<float>& grad_rows) {
+  return value_of(rows.device(), [&](const MeanSlot& slot) { row_norm(rows, weight, grad_rows, slot); });
+}
 inline double squared_error(const Tensor<float>& image, const Tensor<float>& target,
                             const Tensor<uint8_t>& known = {}) {
   return value_of(image.device(), [&](const MeanSlot& slot) { squared_error(image, target, known, slot); });

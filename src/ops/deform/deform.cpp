@@ -132,24 +132,29 @@ Surfels displaced(const Surfels& stored, const Field& field, float time, field::
 
 void backward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
-              Surfels& grad_stored, Field* grad_field) {
+              const Tensor<float>& grad_residuals, Surfels& grad_stored, Field* grad_field) {
   thread_local Tensor<float> scratch, collected;
   require(posed.count() == posed_count(stored, subset), "posed are the surfels of the subset",
           std::to_string(posed.count()));
   const bool reaches_field = field != nullptr && grad_field != nullptr && !saved.residuals.empty();
-  Tensor<float>& grad_residuals = scratch;
-  grad_residuals.place(stored.device()).reset(reaches_field ? saved.residuals.shape() : Shape{});
+  Tensor<float>& all = scratch;
+  all.place(stored.device()).reset(reaches_field ? saved.residuals.shape() : Shape{});
+  if (reaches_field && !grad_residuals.empty()) {
+    require(grad_residuals.shape() == all.shape(), "residuals have gradients of their shape",
+            grad_residuals.shape().to_string());
+    all = grad_residuals;
+  }
   pose_backward(
       subset, posed, grad_posed, grad_stored,
-      {reaches_field ? grad_residuals.data() : nullptr, static_cast<int>(grad_residuals.row_size())});
+      {reaches_field ? all.data() : nullptr, static_cast<int>(all.row_size())});
   if (!reaches_field) return;
   if (!saved.moved.empty()) {
-    const auto columns = static_cast<int>(grad_residuals.row_size());
+    const auto columns = static_cast<int>(all.row_size());
     collected.place(stored.device()).resize(saved.of_moved.shape());
     parallel_for(stored.device(), "deform: collect gradients of residuals", collected.size(),
-                 CollectResiduals{rows_of(saved.moved), grad_residuals.data(), collected.data(), columns});
+                 CollectResiduals{rows_of(saved.moved), all.data(), collected.data(), columns});
   }
-  field::backward(*field, saved.points, time, saved.field, saved.moved.empty() ? grad_residuals : collected,
+  field::backward(*field, saved.points, time, saved.field, saved.moved.empty() ? all : collected,
                   *grad_field);
 }
 

@@ -31,10 +31,11 @@ void forward(const Surfels& stored, const Field* field, float time, const Tensor
 Surfels displaced(const Surfels& stored, const Field& field, float time, field::Precision precision);
 
 // Adds to grad_stored (shapes of stored) and to grad_field (null when the forward pass had none or it is
-// frozen). Reads the activated values back from `posed`, the forward pass's output.
+// frozen). Reads the activated values back from `posed`, the forward pass's output. grad_residuals: what
+// reaches Saved::residuals past `posed`, in their shape; empty: nothing.
 void backward(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               const PosedSurfels& posed, const Saved& saved, const PosedSurfels& grad_posed,
-              Surfels& grad_stored, Field* grad_field);
+              const Tensor<float>& grad_residuals, Surfels& grad_stored, Field* grad_field);
 
 // The plain truth in double precision, of all surfels. field_points: N×3, where the field is evaluated (the
 // stored positions; separate because p enters detached, so that central differences can hold it still).

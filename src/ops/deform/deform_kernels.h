@@ -75,9 +75,9 @@ struct Residuals {
     }
     return row;
   }
-  TRACEFLOW_HD void store(int64_t i, const ResidualRow& row) const {
+  TRACEFLOW_HD void add(int64_t i, const ResidualRow& row) const {
     for (int k = 0; k < residual::main_outputs; ++k) {
-      if (rows != nullptr && k < columns) rows[i * columns + k] = row[k];
+      if (rows != nullptr && k < columns) rows[i * columns + k] += row[k];
     }
   }
 };
@@ -285,7 +285,7 @@ struct PoseBackward {
       add_to_grad_stored.stored.roughness_logit[rows.at(i)] +=
           grad_posed.roughness[i] * roughness_derivative(posed.roughness[i]);
     }
-    grad_residuals.store(i, grad);
+    grad_residuals.add(i, grad);
   }
 };
 

@@ -87,6 +87,14 @@ void silhouette(const Tensor<float>& silhouette, const Tensor<float>& mask, doub
                       MeanOver{count, value.on(silhouette.device())}, block_pixels);
 }
 
+void row_norm(const Tensor<float>& rows, double weight, Tensor<float>& grad_rows, const MeanSlot& value) {
+  check_same_shape(rows, rows, grad_rows);
+  const auto count = static_cast<double>(rows.dim(0));
+  const RowNorm step{rows.data(), rows.row_size(), static_cast<float>(weight / count), grad_rows.data()};
+  ordered_sum<double>(rows.device(), "loss: row norms", rows.dim(0), step,
+                      MeanOver{count, value.on(rows.device())}, block_pixels);
+}
+
 void squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& known,
                    const MeanSlot& value) {
   check_same_shape(image, target, image);

@@ -53,6 +53,12 @@ void silhouette(const Tensor<float>& silhouette, const Tensor<float>& mask, doub
 double silhouette_reference(const Tensor<double>& silhouette, const Tensor<double>& mask, double weight,
                             Tensor<double>& grad_silhouette);
 
+// mean (√(|r|² + ε²) − ε) over rows r, ε = 0.001: how far residuals are from zero. Rows that are zero stay so
+// unless the pictures gain more than the weight, so that few rows differ from zero. A row that is not finite
+// counts as zero. rows: N×K.
+void row_norm(const Tensor<float>& rows, double weight, Tensor<float>& grad_rows, const MeanSlot& value);
+double row_norm_reference(const Tensor<double>& rows, double weight, Tensor<double>& grad_rows);
+
 // mean (image − target)² over channels and pixels, which PSNR is made of; no term of the loss. known (H×W,
 // may be empty) restricts the mean to pixels where it is non-zero.
 void squared_error(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& known,

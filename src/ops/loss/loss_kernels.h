@@ -129,6 +129,26 @@ struct Silhouette {
   }
 };
 
+// Of one row.
+struct RowNorm {
+  static constexpr float soft = 1e-3F;  // ε
+
+  const float* rows;
+  int64_t columns;
+  float scale;
+  float* gradient;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    const float* row = rows + i * columns;
+    float squares = soft * soft;
+    for (int64_t c = 0; c < columns; ++c) squares += row[c] * row[c];
+    if (!std::isfinite(squares)) return 0;
+    const float norm = std::sqrt(squares);
+    for (int64_t c = 0; c < columns; ++c) gradient[i * columns + c] += scale * row[c] / norm;
+    return static_cast<double>(norm) - soft;
+  }
+};
+
 // Method §7.4, L_norm: a pixel is compared with the geometry around it.
 template <class T>
 struct NormalConsistency {

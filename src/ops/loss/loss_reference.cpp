@@ -94,6 +94,21 @@ double silhouette_reference(const Tensor<double>& silhouette, const Tensor<doubl
   return count > 0 ? sum / count : 0;
 }
 
+double row_norm_reference(const Tensor<double>& rows, double weight, Tensor<double>& grad_rows) {
+  constexpr double soft = 1e-3;
+  const auto count = static_cast<double>(rows.dim(0));
+  double sum = 0;
+  for (int64_t i = 0; i < rows.dim(0); ++i) {
+    double squares = 0;
+    for (int64_t c = 0; c < rows.row_size(); ++c) squares += rows(i, c) * rows(i, c);
+    const double norm = std::sqrt(squares + soft * soft);
+    if (!std::isfinite(norm)) continue;
+    sum += norm - soft;
+    for (int64_t c = 0; c < rows.row_size(); ++c) grad_rows(i, c) += weight / count * rows(i, c) / norm;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
 double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& pseudo, double weight,
                                     Tensor<double>& grad_normal, Tensor<double>& grad_pseudo) {
   Mean mean{};

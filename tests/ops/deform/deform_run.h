@@ -36,7 +36,7 @@ inline DeformPass run_deform(Device device, const Surfels& stored, const Field* 
   const PosedSurfels grad_posed = random_gradient_like(posed.on(Device::cpu));
   Surfels grad_stored = zeros_like<float>(there);
   Field grad_field = zeros_like<float>(field_there);
-  deform::backward(there, evaluated, test_time, subset_there, posed, saved, grad_posed.on(device),
+  deform::backward(there, evaluated, test_time, subset_there, posed, saved, grad_posed.on(device), {},
                    grad_stored, evaluated == nullptr || frozen ? nullptr : &grad_field);
   return {posed.on(Device::cpu), grad_posed, grad_stored.on(Device::cpu), grad_field.on(Device::cpu)};
 }

@@ -143,6 +143,32 @@ TEST(Deform, ASubsetIsASliceOfTheWhole) {
   });
 }
 
+// What reaches the residuals directly goes on to the field and not to the stored values.
+TEST(Deform, GradientsOfResidualsReachTheFieldAlone) {
+  const Surfels stored = random_surfels(60, false);
+  const Field field = testing::random_field(small, residual::environment_outputs);
+  deform::Saved saved;
+  PosedSurfels posed, nothing;
+  deform::forward(stored, &field, test_time, {}, 3, Precision::fp32, posed, &saved);
+  nothing.reset_like(posed);
+  Random random(8);
+  const Tensor<float> grad_residuals = testing::random_tensor<float>(saved.residuals.shape(), random, -1, 1);
+  Surfels grad_stored = zeros_like<float>(stored);
+  Field found = zeros_like<float>(field), expected = zeros_like<float>(field);
+  deform::backward(stored, &field, test_time, {}, posed, saved, nothing, grad_residuals, grad_stored, &found);
+  grad_stored.for_each([&](const std::string& name, const Tensor<float>& t) {
+    for (const float g : t.values()) ASSERT_EQ(g, 0) << name;
+  });
+  field::Saved kept;
+  Tensor<float> outputs;
+  field::forward(field, stored.position, test_time, Precision::fp32, outputs, &kept);
+  field::backward(field, stored.position, test_time, kept, grad_residuals, expected);
+  testing::expect_fields_close(found, expected, 1e-6, 1e-6);
+  EXPECT_THROW(deform::backward(stored, &field, test_time, {}, posed, saved, nothing,
+                                Tensor<float>({60, 2}), grad_stored, &found),
+               InternalError);
+}
+
 // A gradient by a subset is one by all surfels that is zero outside of it.
 TEST(Deform, ASubsetsGradientIsScatteredToItsRows) {
   const Surfels stored = random_surfels(400, true);
@@ -165,7 +191,7 @@ TEST(Deform, ASubsetsGradientIsScatteredToItsRows) {
   });
   Surfels grad_stored = zeros_like<float>(stored);
   Field grad_field = zeros_like<float>(field);
-  deform::backward(stored, &field, test_time, {}, posed, saved, grad_posed, grad_stored, &grad_field);
+  deform::backward(stored, &field, test_time, {}, posed, saved, grad_posed, {}, grad_stored, &grad_field);
   std::vector<const Tensor<float>*> expected;
   grad_stored.for_each([&](const std::string&, const Tensor<float>& t) { expected.push_back(&t); });
   next = 0;

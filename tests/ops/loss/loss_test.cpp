@@ -170,6 +170,37 @@ TEST(Silhouette, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
   expect_close(found, expected, 1e-5, "silhouette");
 }
 
+TEST(RowNorm, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
+  Random random(6);
+  Tensor<double> rows = random_tensor<double>({9, 10}, random, -1, 1);
+  for (int64_t c = 0; c < 10; ++c) rows(3, c) *= 1e-3;  // about as large as ε
+  std::fill_n(rows.row(4), 10, 0.0);
+  Tensor<double> expected(rows.shape()), unused(rows.shape());
+  const double value = loss::row_norm_reference(rows, 0.3, expected);
+  expect_close(expected,
+               central_differences(rows, [&] { return 0.3 * loss::row_norm_reference(rows, 1, unused); }, 1e-6),
+               1e-5, "rows");
+  Tensor<float> found(rows.shape());
+  found.fill(1);
+  EXPECT_NEAR(row_norm(convert<float>(rows), 0.3, found), value, 1e-6);
+  for (float& g : found.values()) g -= 1;
+  expect_close(found, expected, 1e-5, "rows");
+}
+
+// Rows of 3, 4 and of nothing: norms of 5 and 0, but for ε.
+TEST(RowNorm, IsTheMeanOfLengthsAndLeavesOutWhatIsNotFinite) {
+  Tensor<float> rows({3, 2}), gradient({3, 2});
+  rows(0, 0) = 3;
+  rows(0, 1) = 4;
+  rows(2, 0) = std::numeric_limits<float>::infinity();
+  EXPECT_NEAR(row_norm(rows, 1, gradient), 5.0 / 3, 1e-3);
+  EXPECT_NEAR(gradient(0, 0), 0.6 / 3, 1e-6);
+  EXPECT_NEAR(gradient(0, 1), 0.8 / 3, 1e-6);
+  for (const int64_t i : {2, 3, 4, 5}) EXPECT_EQ(gradient[i], 0);
+  Tensor<float> none({0, 2}), no_gradient({0, 2});
+  EXPECT_EQ(row_norm(none, 1, no_gradient), 0);
+}
+
 TEST(SquaredError, IsTheMeanOverWhatIsKnown) {
   Tensor<float> image({1, 3, 3}), target({1, 3, 3});
   for (int64_t pixel = 0; pixel < 3; ++pixel) {

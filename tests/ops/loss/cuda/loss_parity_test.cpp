@@ -148,6 +148,17 @@ TEST_F(LossOnDevice, NothingWeighsNothing) {
   EXPECT_EQ(list_of(gradient.on(Device::cpu)), std::vector<float>(12, 0));
 }
 
+TEST_F(LossOnDevice, RowNormsAgree) {
+  Random random(3);
+  for (const int64_t count : {0, 1, 300, 5000}) {
+    Tensor<float> rows = random_tensor<float>({count, 10}, random, -1, 1);
+    for (int64_t i = 0; i < count; i += 7) std::fill_n(rows.row(i), 10, i % 2 == 0 ? 0.0F : nan_f);
+    Tensor<float> expected(rows.shape()), found(rows.shape(), Device::cuda);
+    EXPECT_NEAR(row_norm(rows.on(Device::cuda), 0.3, found), row_norm(rows, 0.3, expected), 1e-6);
+    expect_close_on_host(found, expected, 1e-5, "rows");
+  }
+}
+
 TEST_F(LossOnDevice, ASlotElsewhereIsRefused) {
   Tensor<float> image({2, 2, 3}, Device::cuda);
   Tensor<Mean> here({1}), there({1}, Device::cuda);
