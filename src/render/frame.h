@@ -64,14 +64,14 @@ struct Frame {
 
 // dL/d(layers of a frame), an empty tensor meaning zero.
 struct FrameGradient {
-  Tensor<float> colour;         // H×W×3
-  Tensor<float> normal;         // H×W×3
-  Tensor<float> pseudo_normal;  // H×W×3
-  Tensor<float> distortion;     // H×W
-  Tensor<float> alpha;          // H×W
-  Tensor<float> depth;          // H×W
-  Tensor<float> silhouette;     // H×W
-  Tensor<float> main_position;  // M×3, of the posed main surfels
+  Tensor<float> colour;                 // H×W×3
+  Tensor<float> normal;                 // H×W×3
+  Tensor<float> pseudo_normal;          // H×W×3
+  Tensor<float> distortion;             // H×W
+  Tensor<float> alpha;                  // H×W
+  Tensor<float> depth;                  // H×W
+  Tensor<float> silhouette;             // H×W
+  Tensor<float> main_position;          // M×3, of the posed main surfels
   Tensor<float> environment_residuals;  // N×outputs, of the environment's field
 };
 

@@ -96,6 +96,7 @@ TrainOptions demo_preset() {
   o.density.max_surfels = 16000;
   o.initial.max_points = 8000;
   o.environment_density.max_surfels = 8000;
+  o.loss.environment_residual = 0;  // what its balls mirror moves
   return o;
 }
 

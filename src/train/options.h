@@ -135,9 +135,10 @@ struct LossOptions {
             "Relative stretch from which neighbours count as parted.");
     v.field("silhouette", silhouette, "",
             "Bodies cover what the capture's masks cover (deform.kind = nodes; not in the paper).");
-    v.field("environment_residual", environment_residual, "",
-            "The environment stays as it is where no photograph needs it to change: the mean norm of what its "
-            "field adds to a surfel (not in the paper).");
+    v.field(
+        "environment_residual", environment_residual, "",
+        "The environment stays as it is where no photograph needs it to change: the mean norm of what its "
+        "field adds to a surfel (not in the paper).");
     v.field("lpips", lpips, "", "Perceptual distance LPIPS, late in training (method §7.4).");
     v.field("lpips_from", lpips_from, "iteration", "Where that starts.");
     v.field("lpips_weights", lpips_weights, "",

@@ -144,9 +144,8 @@ void backward(const Surfels& stored, const Field* field, float time, const Tenso
             grad_residuals.shape().to_string());
     all = grad_residuals;
   }
-  pose_backward(
-      subset, posed, grad_posed, grad_stored,
-      {reaches_field ? all.data() : nullptr, static_cast<int>(all.row_size())});
+  pose_backward(subset, posed, grad_posed, grad_stored,
+                {reaches_field ? all.data() : nullptr, static_cast<int>(all.row_size())});
   if (!reaches_field) return;
   if (!saved.moved.empty()) {
     const auto columns = static_cast<int>(all.row_size());

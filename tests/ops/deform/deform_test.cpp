@@ -164,8 +164,8 @@ TEST(Deform, GradientsOfResidualsReachTheFieldAlone) {
   field::forward(field, stored.position, test_time, Precision::fp32, outputs, &kept);
   field::backward(field, stored.position, test_time, kept, grad_residuals, expected);
   testing::expect_fields_close(found, expected, 1e-6, 1e-6);
-  EXPECT_THROW(deform::backward(stored, &field, test_time, {}, posed, saved, nothing,
-                                Tensor<float>({60, 2}), grad_stored, &found),
+  EXPECT_THROW(deform::backward(stored, &field, test_time, {}, posed, saved, nothing, Tensor<float>({60, 2}),
+                                grad_stored, &found),
                InternalError);
 }
 

@@ -178,7 +178,8 @@ TEST(RowNorm, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
   Tensor<double> expected(rows.shape()), unused(rows.shape());
   const double value = loss::row_norm_reference(rows, 0.3, expected);
   expect_close(expected,
-               central_differences(rows, [&] { return 0.3 * loss::row_norm_reference(rows, 1, unused); }, 1e-6),
+               central_differences(
+                   rows, [&] { return 0.3 * loss::row_norm_reference(rows, 1, unused); }, 1e-6),
                1e-5, "rows");
   Tensor<float> found(rows.shape());
   found.fill(1);
