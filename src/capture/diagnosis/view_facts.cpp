@@ -80,9 +80,9 @@ void measure_prior(const Capture& capture, const Tensor<uint8_t>& mask, const Su
 void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& facts) {
   const ViewSource& source = capture.images->source(facts.view->id);
   const Tensor<uint8_t> colour = decode_colour(source).colour;
-  Tensor<uint8_t> mask;
   measure_colour(colour, facts);
-  facts.noise = noise_deviation(colour, mask);
+  facts.noise = noise_deviation(colour, {});
+  Tensor<uint8_t> mask;
   if (source.mask) {
     mask = decode_mask(source).mask;
     facts.masked_noise = noise_deviation(colour, mask);

@@ -137,23 +137,23 @@ void backward(const Surfels& stored, const Field* field, float time, const Tenso
   require(posed.count() == posed_count(stored, subset), "posed are the surfels of the subset",
           std::to_string(posed.count()));
   const bool reaches_field = field != nullptr && grad_field != nullptr && !saved.residuals.empty();
-  Tensor<float>& all = scratch;
-  all.place(stored.device()).reset(reaches_field ? saved.residuals.shape() : Shape{});
+  Tensor<float>& grad_all = scratch;
+  grad_all.place(stored.device()).reset(reaches_field ? saved.residuals.shape() : Shape{});
   if (reaches_field && !grad_residuals.empty()) {
-    require(grad_residuals.shape() == all.shape(), "residuals have gradients of their shape",
+    require(grad_residuals.shape() == grad_all.shape(), "residuals have gradients of their shape",
             grad_residuals.shape().to_string());
-    all = grad_residuals;
+    grad_all = grad_residuals;
   }
   pose_backward(subset, posed, grad_posed, grad_stored,
-                {reaches_field ? all.data() : nullptr, static_cast<int>(all.row_size())});
+                {reaches_field ? grad_all.data() : nullptr, static_cast<int>(grad_all.row_size())});
   if (!reaches_field) return;
   if (!saved.moved.empty()) {
-    const auto columns = static_cast<int>(all.row_size());
+    const auto columns = static_cast<int>(grad_all.row_size());
     collected.place(stored.device()).resize(saved.of_moved.shape());
     parallel_for(stored.device(), "deform: collect gradients of residuals", collected.size(),
-                 CollectResiduals{rows_of(saved.moved), all.data(), collected.data(), columns});
+                 CollectResiduals{rows_of(saved.moved), grad_all.data(), collected.data(), columns});
   }
-  field::backward(*field, saved.points, time, saved.field, saved.moved.empty() ? all : collected,
+  field::backward(*field, saved.points, time, saved.field, saved.moved.empty() ? grad_all : collected,
                   *grad_field);
 }
 
