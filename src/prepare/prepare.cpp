@@ -37,15 +37,15 @@ fs::path without_links(const fs::path& path) {
 // The steps of one capture, in order. Each tells Steps what its results depend on beyond the steps before.
 class Preparation {
  public:
-  Preparation(fs::path input, fs::path capture, const PrepareOptions& options, const Audience& audience,
-              const std::atomic<bool>& stop)
+  Preparation(fs::path input, fs::path capture, const PrepareOptions& options,
+              const ProgressCallbacks& callbacks, const std::atomic<bool>& stop)
       : input_(std::move(input)),
         capture_(without_links(capture)),
         folder_(work_folder(capture_)),
         options_(options),
         work_(stop, [this](int64_t done, int64_t all) { audience_.at_work(step_, done, all); }),
-        audience_(audience),
-        steps_(folder_, audience.found, [this] { before_work(); }) {}
+        audience_(callbacks),
+        steps_(folder_, callbacks.found, [this] { before_work(); }) {}
 
   void run() {
     for (const fs::path& given : {input_, fs::path(options_.masks), fs::path(options_.test_video)})
@@ -191,7 +191,7 @@ class Preparation {
   fs::path input_, capture_, folder_;
   const PrepareOptions& options_;
   const Work work_;
-  const Audience& audience_;
+  const ProgressCallbacks& audience_;
   Step step_ = Step::frames;
   std::optional<FolderLock> lock_;
   Steps steps_;
@@ -203,13 +203,13 @@ class Preparation {
 fs::path work_folder(const fs::path& capture) { return without_links(capture).string() + ".prepare"; }
 
 bool prepare_capture(const fs::path& input, const fs::path& capture, const PrepareOptions& options,
-                     const Audience& audience, const std::atomic<bool>& stop) {
+                     const ProgressCallbacks& callbacks, const std::atomic<bool>& stop) {
   options.validate();
   if (!fs::exists(input)) throw InputError(input.string(), "", "nothing", "a film or a folder of pictures");
   need_program("ffmpeg");
   if (options.until > Step::masks) need_program("colmap");
   try {
-    Preparation(input, capture, options, audience, stop).run();
+    Preparation(input, capture, options, callbacks, stop).run();
   } catch (const Stopped&) {
     return false;
   }

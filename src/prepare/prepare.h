@@ -11,7 +11,7 @@
 namespace traceflow::prepare {
 
 // Whoever waits for a preparation.
-struct Audience {
+struct ProgressCallbacks {
   // What a step found, one line for each.
   std::function<void(const std::string& line)> found;
   // How much a step at work has done; 0 of 0 when it begins. all is 0 where it is not known.
@@ -22,7 +22,8 @@ struct Audience {
 // What the steps leave lies in CAPTURE.prepare, so that a later call goes on where this one ends. False where
 // `stop` turned true before the end. Throws InputError.
 bool prepare_capture(const std::filesystem::path& input, const std::filesystem::path& capture,
-                     const PrepareOptions& options, const Audience& audience, const std::atomic<bool>& stop);
+                     const PrepareOptions& options, const ProgressCallbacks& callbacks,
+                     const std::atomic<bool>& stop);
 
 // Where the steps of a capture leave what they made.
 std::filesystem::path work_folder(const std::filesystem::path& capture);

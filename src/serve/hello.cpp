@@ -15,20 +15,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json captured_json(const CapturedCamera& view, const SceneNormalisation& normalisation) {
-  Json json = to_json(viewpoint_of(view.camera, normalisation));
-  json["id"] = view.id;
-  json["time"] = view.time;
-  json["width"] = view.camera.width;
-  json["height"] = view.camera.height;
-  json["centre"] = {view.camera.centre_x / static_cast<float>(view.camera.width),
-                    view.camera.centre_y / static_cast<float>(view.camera.height)};
+Json captured_json(const CapturedCamera& captured, const SceneNormalisation& normalisation) {
+  Json json = to_json(viewpoint_of(captured.camera, normalisation));
+  json["id"] = captured.id;
+  json["time"] = captured.time;
+  json["width"] = captured.camera.width;
+  json["height"] = captured.camera.height;
+  json["centre"] = {captured.camera.centre_x / static_cast<float>(captured.camera.width),
+                    captured.camera.centre_y / static_cast<float>(captured.camera.height)};
   return json;
 }
 
-Json captured_json(const std::vector<CapturedCamera>& views, const SceneNormalisation& normalisation) {
+Json captured_json(const std::vector<CapturedCamera>& cameras, const SceneNormalisation& normalisation) {
   Json list = Json::array();
-  for (const CapturedCamera& view : views) list.push_back(captured_json(view, normalisation));
+  for (const CapturedCamera& captured : cameras) list.push_back(captured_json(captured, normalisation));
   return list;
 }
 
@@ -42,18 +42,18 @@ Json layers(bool with_photographs) {
   return list;
 }
 
-// Where to look from first, and at what.
+// The page's first camera.
 struct Start {
   Camera<float> camera;
   show::Aim aim;
 };
 
-Start start_of(const Stage& stage, const Setting& setting) {
+Start start_of(const SceneView& view, const SceneInfo& info) {
   std::vector<Camera<float>> cameras;
-  for (const CapturedCamera& view : setting.train) cameras.push_back(view.camera);
-  for (const CapturedCamera& view : setting.test) cameras.push_back(view.camera);
+  for (const CapturedCamera& captured : info.train) cameras.push_back(captured.camera);
+  for (const CapturedCamera& captured : info.test) cameras.push_back(captured.camera);
   if (!cameras.empty()) return {cameras.front(), show::aim_of(cameras)};
-  const Tensor<float> points = stage.scene.main.position.on(Device::cpu);
+  const Tensor<float> points = view.scene.main.position.on(Device::cpu);
   Start start{show::orbit_around_points(points, 16, 9, 1).front().camera, {}};
   start.aim.target = show::median_point(points);
   return start;
@@ -70,25 +70,25 @@ Json to_json(const Viewpoint& camera) {
           {"fov_y", camera.fov_y}};
 }
 
-std::string hello_text(const Stage& stage, const Setting& setting) {
-  const Scene& scene = stage.scene;
+std::string hello_text(const SceneView& view, const SceneInfo& info) {
+  const Scene& scene = view.scene;
   const SceneNormalisation& normalisation = scene.normalisation;
-  const Start start = start_of(stage, setting);
+  const Start start = start_of(view, info);
   Json maps = Json::array();
   for (const std::string_view name : enum_names(show::ColourMap{})) maps.push_back(std::string(name));
   const Json hello = {{"type", "hello"},
                       {"version", version()},
-                      {"source", setting.source},
-                      {"name", setting.name},
-                      {"capture", setting.capture != nullptr ? setting.capture->name : ""},
+                      {"source", info.source},
+                      {"name", info.name},
+                      {"capture", info.capture != nullptr ? info.capture->name : ""},
                       {"device", name_of(scene.device())},
                       {"moves", scene.main_field.has_value() || scene.main_motion.has_value() ||
                                     scene.environment_field.has_value()},
-                      {"layers", layers(setting.capture != nullptr)},
+                      {"layers", layers(info.capture != nullptr)},
                       {"maps", std::move(maps)},
                       {"cameras",
-                       {{"train", captured_json(setting.train, normalisation)},
-                        {"test", captured_json(setting.test, normalisation)}}},
+                       {{"train", captured_json(info.train, normalisation)},
+                        {"test", captured_json(info.test, normalisation)}}},
                       {"start", to_json(viewpoint_of(start.camera, normalisation))},
                       {"target", to_json(normalisation.in_capture(start.aim.target))},
                       {"up", to_json(start.aim.up)},

@@ -3,13 +3,13 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "serve/audience/messages.h"
-#include "serve/stage.h"
+#include "serve/clients/messages.h"
+#include "serve/scene_view.h"
 
 namespace traceflow::serve {
 
-// What a page hears first: what there is to see (web/src/messages.ts, Hello).
-std::string hello_text(const Stage& stage, const Setting& setting);
+// The first message to a page: the scene, its cameras and layers (web/src/messages.ts, Hello).
+std::string hello_text(const SceneView& view, const SceneInfo& info);
 
 // {"position": …, "rotation": rows of world_from_camera, "fov_y": …}.
 nlohmann::ordered_json to_json(const Viewpoint& camera);

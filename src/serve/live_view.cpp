@@ -20,10 +20,10 @@ void ViewOptions::validate() const {
   check_option(share > 0 && share < 1, "view-share", share, "above 0 and under 1");
 }
 
-LiveView::LiveView(const ViewOptions& options, Setting setting, TrainingHooks hooks)
+LiveView::LiveView(const ViewOptions& options, SceneInfo info, TrainingHooks hooks)
     : hooks_(std::move(hooks)),
-      audience_([this](Do what) { command(what); }),
-      projector_(audience_, std::move(setting)),
+      clients_([this](Do what) { command(what); }),
+      frame_server_(clients_, std::move(info)),
       share_(options.share),
       returned_(Clock::now()) {}
 
@@ -60,8 +60,8 @@ void LiveView::operator()(const events::Event& event) {
               started->iterations,
               started->surfels.main,
               started->surfels.environment};
-    projector_.greet(hooks_.stage());
-    audience_.set_state(state_);
+    frame_server_.send_hello(hooks_.view());
+    clients_.set_state(state_);
     returned_ = Clock::now();
   }
   flush_events();
@@ -81,9 +81,9 @@ void LiveView::on_step(const events::Step& step) {
   state_.environment_surfels = step.surfels.environment;
   if (now - sent_ >= between_events) flush_events();
 
-  audience_.scene_changed(refresh);
+  clients_.scene_changed(refresh);
   while (share_.is_open() && serve(share_.allowed())) charge();
-  projector_.scene_changed(hooks_.stage().scene.device());
+  frame_server_.scene_changed(hooks_.view().scene.device());
   charge();
   if (save_.exchange(false)) save();
   if (pause_) serve_while_paused();
@@ -95,50 +95,50 @@ void LiveView::serve_while_paused() {
   hooks_.emit(events::Paused{state_.iteration, true});
   while (pause_ && !stop_ && !*hooks_.interrupted) {
     if (save_.exchange(false)) save();
-    if (audience_.wait(longest_wait)) serve({});
+    if (clients_.wait(longest_wait)) serve({});
   }
   pause_ = false;
   state_.paused = false;
   hooks_.emit(events::Paused{state_.iteration, false});
-  projector_.scene_changed(hooks_.stage().scene.device());
+  frame_server_.scene_changed(hooks_.view().scene.device());
 }
 
 // A page's wish must not end a training: where it cannot be saved, it goes on.
 void LiveView::save() {
   try {
     hooks_.save();
-    audience_.tell_trouble("saving", "");
+    clients_.set_warning("saving", "");
   } catch (const std::exception& error) {
-    audience_.tell_trouble("saving", std::string("Not saved. ") + error.what());
+    clients_.set_warning("saving", std::string("Not saved. ") + error.what());
   }
 }
 
 bool LiveView::serve(const Allowed& allowed) {
-  const std::optional<Job> job = audience_.next(allowed);
-  if (job) projector_.answer(*job, hooks_.stage());
+  const std::optional<Job> job = clients_.next(allowed);
+  if (job) frame_server_.answer(*job, hooks_.view());
   return job.has_value();
 }
 
 void LiveView::flush_events() {
   if (!last_step_.empty()) unsent_.push_back(std::exchange(last_step_, {}));
-  audience_.tell(unsent_);
+  clients_.add_log_lines(unsent_);
   unsent_.clear();
-  audience_.set_state(state_);
+  clients_.set_state(state_);
   sent_ = Clock::now();
 }
 
 void LiveView::on_finished(const events::Finished& finished) {
   state_.iteration = finished.iteration;
   state_.over = true;
-  audience_.set_state(state_);
-  audience_.scene_changed({});
+  clients_.set_state(state_);
+  clients_.scene_changed({});
 }
 
-bool LiveView::is_wanted() { return audience_.viewers() > 0 && !*hooks_.interrupted; }
+bool LiveView::is_wanted() { return clients_.viewers() > 0 && !*hooks_.interrupted; }
 
 void LiveView::stay() {
   while (is_wanted()) {
-    if (audience_.wait(longest_wait)) serve({});
+    if (clients_.wait(longest_wait)) serve({});
   }
 }
 

@@ -4,8 +4,8 @@
 #include <functional>
 
 #include "base/options.h"
-#include "serve/audience/audience.h"
-#include "serve/projector.h"
+#include "serve/clients/clients.h"
+#include "serve/frame_server.h"
 #include "serve/time_share.h"
 #include "train/events.h"
 #include "train/log_history.h"
@@ -13,38 +13,39 @@
 namespace traceflow::serve {
 
 struct ViewOptions {
-  double share =
-      0.25;  // of the training's time that pages may take while somebody looks, above 0 and under 1
+  double share = 0.25;  // of the time that may go into pictures while a page is open, above 0 and under 1
 
   void validate() const;
 };
 
-// What a training run lets its viewer do. All but `stop` is called on the training's thread, between
+// What the viewer may do with a training. All but `stop` are called on the training's thread, between
 // iterations.
 struct TrainingHooks {
-  std::function<Stage()> stage;
+  std::function<SceneView()> view;
   std::function<void()> save;
   std::function<void(const events::Event&)> emit;
   std::function<void()> stop;                      // on any thread
-  const std::atomic<bool>* interrupted = nullptr;  // the whole program is to end
+  const std::atomic<bool>* interrupted = nullptr;  // set when the program shall end
 };
 
-// Shows a training run to the pages that look at it: a listener of its events, so that pictures are made
-// between two iterations, on the training's thread and of a scene that stands still. They take a bounded
-// share of the time. Training goes by the same bytes whether somebody looks or not.
+// Shows a training to the open pages. It listens to the training's events, so it renders between two
+// iterations, on the training's thread, and takes a bounded share of the time. The trained scene is the same
+// to the byte whether a page is open or not.
 class LiveView {
  public:
-  LiveView(const ViewOptions& options, Setting setting, TrainingHooks hooks);
+  LiveView(const ViewOptions& options, SceneInfo info, TrainingHooks hooks);
 
-  // Whom the server talks to.
-  Room& room() { return audience_; }
+  // For the server.
+  MessageHandler& handler() { return clients_; }
 
   // The log of a run that is resumed.
-  void recall(const std::vector<LoggedEvent>& events) { audience_.tell(lines_of(thinned(events)), true); }
+  void restore_log(const std::vector<LoggedEvent>& events) {
+    clients_.add_log_lines(lines_of(thinned(events)), true);
+  }
   void operator()(const events::Event& event);
   // After the training: whether a page is open.
   bool is_wanted();
-  // Goes on until the last page has left, or the program is to end.
+  // Serves until the last page has closed or the program shall end.
   void stay();
 
  private:
@@ -60,8 +61,8 @@ class LiveView {
   void command(Do what);
 
   TrainingHooks hooks_;
-  Audience audience_;
-  Projector projector_;
+  Clients clients_;
+  FrameServer frame_server_;
   std::atomic<bool> pause_{false}, save_{false}, stop_{false};
   State state_;
   std::vector<std::string> unsent_;

@@ -11,8 +11,8 @@ int side(double pixels) { return std::max(1, static_cast<int>(std::lround(pixels
 
 }  // namespace
 
-const CapturedCamera& captured(const PhotoRef& photo, const Setting& setting) {
-  const std::vector<CapturedCamera>& split = photo.test ? setting.test : setting.train;
+const CapturedCamera& captured(const PhotoRef& photo, const SceneInfo& info) {
+  const std::vector<CapturedCamera>& split = photo.test ? info.test : info.train;
   if (photo.index >= static_cast<int64_t>(split.size())) {
     throw InputError("message", "photo.index", std::to_string(photo.index),
                      "one of " + std::to_string(split.size()) + " views");
@@ -32,11 +32,11 @@ Camera<float> resized(Camera<float> camera, int width, int height) {
   return camera;
 }
 
-Camera<float> camera_of(const Look& look, const Setting& setting, const SceneNormalisation& normalisation,
+Camera<float> camera_of(const Look& look, const SceneInfo& info, const SceneNormalisation& normalisation,
                         double divisor) {
   if (const auto* free = std::get_if<Viewpoint>(&look.camera))
     return camera_at(*free, side(look.width / divisor), side(look.height / divisor), normalisation);
-  const Camera<float>& camera = captured(std::get<PhotoRef>(look.camera), setting).camera;
+  const Camera<float>& camera = captured(std::get<PhotoRef>(look.camera), info).camera;
   double fit = std::min(look.width / static_cast<double>(camera.width),
                         look.height / static_cast<double>(camera.height));
   // Beyond the photograph's own size a difference would be one from pixels that were made up.

@@ -4,8 +4,8 @@
 #include <functional>
 #include <optional>
 
-#include "serve/audience/audience.h"
-#include "serve/projector.h"
+#include "serve/clients/clients.h"
+#include "serve/frame_server.h"
 #include "serve/run_watch.h"
 #include "show/subject.h"
 #include "train/log_tail.h"
@@ -25,38 +25,38 @@ class RunView {
   };
 
   // Takes what is shown to the device. Throws what that throws, here alone.
-  RunView(Setting setting, Shown shown, Device device);
+  RunView(SceneInfo info, Shown shown, Device device);
 
-  // Whom the server talks to.
-  Room& room() { return audience_; }
+  // For the server.
+  MessageHandler& handler() { return clients_; }
 
-  // Follows a run. `reread` reads it anew, to the host, when it has been saved; whatever it throws is told to
-  // the pages, what was read before stays, and it is called again at the next look.
+  // Follows a run. When the run has saved a checkpoint, `reread` reads it to the host. Where that throws, the
+  // pages get the error's text, the scene stays as it was, and the next check tries again.
   void follow(RunWatch watch, std::function<Shown()> reread,
-              Audience::Clock::duration between_looks = std::chrono::seconds(1));
+              Clients::Clock::duration between_checks = std::chrono::seconds(1));
 
   // Until `stop` is set.
   void run(const std::atomic<bool>& stop);
-  // One turn of that: answers one page, when one asks within `most`, and looks after the run when it is time.
-  void turn(Audience::Clock::duration most);
+  // One turn of that: serves one job, if one arrives within `most`, and checks the run when it is time.
+  void turn(Clients::Clock::duration most);
 
  private:
-  Stage stage() const;
+  SceneView view() const;
   void take(Shown shown);
   // A scene for which the device has no memory is shown from the host.
   void move_to_device();
-  void look_after_run();
-  void tell_log();
+  void check_run();
+  void send_log();
 
   Device device_;
   Shown shown_;
-  Audience audience_;
-  Projector projector_;
+  Clients clients_;
+  FrameServer frame_server_;
   std::function<Shown()> reread_;
   std::optional<RunWatch> watch_;
   std::optional<LogTail> log_;
-  Audience::Clock::duration between_looks_ = {};
-  Audience::Clock::time_point looked_ = {};
+  Clients::Clock::duration between_checks_ = {};
+  Clients::Clock::time_point checked_ = {};
 };
 
 }  // namespace traceflow::serve

@@ -12,11 +12,11 @@ RunWatch::Version RunWatch::version_of(const std::filesystem::path& path) {
 }
 
 RunWatch::RunWatch(RunFolder run) : run_(std::move(run)) {
-  look();
+  poll();
   accept();
 }
 
-RunWatch::Change RunWatch::look() {
+RunWatch::Change RunWatch::poll() {
   const Version checkpoint = version_of(run_.checkpoint());
   if (checkpoint.size < 0) {
     // Where no file has two names, a checkpoint is renamed to the one before: only that one is there then.

@@ -7,25 +7,25 @@
 
 namespace traceflow::serve {
 
-// Looks whether a run that is shown goes on: another process may train it, or somebody move it away.
+// Polls the folder of a run, which another process may train, move or delete.
 class RunWatch {
  public:
-  // Takes the checkpoint that is there now for read; so make it before reading, lest one be missed that comes
-  // meanwhile.
+  // Counts the present checkpoint as read. Construct it before reading the checkpoint, so that one saved
+  // meanwhile is not missed.
   explicit RunWatch(RunFolder run);
 
   struct Change {
     bool vanished = false;  // the run's checkpoints are not there
     bool saved = false;     // there is another checkpoint than the one read last
   };
-  Change look();
-  // What the last look saw has been read: until this is said, it is another at every look.
+  Change poll();
+  // Counts the checkpoint of the last poll as read. Until then each poll reports it.
   void accept() { read_ = seen_; }
 
   const RunFolder& run() const { return run_; }
 
  private:
-  // What tells one version of a file from the next.
+  // Distinguishes versions of a file.
   struct Version {
     int64_t size = -1;
     int64_t changed = 0;

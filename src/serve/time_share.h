@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
-#include "serve/audience/audience.h"
+#include "serve/clients/clients.h"
 
 namespace traceflow::serve {
 
-// An account of the time that pages may take from a training: `share` of the whole. What nobody uses is saved
-// up to one second, enough for the first pictures of somebody who comes; whoever moves the camera may run
-// into as much debt.
+// Limits the share of a training's time that rendering for pages takes, as a token bucket. Up to one second
+// of unused time is saved, enough for the first pictures of a new page. A moving camera may overdraw by as
+// much.
 class TimeShare {
  public:
   // Above 0 and under 1.
@@ -20,7 +20,7 @@ class TimeShare {
 
   // Whether anything may be made now.
   bool is_open() const { return credit_ > -most_debt; }
-  // What only becomes finer or newer waits until there is time for it.
+  // Finer and newer frames wait until there is time for them.
   Allowed allowed() const { return {credit_ > 0, credit_ >= most_credit / 2}; }
 
   static constexpr double most_credit = 1, most_debt = 1;  // seconds

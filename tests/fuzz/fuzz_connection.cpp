@@ -8,34 +8,36 @@
 #include <cstdint>
 #include <set>
 
-#include "fuzz/front_door.h"
-#include "serve/net/connection.h"
+#include "fuzz/http_checks.h"
+#include "serve/net/http_session.h"
 
 using namespace traceflow;
 
 namespace {
 
 // Echoes, keeps account of who is here, and throws when it is told to.
-class FuzzRoom : public serve::Room {
+class FuzzRoom : public serve::MessageHandler {
  public:
-  void enter(uint64_t guest, serve::Send send) override {
-    fuzz::promise(guests_.insert(guest).second, "a guest enters once");
+  void on_connect(uint64_t client, serve::Send send) override {
+    fuzz::promise(clients_.insert(client).second, "a client enters once");
     send_ = std::move(send);
     ++entered;
   }
-  void hear(uint64_t guest, std::string_view text) override {
-    fuzz::promise(guests_.contains(guest), "who speaks is here");
+  void on_message(uint64_t client, std::string_view text) override {
+    fuzz::promise(clients_.contains(client), "who speaks is here");
     fuzz::promise(text.size() <= serve::Limits().message_bytes, "no long message is heard");
     if (text == "throw") throw std::runtime_error(std::string(200, 'x'));
     send_({std::make_shared<const std::string>(text), text.starts_with("b")});
   }
-  void leave(uint64_t guest) override { fuzz::promise(guests_.erase(guest) == 1, "a guest leaves once"); }
+  void on_disconnect(uint64_t client) override {
+    fuzz::promise(clients_.erase(client) == 1, "a client leaves once");
+  }
 
-  bool empty() const { return guests_.empty(); }
+  bool empty() const { return clients_.empty(); }
   int entered = 0;
 
  private:
-  std::set<uint64_t> guests_;
+  std::set<uint64_t> clients_;
   serve::Send send_;
 };
 
@@ -75,8 +77,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const size_t piece = data[0] == 0 ? size : data[0];
   const std::string_view asked(reinterpret_cast<const char*>(data + 1), size - 1);
 
-  FuzzRoom room;
-  serve::Common common{fuzz::front_door(), fuzz::page, room, {}};
+  FuzzRoom handler;
+  serve::SharedState shared{fuzz::request_guard(), fuzz::page, handler, {}};
   Caller caller;
   const auto live = [&] {
     io.restart();
@@ -85,7 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   };
   serve::Stream stream(io.get_executor(), boost::asio::generic::stream_protocol(AF_UNIX, 0),
                        caller.other_end());
-  common.sessions.push_back(serve::start_connection(std::move(stream), common, full));
+  shared.sessions.push_back(serve::start_http_session(std::move(stream), shared, full));
   for (size_t at = 0; at < asked.size(); at += piece) {
     caller.say(asked.substr(at, piece));
     live();
@@ -94,17 +96,18 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   live();
 
   fuzz::promise(
-      std::all_of(common.sessions.begin(), common.sessions.end(), [](const auto& s) { return s.expired(); }),
-      "a connection that is over is gone");
-  fuzz::promise(room.empty(), "whose connection is over has left");
+      std::all_of(shared.sessions.begin(), shared.sessions.end(), [](const auto& s) { return s.expired(); }),
+      "a closed connection is destroyed");
+  fuzz::promise(handler.empty(), "every closed connection has disconnected");
   const size_t end = caller.heard.find("\r\n\r\n");
   fuzz::promise(caller.heard.empty() || end != std::string::npos, "an answer is whole");
   if (end != std::string::npos) fuzz::check_head(std::string_view(caller.heard).substr(0, end + 2), asked);
-  fuzz::promise(room.entered == 0 || asked.find(fuzz::token) != std::string_view::npos, "no stranger enters");
+  fuzz::promise(handler.entered == 0 || asked.find(fuzz::token) != std::string_view::npos,
+                "no client without the token connects");
   const bool long_head = asked.substr(0, asked.find("\r\n\r\n")).size() > serve::Limits().header_bytes;
   fuzz::promise(!long_head || !caller.heard.starts_with("HTTP/1.1 200"), "no long header is read");
   fuzz::promise(!full || caller.heard.empty() || caller.heard.starts_with("HTTP/1.1 503") ||
                     caller.heard.starts_with("HTTP/1.1 4"),
-                "a full house lets nobody in");
+                "no connection above the limit is served");
   return 0;
 }

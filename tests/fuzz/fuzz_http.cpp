@@ -1,9 +1,9 @@
-// Bytes as a request: parser, gate, answer, without a connection.
+// Bytes as a request: parser, guard, answer, without a connection.
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <cstdint>
 
-#include "fuzz/front_door.h"
+#include "fuzz/http_checks.h"
 #include "serve/net/parser.h"
 
 using namespace traceflow;
@@ -17,9 +17,9 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   boost::system::error_code error;
   parser.put(boost::asio::buffer(asked), error);
   if (!parser.is_header_done()) return 0;
-  static const serve::Gate gate = fuzz::front_door();
+  static const serve::RequestGuard guard = fuzz::request_guard();
   const serve::Request request = serve::request_of(parser.get());
-  const serve::Answer reply = serve::answer(gate, fuzz::page, request);
+  const serve::Answer reply = serve::answer(guard, fuzz::page, request);
   const std::string text = serve::wire_text(reply, {true, request.stays});
   fuzz::check_head(std::string_view(text).substr(0, text.find("\r\n\r\n") + 2), asked);
   fuzz::promise(text.substr(text.find("\r\n\r\n") + 4) == reply.body, "the body follows the empty line");

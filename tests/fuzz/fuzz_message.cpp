@@ -1,4 +1,4 @@
-// Bytes as what a page says over its live connection, a message in each line: read, kept by the audience, and
+// Bytes as what a page says over its live connection, a message in each line: read, kept by the clients, and
 // turned into jobs.
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -6,7 +6,7 @@
 #include "base/error.h"
 #include "base/overloaded.h"
 #include "fuzz/promise.h"
-#include "serve/audience/audience.h"
+#include "serve/clients/clients.h"
 
 using namespace traceflow;
 using fuzz::promise;
@@ -57,9 +57,9 @@ void check(const serve::Outgoing& message) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   std::string_view rest(reinterpret_cast<const char*>(data), size);
-  serve::Audience audience([](serve::Do) {});
-  audience.greet_with("{}");
-  audience.enter(1, [](const serve::Outgoing& message) { check(message); });
+  serve::Clients clients([](serve::Do) {});
+  clients.set_hello("{}");
+  clients.on_connect(1, [](const serve::Outgoing& message) { check(message); });
   while (!rest.empty()) {
     const std::string_view line = rest.substr(0, rest.find('\n'));
     rest.remove_prefix(std::min(rest.size(), line.size() + 1));
@@ -67,18 +67,18 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       check(serve::parse_request(line));
     } catch (const InputError&) {
     }
-    audience.hear(1, line);
-    const auto job = audience.next();
+    clients.on_message(1, line);
+    const auto job = clients.next();
     if (!job) continue;
     if (std::holds_alternative<serve::FrameJob>(job->what)) {
-      audience.show_frame(*job, {{"type", "frame"}}, "picture", 100, 0.01);
+      clients.show_frame(*job, {{"type", "frame"}}, "picture", 100, 0.01);
     } else {
-      audience.refuse(*job, "not here");
+      clients.refuse(*job, "not here");
     }
   }
   int jobs = 0;
-  while (audience.next() && jobs < 1000) ++jobs;
-  audience.leave(1);
-  promise(!audience.next(), "nothing is done for who has left");
+  while (clients.next() && jobs < 1000) ++jobs;
+  clients.on_disconnect(1);
+  promise(!clients.next(), "nothing is done for who has left");
   return 0;
 }

@@ -27,7 +27,7 @@ class ScratchFolder {
   std::filesystem::path write(const std::filesystem::path& name, std::string_view bytes) const {
     std::filesystem::path path = folder_.path() / name;
     const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    promise(descriptor >= 0, "there is room for the input");
+    promise(descriptor >= 0, "there is handler for the input");
     promise(::write(descriptor, bytes.data(), bytes.size()) == static_cast<ssize_t>(bytes.size()),
             "the input is written");
     ::close(descriptor);

@@ -5,7 +5,7 @@
 
 #include <thread>
 
-#include "serve/audience/fake_page.h"
+#include "serve/clients/fake_page.h"
 #include "train/event_log.h"
 #include "train/small_run.h"
 
@@ -19,13 +19,14 @@ using serve::testing::look;
 struct WatchedRun {
   WatchedRun(int iterations, const std::string& name)
       : trainer(make_trainer(small_run(iterations), name)),
-        view({0.5}, make_setting("training", name, &trainer.capture(), trainer.scene().normalisation),
+        view({0.5}, make_scene_info("training", name, &trainer.capture(), trainer.scene().normalisation),
              {[this] {
-                return Stage{trainer.scene(), picture_render(trainer.options(), trainer.iteration()),
-                             picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
+                return SceneView{trainer.scene(), picture_render(trainer.options(), trainer.iteration()),
+                                 picture_request(trainer.options(), trainer.iteration()),
+                                 trainer.iteration()};
               },
               [this] {
-                if (cannot_save) throw InputError("run", "", "a full disk", "room");
+                if (cannot_save) throw InputError("run", "", "a full disk", "handler");
                 trainer.save();
               },
               [this](const events::Event& event) { trainer.stream().emit(event); },
@@ -67,7 +68,7 @@ TEST(LiveView, TrainingGoesByTheSameBytesWhetherSomebodyLooksOrNot) {
   alone.run(never);
 
   WatchedRun watched(30, "view_watched");
-  FakePage page(watched.view.room(), 1);
+  FakePage page(watched.view.handler(), 1);
   {
     const Wanderer wanderer(page);
     watched.trainer.run(watched.stop);
@@ -78,7 +79,7 @@ TEST(LiveView, TrainingGoesByTheSameBytesWhetherSomebodyLooksOrNot) {
 
 TEST(LiveView, TellsWhatHappens) {
   WatchedRun watched(12, "view_told");
-  const FakePage page(watched.view.room(), 1);
+  const FakePage page(watched.view.handler(), 1);
   watched.trainer.run(watched.stop);
   ASSERT_EQ(page.of("hello").size(), 1U);
   EXPECT_EQ(page.of("hello")[0].json["source"], "training");
@@ -97,7 +98,7 @@ TEST(LiveView, TellsWhatHappens) {
 
 TEST(LiveView, APauseHoldsTheIterationAndGoesOnShowing) {
   WatchedRun watched(20, "view_paused");
-  FakePage page(watched.view.room(), 1);
+  FakePage page(watched.view.handler(), 1);
   std::atomic<int64_t> reached{0}, saved{-1};
   watched.trainer.stream().listen([&](const events::Event& event) {
     if (const auto* step = std::get_if<events::Step>(&event)) reached = step->iteration;
@@ -129,7 +130,7 @@ TEST(LiveView, APauseHoldsTheIterationAndGoesOnShowing) {
 
 TEST(LiveView, StopsAPausedTraining) {
   WatchedRun watched(20, "view_stopped");
-  FakePage page(watched.view.room(), 1);
+  FakePage page(watched.view.handler(), 1);
   page.say({{"type", "command"}, {"do", "pause"}});
   page.say({{"type", "command"}, {"do", "stop"}});
   const events::Finished end = watched.trainer.run(watched.stop);
@@ -139,7 +140,7 @@ TEST(LiveView, StopsAPausedTraining) {
 
 TEST(LiveView, StaysUntilTheLastPageHasLeft) {
   WatchedRun watched(3, "view_stays");
-  FakePage page(watched.view.room(), 1);
+  FakePage page(watched.view.handler(), 1);
   watched.trainer.run(watched.stop);
   std::thread leaving([&] {
     page.say(look(1));
@@ -156,7 +157,7 @@ TEST(LiveView, StaysUntilTheLastPageHasLeft) {
 TEST(LiveView, ASaveThatFailsEndsNothing) {
   WatchedRun watched(10, "view_unsaved");
   watched.cannot_save = true;
-  FakePage page(watched.view.room(), 1);
+  FakePage page(watched.view.handler(), 1);
   page.say({{"type", "command"}, {"do", "save"}});
   EXPECT_EQ(watched.trainer.run(watched.stop).ending, events::Ending::completed);
   EXPECT_THAT(page.of("trouble").at(0).json["text"].get<std::string>(), ::testing::HasSubstr("full"));
@@ -164,13 +165,13 @@ TEST(LiveView, ASaveThatFailsEndsNothing) {
 
 TEST(LiveView, StaysForThePageThatStoppedItAndForNobodyElse) {
   WatchedRun watched(20, "view_stays_stopped");
-  FakePage page(watched.view.room(), 1);
+  FakePage page(watched.view.handler(), 1);
   page.say({{"type", "command"}, {"do", "stop"}});
   watched.trainer.run(watched.stop);
   EXPECT_TRUE(watched.view.is_wanted());
 
   WatchedRun interrupted(20, "view_interrupted");
-  FakePage other(interrupted.view.room(), 1);
+  FakePage other(interrupted.view.handler(), 1);
   interrupted.stop = true;
   interrupted.trainer.run(interrupted.stop);
   EXPECT_FALSE(interrupted.view.is_wanted());

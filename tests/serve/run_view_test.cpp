@@ -6,7 +6,7 @@
 #include <fstream>
 #include <new>
 
-#include "serve/audience/fake_page.h"
+#include "serve/clients/fake_page.h"
 #include "support/temp_folder.h"
 #include "train/event_log.h"
 #include "train/small_run.h"
@@ -25,9 +25,9 @@ class FollowedRun {
   explicit FollowedRun(const std::string& name)
       : trainer_(small_run(40), load_capture(capture_folder(), small_run(40).capture), run_.folder) {
     train_to(2);
-    view_.emplace(make_setting("run", name, &trainer_.capture(), trainer_.scene().normalisation), reread(),
+    view_.emplace(make_scene_info("run", name, &trainer_.capture(), trainer_.scene().normalisation), reread(),
                   Device::cpu);
-    page_.emplace(view_->room(), 1);
+    page_.emplace(view_->handler(), 1);
   }
   void follow() {
     view_->follow(RunWatch(run_),

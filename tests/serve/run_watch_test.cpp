@@ -16,7 +16,7 @@ struct WatchedFolder {
   void save(size_t length) const { std::ofstream(run.checkpoint()) << std::string(length, 'x'); }
   // "saved", "vanished" or nothing.
   static std::string seen_by(RunWatch& watch) {
-    const RunWatch::Change change = watch.look();
+    const RunWatch::Change change = watch.poll();
     return std::string(change.saved ? "saved" : "") + (change.vanished ? "vanished" : "");
   }
 

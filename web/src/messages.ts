@@ -24,7 +24,7 @@ export interface PhotoRef {
   index: number; // in Hello.cameras
 }
 
-// What the server takes at most; src/serve/audience/messages.cpp and src/serve/net/limits.h have these too.
+// What the server takes at most; src/serve/clients/messages.cpp and src/serve/net/limits.h have these too.
 export const look_side = 4096; // pixels, width and height
 export const still_side = 8192;
 export const message_bytes = 64 * 1024; // a longer message ends the connection

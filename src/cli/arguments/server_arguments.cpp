@@ -43,12 +43,14 @@ ServerArguments::ServerArguments(CLI::App& verb, CLI::Option* needs) : state_(st
       ->option_text("NAME:PORT");
 }
 
-std::unique_ptr<serve::Server> ServerArguments::start(serve::Room& room) const {
+std::unique_ptr<serve::Server> ServerArguments::start(serve::MessageHandler& handler) const {
   serve::ServerOptions options;
   options.bind = state_->bind;
   options.allowed_hosts = state_->allowed_hosts;
   options.port = state_->port.value_or(usual_port);
-  const auto listen = [&] { return std::make_unique<serve::Server>(options, serve::embedded_files(), room); };
+  const auto listen = [&] {
+    return std::make_unique<serve::Server>(options, serve::embedded_files(), handler);
+  };
   std::unique_ptr<serve::Server> server;
   try {
     server = listen();

@@ -20,7 +20,7 @@ class ServerArguments {
 
   // Starts the server, and says on standard output where to look and how from another machine. Where no port
   // was asked for and the usual one is taken, it takes any. Throws InputError.
-  std::unique_ptr<serve::Server> start(serve::Room& room) const;
+  std::unique_ptr<serve::Server> start(serve::MessageHandler& handler) const;
 
  private:
   struct State;

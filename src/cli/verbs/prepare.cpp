@@ -46,10 +46,10 @@ class Watcher {
 
 void run_prepare(const PrepareArguments& a) {
   Watcher watcher;
-  const prepare::Audience audience{
+  const prepare::ProgressCallbacks callbacks{
       [&](const std::string& line) { watcher.found(line); },
       [&](prepare::Step step, int64_t done, int64_t all) { watcher.at_work(step, done, all); }};
-  if (prepare::prepare_capture(a.input, a.capture, a.options, audience, stop_on_signals())) return;
+  if (prepare::prepare_capture(a.input, a.capture, a.options, callbacks, stop_on_signals())) return;
   watcher.found("stopped; the same command goes on with the step that it was in");
   throw Exit{exit_interrupted};
 }

@@ -119,13 +119,13 @@ class Watched {
   Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where,
           const std::atomic<bool>& stop)
       : view_(arguments.view_options,
-              serve::make_setting("training", run_name(arguments.output), &trainer.capture(),
-                                  trainer.scene().normalisation),
+              serve::make_scene_info("training", run_name(arguments.output), &trainer.capture(),
+                                     trainer.scene().normalisation),
               {[&trainer] { return stage_of(trainer); }, [&trainer] { trainer.save(); },
                [&trainer](const events::Event& event) { trainer.stream().emit(event); },
                [&trainer] { trainer.stop_soon(); }, &stop}) {
-    view_.recall(read_log(RunFolder{arguments.output}.log()));
-    server_ = where.start(view_.room());
+    view_.restore_log(read_log(RunFolder{arguments.output}.log()));
+    server_ = where.start(view_.handler());
     trainer.stream().listen([this](const events::Event& event) { view_(event); });
   }
 
@@ -137,7 +137,7 @@ class Watched {
   }
 
  private:
-  static serve::Stage stage_of(const Trainer& trainer) {
+  static serve::SceneView stage_of(const Trainer& trainer) {
     return {trainer.scene(), picture_render(trainer.options(), trainer.iteration()),
             picture_request(trainer.options(), trainer.iteration()), trainer.iteration()};
   }

@@ -22,9 +22,9 @@ struct ViewArguments {
 };
 
 // What a .ply that does not tell its scene's size is taken for.
-float extent_of(const Surfels& surfels, const serve::Setting& setting) {
+float extent_of(const Surfels& surfels, const serve::SceneInfo& info) {
   std::vector<show::Shot> shots;
-  for (const serve::CapturedCamera& view : setting.train) shots.push_back({view.id, view.time, view.camera});
+  for (const serve::CapturedCamera& view : info.train) shots.push_back({view.id, view.time, view.camera});
   if (shots.empty()) shots = show::orbit_around_points(surfels.position, 16, 9, 8);
   return show::extent_seen_from(surfels, shots);
 }
@@ -50,9 +50,9 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
   Scene& scene = loaded.subject.scene;
   if (!loaded.subject.warning.empty()) std::cerr << loaded.subject.warning << std::endl;
   const std::optional<Capture> capture = capture_beside(a, loaded);
-  serve::Setting setting = serve::make_setting(loaded.run ? "run" : "ply", run_name(a.scene),
-                                               capture ? &*capture : nullptr, scene.normalisation);
-  if (!(scene.extent > 0)) scene.extent = extent_of(scene.main, setting);
+  serve::SceneInfo info = serve::make_scene_info(loaded.run ? "run" : "ply", run_name(a.scene),
+                                                 capture ? &*capture : nullptr, scene.normalisation);
+  if (!(scene.extent > 0)) scene.extent = extent_of(scene.main, info);
 
   serve::RunView::Shown shown{std::move(loaded.subject)};
   if (loaded.run) {
@@ -60,9 +60,9 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
     shown.iterations = loaded.run->options.iterations;
     shown.note = loaded.run->note;
   }
-  serve::RunView view(std::move(setting), std::move(shown), devices.choose());
+  serve::RunView view(std::move(info), std::move(shown), devices.choose());
   if (loaded.run) view.follow(std::move(watch), [&a] { return shown_of(read_run(a.scene)); });
-  const auto server = where.start(view.room());
+  const auto server = where.start(view.handler());
   view.run(stop_on_signals());
 }
 

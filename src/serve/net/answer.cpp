@@ -67,8 +67,8 @@ std::string_view reason(int status) {
 
 }  // namespace
 
-Answer answer(const Gate& gate, std::span<const EmbeddedFile> page, const Request& request) {
-  if (const auto refusal = gate.refusal(request)) return plain_answer(refusal->status, refusal->words);
+Answer answer(const RequestGuard& guard, std::span<const EmbeddedFile> page, const Request& request) {
+  if (const auto refusal = guard.refusal(request)) return plain_answer(refusal->status, refusal->words);
   const std::string_view path = request.path();
   if (path == "/ws") {
     if (request.upgrade) return {101, {}, {}, {}};
@@ -80,7 +80,7 @@ Answer answer(const Gate& gate, std::span<const EmbeddedFile> page, const Reques
       std::find_if(page.begin(), page.end(), [&](const EmbeddedFile& f) { return f.name == name; });
   if (file == page.end() || request.upgrade) return plain_answer(404, "There is nothing at this address.");
   Answer found{200, std::string(content_type(name)), std::string(file->text()), {}};
-  if (gate.brings_token(request)) found.fields.emplace_back("Set-Cookie", gate.cookie());
+  if (guard.brings_token(request)) found.fields.emplace_back("Set-Cookie", guard.cookie());
   return found;
 }
 

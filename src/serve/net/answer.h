@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/embedded_file.h"
-#include "serve/net/gate.h"
+#include "serve/net/request_guard.h"
 
 namespace traceflow::serve {
 
@@ -17,13 +17,13 @@ struct Answer {
   std::vector<std::pair<std::string, std::string>> fields;  // beside those that every answer has
 };
 
-// What a request is answered.
-Answer answer(const Gate& gate, std::span<const EmbeddedFile> page, const Request& request);
+// The answer to a request.
+Answer answer(const RequestGuard& guard, std::span<const EmbeddedFile> page, const Request& request);
 
 // An answer that is one line of plain text.
-Answer plain_answer(int status, std::string words);
+Answer plain_answer(int status, std::string text);
 
-// Fields that every answer has: what a browser may do with it.
+// The security headers that every answer has.
 std::span<const Field> safety_fields();
 
 struct Form {

@@ -5,19 +5,20 @@
 
 namespace traceflow::serve {
 
-// How much of anything a connection may take. No page comes near these; who does is cut off.
+// What one connection may use. The viewer's page stays far below; a connection that exceeds a limit is
+// closed.
 struct Limits {
   size_t header_bytes = 8 << 10;    // of a request
   size_t message_bytes = 64 << 10;  // that a page sends
   size_t waiting_bytes = 64 << 20;  // on their way to a page
   size_t waiting_messages = 1024;   // likewise
-  // Until a whole request is there, from the connection or the last answer on; until an answer is taken.
+  // From the connection or the last answer until the whole request has arrived; also until an answer is sent.
   std::chrono::milliseconds request{20'000};
-  // Until 256 KiB of a message are taken.
+  // To send 256 KiB of a message.
   std::chrono::milliseconds piece{20'000};
-  // Until a page that says nothing is given up; at half of it, it is asked for a sign of life.
+  // Until a silent connection is closed; a ping is sent at half of it.
   std::chrono::milliseconds silence{60'000};
-  // To end a connection in good manners.
+  // To read what the client still sends after the last answer.
   std::chrono::milliseconds linger{2'000};
 };
 

@@ -6,23 +6,22 @@
 #include <mutex>
 #include <optional>
 
-#include "serve/net/room.h"
+#include "serve/net/message_handler.h"
 
 namespace traceflow::serve {
 
-// Messages on their way to one page: put in by any thread, taken out by the network's.
+// A bounded queue of messages to one page. Any thread puts messages in; the network thread takes them out.
 class Mailbox {
  public:
-  // messages, bytes: what may wait; the message that fills the box still fits. wake: called, while the box is
-  // open, when there is something to do after there was nothing, from the thread that puts it in; must return
-  // at once and not touch the box.
+  // messages, bytes: the capacity; the message that reaches it still fits. wake: called by the thread that
+  // puts a message into the empty, open queue; must return at once and not touch the queue.
   Mailbox(size_t messages, size_t bytes, std::function<void()> wake);
 
   void put(Outgoing message);
   std::optional<Outgoing> take();
-  // Whether more was put in than may wait. What waits then is not of use any more.
+  // Whether more was put in than fits. The queue's contents are then incomplete.
   bool overflowed() const;
-  // From now on nothing is put in, and wake is not called.
+  // Afterwards put() does nothing, and wake is not called.
   void close();
 
  private:

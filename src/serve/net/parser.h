@@ -6,7 +6,7 @@
 #include "serve/net/limits.h"
 #include "serve/net/request.h"
 
-// Boost's headers are many: this one is for the files that read requests alone.
+// Includes much of Boost, so only the files that read requests include this header.
 namespace traceflow::serve {
 
 using Parser = boost::beast::http::request_parser<boost::beast::http::empty_body>;

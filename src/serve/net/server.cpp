@@ -10,7 +10,7 @@
 #include <csignal>
 #include <thread>
 
-#include "serve/net/connection.h"
+#include "serve/net/http_session.h"
 #include "serve/net/token.h"
 
 namespace traceflow::serve {
@@ -22,7 +22,7 @@ using asio::ip::tcp;
 using boost::system::error_code;
 using Acceptor = asio::basic_socket_acceptor<tcp, Executor>;
 
-// Connections above the limit that are still told so.
+// Connections above the limit that are still answered, with status 503.
 constexpr size_t spare_connections = 8;
 
 [[noreturn]] void refuse(const ServerOptions& options, const error_code& error) {
@@ -38,8 +38,8 @@ constexpr size_t spare_connections = 8;
                    "an address of this machine");
 }
 
-// Programs that this one starts are not to hold its connections open.
-void keep_from_children(int handle) { fcntl(handle, F_SETFD, FD_CLOEXEC); }
+// Child processes must not inherit the connections.
+void close_on_exec(int handle) { fcntl(handle, F_SETFD, FD_CLOEXEC); }
 
 Acceptor listen(asio::io_context& io, const ServerOptions& options) {
   options.validate();
@@ -47,8 +47,8 @@ Acceptor listen(asio::io_context& io, const ServerOptions& options) {
   Acceptor acceptor(io);
   error_code error;
   acceptor.open(where.protocol(), error);
-  if (!error) keep_from_children(acceptor.native_handle());
-  // Else a port would be taken for a minute after its server has ended.
+  if (!error) close_on_exec(acceptor.native_handle());
+  // Without it the port stays in TIME_WAIT for a minute after the server has ended.
   if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(where, error);
   if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
@@ -56,8 +56,8 @@ Acceptor listen(asio::io_context& io, const ServerOptions& options) {
   return acceptor;
 }
 
-// The names under which the server may be asked, the one to print first. From outside by name only: what
-// names lead here only the user knows (allowed_hosts).
+// The values of Host that the server answers to; the first one is printed. Only the user knows which names
+// resolve to this machine from outside (allowed_hosts).
 std::vector<std::string> host_names(const ServerOptions& options, const tcp::endpoint& bound) {
   std::vector<std::string> names;
   const auto add = [&](const std::string& name) {
@@ -83,33 +83,34 @@ std::vector<std::string> host_names(const ServerOptions& options, const tcp::end
 }  // namespace
 
 struct Server::State {
-  State(const ServerOptions& options, std::span<const EmbeddedFile> page, Room& room, const Limits& limits)
+  State(const ServerOptions& options, std::span<const EmbeddedFile> page, MessageHandler& handler,
+        const Limits& limits)
       : acceptor(listen(io, options)),
         retry(io.get_executor()),
         connections(static_cast<size_t>(options.connections)),
         port(acceptor.local_endpoint().port()),
-        common(make_common(options, page, room, limits)) {
+        shared(make_shared_state(options, page, handler, limits)) {
     accept();
   }
 
-  Common make_common(const ServerOptions& options, std::span<const EmbeddedFile> page, Room& room,
-                     const Limits& limits) {
+  SharedState make_shared_state(const ServerOptions& options, std::span<const EmbeddedFile> page,
+                                MessageHandler& handler, const Limits& limits) {
     const auto names = host_names(options, acceptor.local_endpoint());
     const std::string token = random_token();
     address = fmt::format("http://{}/?token={}", names.front(), token);
-    return Common{Gate(token, port, names), page, room, limits};
+    return SharedState{RequestGuard(token, port, names), page, handler, limits};
   }
 
   void accept() {
     acceptor.async_accept([this](error_code error, auto socket) {
       if (error == asio::error::operation_aborted) return;
       if (error) return accept_later();
-      accept();  // first: greeting may fail
-      greet(std::move(socket));
+      accept();  // first, since starting a session may throw
+      start_session(std::move(socket));
     });
   }
 
-  // The system has no more handles, or the like: asking again at once would only spin.
+  // The system may have run out of file descriptors: retrying at once would only spin.
   void accept_later() {
     retry.expires_after(std::chrono::milliseconds(100));
     retry.async_wait([this](error_code error) {
@@ -118,30 +119,30 @@ struct Server::State {
   }
 
   template <class Socket>
-  void greet(Socket socket) {
-    auto& sessions = common.sessions;
+  void start_session(Socket socket) {
+    auto& sessions = shared.sessions;
     sessions.erase(
         std::remove_if(sessions.begin(), sessions.end(), [](const auto& s) { return s.expired(); }),
         sessions.end());
-    if (sessions.size() >= connections) make_room();
+    if (sessions.size() >= connections) close_unauthenticated();
     if (sessions.size() >= connections + spare_connections) return;
     error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
-    keep_from_children(socket.native_handle());
+    close_on_exec(socket.native_handle());
     const bool full = sessions.size() >= connections;
-    sessions.push_back(start_connection(Stream(std::move(socket)), common, full));
+    sessions.push_back(start_http_session(Stream(std::move(socket)), shared, full));
   }
 
-  // Nobody without the token can keep out who has it: the longest of those waiting makes way.
-  void make_room() {
-    auto& sessions = common.sessions;
-    const auto stranger = std::find_if(sessions.begin(), sessions.end(), [](const auto& s) {
+  // Clients without the token cannot keep out those that have it: the oldest of the former is closed.
+  void close_unauthenticated() {
+    auto& sessions = shared.sessions;
+    const auto unauthenticated = std::find_if(sessions.begin(), sessions.end(), [](const auto& s) {
       const auto alive = s.lock();
-      return alive && !alive->known();
+      return alive && !alive->is_authenticated();
     });
-    if (stranger == sessions.end()) return;
-    stranger->lock()->end();
-    sessions.erase(stranger);
+    if (unauthenticated == sessions.end()) return;
+    unauthenticated->lock()->end();
+    sessions.erase(unauthenticated);
   }
 
   void run() {
@@ -149,7 +150,7 @@ struct Server::State {
       try {
         io.run();
         return;
-      } catch (...) {  // what failed has ended; the others go on
+      } catch (...) {  // the session that threw has ended; the others go on
       }
     }
   }
@@ -158,27 +159,27 @@ struct Server::State {
     error_code ignored;
     acceptor.close(ignored);
     retry.cancel();
-    for (const auto& session : common.sessions) {
+    for (const auto& session : shared.sessions) {
       if (const auto alive = session.lock()) alive->end();
     }
     io.stop();
   }
 
-  // Above all that waits in it: it ends last.
+  // Declared first, so that it is destroyed last.
   asio::io_context io{1};
   Acceptor acceptor;
   Timer retry;
   size_t connections;
   int port;
   std::string address;
-  Common common;
+  SharedState shared;
   std::thread thread;
 };
 
-Server::Server(const ServerOptions& options, std::span<const EmbeddedFile> page, Room& room,
+Server::Server(const ServerOptions& options, std::span<const EmbeddedFile> page, MessageHandler& handler,
                const Limits& limits)
-    : state_(std::make_unique<State>(options, page, room, limits)) {
-  // Signals are for the program's own threads, whose waits they are to interrupt.
+    : state_(std::make_unique<State>(options, page, handler, limits)) {
+  // Signals must interrupt the main thread and not this one.
   sigset_t all;
   sigset_t before;
   sigfillset(&all);

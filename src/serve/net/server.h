@@ -8,7 +8,7 @@
 #include "base/embedded_file.h"
 #include "base/options.h"
 #include "serve/net/limits.h"
-#include "serve/net/room.h"
+#include "serve/net/message_handler.h"
 
 namespace traceflow::serve {
 
@@ -27,11 +27,11 @@ struct ServerOptions {
 // own. Everything asked of it must carry the token of its address (docs/view.md, Safety).
 class Server {
  public:
-  // Starts to listen. page (embedded_files() of serve/net/page.h) and room outlive the server. Throws
+  // Starts to listen. page (embedded_files() of serve/net/page.h) and handler outlive the server. Throws
   // InputError when the address is not to be had.
-  Server(const ServerOptions& options, std::span<const EmbeddedFile> page, Room& room,
+  Server(const ServerOptions& options, std::span<const EmbeddedFile> page, MessageHandler& handler,
          const Limits& limits = {});
-  // Ends all connections: when it returns, every guest has left.
+  // Ends all connections: when it returns, every client has left.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "base/embedded_file.h"
-#include "serve/net/gate.h"
 #include "serve/net/limits.h"
-#include "serve/net/room.h"
+#include "serve/net/message_handler.h"
+#include "serve/net/request_guard.h"
 
-// Boost's headers are many: this one is for the files that carry connections alone.
+// Includes much of Boost, so only the files that implement connections include this header.
 namespace traceflow::serve {
 
 // Everything here runs on the one thread of an io_context.
@@ -30,27 +30,27 @@ using Timer =
     boost::asio::basic_waitable_timer<std::chrono::steady_clock,
                                       boost::asio::wait_traits<std::chrono::steady_clock>, Executor>;
 
-// A connection. Lives for as long as it waits for something.
+// One connection. Its pending operations keep it alive.
 class Session {
  public:
   virtual ~Session() = default;
-  // Cuts the connection, so that nothing is waited for any more.
+  // Closes the connection and so cancels its pending operations.
   virtual void end() = 0;
-  // Whether whoever is at the other end has shown the token.
-  virtual bool known() const = 0;
+  // Whether the client has shown the token.
+  virtual bool is_authenticated() const = 0;
 };
 
 // What all connections of a server share. Outlives them.
-struct Common {
-  Gate gate;
+struct SharedState {
+  RequestGuard guard;
   std::span<const EmbeddedFile> page;
-  Room& room;
+  MessageHandler& handler;
   Limits limits;
-  uint64_t guests = 0;  // that ever were
+  uint64_t clients = 0;  // that ever were
   std::vector<std::weak_ptr<Session>> sessions = {};
 };
 
-// Ends a session when the time that it was given is over, however much happened in between.
+// Ends a session when its time is over, whatever happened in between.
 class Deadline {
  public:
   explicit Deadline(const Executor& executor) : timer_(executor) {}
@@ -71,10 +71,10 @@ class Deadline {
   Timer timer_;
 };
 
-// After the last words of a connection: what the other side still sends is read for a moment, as closing the
-// connection at once would take those words from it.
+// Closes a connection after its last answer. Reads what the client still sends for a moment, since closing at
+// once would reset the connection and the client might lose the answer (RFC 9112, section 9.6).
 template <class Session>
-class Farewell {
+class LingeringClose {
  public:
   void begin(Session& session, Stream& stream) {
     boost::system::error_code ignored;
@@ -85,14 +85,14 @@ class Farewell {
  private:
   void read(Session& session, Stream& stream) {
     stream.async_read_some(
-        boost::asio::buffer(unheard_),
+        boost::asio::buffer(discarded_),
         [this, &stream, self = session.shared_from_this()](const boost::system::error_code& error, size_t) {
           if (error) return self->end();
           read(*self, stream);
         });
   }
 
-  std::array<char, 4096> unheard_{};
+  std::array<char, 4096> discarded_{};
 };
 
 }  // namespace traceflow::serve

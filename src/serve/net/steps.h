@@ -4,8 +4,8 @@
 
 namespace traceflow::serve {
 
-// What to do when a wait of a session is over: its member function, called with the error. Keeps the session
-// alive until then; whatever the function throws ends this session and no other.
+// The completion handler of an asynchronous operation: calls a member function of the session with the error.
+// It keeps the session alive until then. An exception ends this session and no other.
 template <class Session>
 auto step(Session& session, void (Session::*next)(boost::system::error_code)) {
   return [self = session.shared_from_this(), next](boost::system::error_code error, auto...) {

@@ -20,8 +20,8 @@ constexpr EmbeddedFile page[] = {{"index.html", bytes},
                                  {"other", bytes}};
 
 Answer answer_to(std::string_view target, bool upgrade = false) {
-  const Gate gate("secret", 80, {"here"});
-  return answer(gate, page,
+  const RequestGuard guard("secret", 80, {"here"});
+  return answer(guard, page,
                 {"GET",
                  target,
                  {{"Host", "here"}, {"Origin", "http://here"}, {"Cookie", "traceflow_80=secret"}},

@@ -12,7 +12,7 @@
 
 namespace traceflow::serve {
 
-Client::Client(int port) : handle_(socket(AF_INET, SOCK_STREAM, 0)) {
+HttpClient::HttpClient(int port) : handle_(socket(AF_INET, SOCK_STREAM, 0)) {
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<uint16_t>(port));
@@ -25,11 +25,11 @@ Client::Client(int port) : handle_(socket(AF_INET, SOCK_STREAM, 0)) {
   }
 }
 
-Client::~Client() {
+HttpClient::~HttpClient() {
   if (handle_ >= 0) close(handle_);
 }
 
-bool Client::send(std::string_view bytes) {
+bool HttpClient::send(std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = ::send(handle_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent <= 0) return false;
@@ -38,7 +38,7 @@ bool Client::send(std::string_view bytes) {
   return true;
 }
 
-bool Client::more() {
+bool HttpClient::more() {
   std::array<char, 65536> bytes{};
   errno = 0;
   const ssize_t got = recv(handle_, bytes.data(), bytes.size(), 0);
@@ -47,7 +47,7 @@ bool Client::more() {
   return true;
 }
 
-std::optional<std::string> Client::bytes(size_t count) {
+std::optional<std::string> HttpClient::bytes(size_t count) {
   while (unread_.size() < count) {
     if (!more()) return std::nullopt;
   }
@@ -56,7 +56,7 @@ std::optional<std::string> Client::bytes(size_t count) {
   return result;
 }
 
-std::optional<Reply> Client::reply(bool body) {
+std::optional<Reply> HttpClient::reply(bool body) {
   size_t end;
   while ((end = unread_.find("\r\n\r\n")) == std::string::npos) {
     if (!more()) return std::nullopt;
@@ -81,12 +81,12 @@ std::optional<Reply> Client::reply(bool body) {
   return reply;
 }
 
-bool Client::ends() {
+bool HttpClient::ends() {
   while (more()) unread_.clear();
   return errno != EAGAIN;  // the same as EWOULDBLOCK here
 }
 
-SocketClient::SocketClient(int port, const std::string& lines) : client_(port) {
+WebSocketClient::WebSocketClient(int port, const std::string& lines) : client_(port) {
   // The key and its answer are those of RFC 6455, section 1.3.
   client_.send(
       "GET /ws HTTP/1.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
@@ -95,7 +95,7 @@ SocketClient::SocketClient(int port, const std::string& lines) : client_(port) {
   welcome_ = client_.reply();
 }
 
-bool SocketClient::send_frame(int opcode, std::string_view payload, bool last, bool masked) {
+bool WebSocketClient::send_frame(int opcode, std::string_view payload, bool last, bool masked) {
   std::string bytes(1, static_cast<char>((last ? 0x80 : 0) | opcode));
   const char mask_bit = static_cast<char>(masked ? 0x80 : 0);
   const size_t size = payload.size();
@@ -117,7 +117,7 @@ bool SocketClient::send_frame(int opcode, std::string_view payload, bool last, b
   return client_.send(bytes);
 }
 
-std::optional<Frame> SocketClient::frame() {
+std::optional<Frame> WebSocketClient::frame() {
   const auto head = client_.bytes(2);
   if (!head) return std::nullopt;
   const auto byte = [](char c) { return static_cast<unsigned char>(c); };
@@ -135,7 +135,7 @@ std::optional<Frame> SocketClient::frame() {
   return frame;
 }
 
-std::optional<Frame> SocketClient::message() {
+std::optional<Frame> WebSocketClient::message() {
   std::optional<Frame> whole;
   while (auto part = frame()) {
     if (part->opcode == 8) return part;

@@ -16,15 +16,15 @@ struct Reply {
 };
 
 // A client made of a plain socket, which says exactly what it is told to. Waits 20 s for an answer at most.
-class Client {
+class HttpClient {
  public:
-  explicit Client(int port);
-  ~Client();
-  Client(Client&& other) noexcept
+  explicit HttpClient(int port);
+  ~HttpClient();
+  HttpClient(HttpClient&& other) noexcept
       : handle_(std::exchange(other.handle_, -1)), unread_(std::move(other.unread_)) {}
-  Client(const Client&) = delete;
-  Client& operator=(const Client&) = delete;
-  Client& operator=(Client&&) = delete;
+  HttpClient(const HttpClient&) = delete;
+  HttpClient& operator=(const HttpClient&) = delete;
+  HttpClient& operator=(HttpClient&&) = delete;
 
   // False when the connection is gone.
   bool send(std::string_view bytes);
@@ -49,10 +49,10 @@ struct Frame {
 };
 
 // The client's half of RFC 6455, by hand.
-class SocketClient {
+class WebSocketClient {
  public:
   // Sends the upgrade request with these lines, each ending in \r\n, beside those that make it one.
-  SocketClient(int port, const std::string& lines);
+  WebSocketClient(int port, const std::string& lines);
 
   const std::optional<Reply>& welcome() const { return welcome_; }
   bool send_text(std::string_view text) { return send_frame(1, text); }
@@ -61,10 +61,10 @@ class SocketClient {
   std::optional<Frame> frame();
   // The next whole message, whatever else comes in between; a closing one comes as its frame does.
   std::optional<Frame> message();
-  Client& client() { return client_; }
+  HttpClient& client() { return client_; }
 
  private:
-  Client client_;
+  HttpClient client_;
   std::optional<Reply> welcome_;
 };
 

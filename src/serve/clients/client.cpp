@@ -1,0 +1,113 @@
+#include "serve/clients/client.h"
+
+#include "base/overloaded.h"
+#include "serve/clients/replies.h"
+
+namespace traceflow::serve {
+
+namespace {
+
+constexpr size_t max_questions = 32;  // that wait for an answer
+constexpr size_t max_in_flight = 2;   // frames sent that the page has not shown yet
+// After memory ran out: how long frames stay coarse, and how long none is tried.
+constexpr std::chrono::seconds coarse_for{30}, retry_after{1};
+
+}  // namespace
+
+void Client::look(const Look& look) {
+  look_ = look;
+  asleep_ = false;
+  shown_divisor_ = std::numeric_limits<double>::infinity();
+  shown_final_ = false;
+}
+
+void Client::seen(int64_t frame, Clock::time_point now) {
+  while (!in_flight_.empty() && in_flight_.front().frame <= frame) {
+    const Sent& sent = in_flight_.front();
+    pacer_.displayed(sent.bytes, std::chrono::duration<double>(now - sent.when).count());
+    in_flight_.pop_front();
+  }
+}
+
+bool Client::ask(const Question& question) {
+  if (questions_.size() >= max_questions) return false;
+  questions_.push_back(question);
+  return true;
+}
+
+void Client::drop_look(int64_t look) {
+  if (look_ && look_->id == look) look_.reset();
+}
+
+std::optional<Job> Client::next_question() {
+  const Question question = std::move(questions_.front());
+  questions_.pop_front();
+  const auto about_look = [&](const char* name, int64_t id, auto make) -> std::optional<Job> {
+    if (look_) return Job{number_, make(*look_)};
+    send_(refusal(name, id, "nothing has been looked at yet"));
+    return std::nullopt;
+  };
+  return std::visit(
+      Overloaded{[&](const Photo& photo) {
+                   return std::optional<Job>({number_, photo});
+                 },
+                 [&](const Path& path) {
+                   return std::optional<Job>({number_, path});
+                 },
+                 [&](const Probe& probe) {
+                   return about_look("probe", probe.id, [&](const Look& l) { return ProbeJob{l, probe}; });
+                 },
+                 [&](const Still& still) {
+                   return about_look("still", still.id, [&](const Look& l) { return StillJob{l, still}; });
+                 }},
+      question);
+}
+
+bool Client::wants_frame(const Allowed& allowed, const SceneState& scene, Clock::time_point now) const {
+  if (!look_ || asleep_ || in_flight_.size() >= max_in_flight) return false;
+  if (now < not_before_) return false;
+  if (sees_nothing()) return true;
+  if (look_->moving) return false;
+  if (!shown_final_) return allowed.refining;
+  return allowed.refreshing && shown_scene_ != scene.number && now - served_ >= scene.refresh;
+}
+
+Coarseness Client::coarseness(Clock::time_point now) const {
+  const double pixels = static_cast<double>(look_->width) * look_->height;
+  Coarseness chosen = Pacer::full();
+  if (sees_nothing()) {
+    chosen = pacer_.moving(pixels);
+  } else if (!shown_final_) {
+    chosen = pacer_.finer(pixels, shown_divisor_);
+  }
+  if (!lacks_memory(now) || chosen.divisor >= min_divisor_) return chosen;
+  // The finest that fits.
+  return {min_divisor_, chosen.quality, !look_->moving};
+}
+
+Job Client::next_frame(Clock::time_point now) {
+  served_ = now;
+  return {number_, FrameJob{*look_, coarseness(now)}};
+}
+
+void Client::show(const FrameJob& job, const Outgoing& message, double pixels, double seconds,
+                  const SceneState& scene) {
+  const auto bytes = static_cast<double>(message.bytes->size());
+  pacer_.rendered(pixels, seconds, bytes, job.coarseness.quality);
+  served_ = Clock::now();
+  in_flight_.push_back({++frames_, bytes, served_});
+  send_(message);
+  // A newer Look may have arrived meanwhile.
+  if (!look_ || look_->id != job.look.id) return;
+  shown_divisor_ = job.coarseness.divisor;
+  shown_final_ = job.coarseness.final;
+  shown_scene_ = scene.number;
+}
+
+void Client::no_memory_for(const FrameJob& job, Clock::time_point now) {
+  min_divisor_ = 2 * job.coarseness.divisor;
+  coarse_until_ = now + coarse_for;
+  not_before_ = now + retry_after;
+}
+
+}  // namespace traceflow::serve

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <map>
+#include <memory>
+
+#include "render/renderer.h"
+#include "serve/clients/clients.h"
+#include "serve/scene_view.h"
+#include "show/picture.h"
+
+namespace traceflow::serve {
+
+// Renders the pictures that pages request and answers their other requests, on the thread that owns the
+// scene.
+class FrameServer {
+ public:
+  FrameServer(Clients& clients, SceneInfo info) : clients_(clients), info_(std::move(info)) {}
+
+  // Sends the hello message to every page, now and later.
+  void send_hello(const SceneView& view);
+  // Serves one job. Errors are sent to the page as text; nothing is thrown.
+  void answer(const Job& job, const SceneView& view);
+  // The scene is about to change: drops what was computed from it and, on a CUDA device, frees the memory
+  // that training may need.
+  void scene_changed(Device device);
+  // Another scene is shown from now on.
+  void forget();
+
+ private:
+  void answer(const Job& job, const FrameJob& frame, const SceneView& view);
+  void answer(const Job& job, const StillJob& still, const SceneView& view);
+  void answer(const Job& job, const ProbeJob& probe, const SceneView& view);
+  void answer(const Job& job, const Photo& photo, const SceneView& view);
+  void answer(const Job& job, const Path& path, const SceneView& view);
+
+  FrameRequest request_for(const Look& look, const SceneView& view, double divisor) const;
+  // As the capture has it, on the host. Throws InputError.
+  std::shared_ptr<const ViewImages> photograph(const PhotoRef& photo) const;
+  // What a Look shows, as 8-bit colours.
+  Tensor<uint8_t> picture(const Look& look, const FrameRequest& request, const SceneView& view,
+                          show::Painter& painter);
+  Renderer& renderer(const SceneView& view);
+  show::Tracks tracks(const FrameRequest& request, const SceneView& view);
+
+  Clients& clients_;
+  SceneInfo info_;
+  std::unique_ptr<Renderer> renderer_;
+  std::optional<show::TrackFollower> follower_;  // of the scene as it is now, once a page wants paths
+  bool posed_ = false;                           // the renderer has seen the scene as it is now
+  std::map<uint64_t, show::Painter> painters_;   // of every page, whose ranges follow what it sees
+};
+
+}  // namespace traceflow::serve
