@@ -2,7 +2,7 @@
 
 #include "math/bf16.h"
 #include "on_device.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 
 // What the CUDA device can do, measured: copies within its memory, matrix products, and how soon one small
 // piece of work follows another. The floors of the other benchmarks' calls rest on it (scripts/floors).
@@ -30,7 +30,7 @@ void start_on_device(benchmark::State& state) {
 BENCHMARK(start_on_device)->Apply(bench::by_the_clock);
 
 // The one place that knows the product's name. C = A·Bᵀ, as layers have it.
-void multiply(int64_t m, int64_t n, int64_t k, Number number, const Tensor<std::byte>& a,
+void multiply(int64_t m, int64_t n, int64_t k, DType number, const Tensor<std::byte>& a,
               const Tensor<std::byte>& b, Tensor<std::byte>& c) {
   cuda::multiply({.m = m,
                   .k = k,
@@ -57,7 +57,7 @@ Tensor<std::byte> random_operand(int64_t numbers, uint64_t seed) {
 }
 
 template <class T>
-void time_product(benchmark::State& state, Number number) {
+void time_product(benchmark::State& state, DType number) {
   const int64_t m = state.range(1), n = state.range(2), k = state.range(3);
   const Tensor<std::byte> a = random_operand<T>(m * k, 1), b = random_operand<T>(n * k, 2);
   Tensor<std::byte> c({m * n * static_cast<int64_t>(sizeof(T))}, Device::cuda);
@@ -71,9 +71,9 @@ void time_product(benchmark::State& state, Number number) {
 void product_on_device(benchmark::State& state) {
   if (bench::no_device(state)) return;
   if (state.range(0) == 16) {
-    time_product<Bf16>(state, Number::bf16);
+    time_product<Bf16>(state, DType::bf16);
   } else {
-    time_product<float>(state, Number::fp32);
+    time_product<float>(state, DType::fp32);
   }
 }
 BENCHMARK(product_on_device)

@@ -7,7 +7,7 @@
 #include "base/device_memory.h"
 #include "base/random.h"
 #include "base/tensor.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 #include "scene/field.h"
 #include "scene/surfels.h"
 

@@ -3,8 +3,8 @@
 #include "base/parallel.h"
 #include "math/spherical_harmonics.h"
 #include "ops/shade/shade.h"
+#include "primitives/batched_fill.h"
 #include "primitives/sums.h"
-#include "primitives/zeros.h"
 #include "render/frame_kernels.h"
 #include "render/samples.h"
 #include "render/visibility.h"
@@ -49,7 +49,7 @@ Tensor<float> Frame::specular_image() const {
 }
 
 void SceneGradient::reset(const Scene& scene) {
-  Zeros zeros;
+  BatchedZeroFill zeros;
   const auto like = [&](auto& gradient, const auto& parameters) {
     gradient.resize_like(parameters);
     gradient.for_each([&](const auto&, auto& tensor) { zeros.add(tensor); });

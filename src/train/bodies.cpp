@@ -460,7 +460,7 @@ Sphere sphere_around(const Tensor<float>& position, const Surfels& surfels, int3
 
 }  // namespace
 
-void take_light_along(const Motion& motion, const Surfels& surfels, Lighting& lighting) {
+void carry_lighting(const Motion& motion, const Surfels& surfels, Lighting& lighting) {
   for (int64_t key = 0; key < lighting.times(); ++key) {
     const Tensor<float> position = positions_at(lighting.time[key], motion, surfels);
     for (int64_t b = 0; b < lighting.bodies(); ++b) {
@@ -510,7 +510,7 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
   lighting.middle.reset({motion.bodies(), lighting.times(), 3});
   lighting.radius.reset({motion.bodies()});
   lighting.body_brightness.reset({motion.bodies(), lighting.times(), 4});
-  take_light_along(motion, surfels, lighting);
+  carry_lighting(motion, surfels, lighting);
   return lighting;
 }
 

@@ -54,7 +54,7 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
                          bool on_bodies);
 // Sets the middle of light on each body to that of its opaque surfels at each time, and the radius to the
 // root of their mean squared distance from it at the first time. On the CPU.
-void take_light_along(const Motion& motion, const Surfels& surfels, Lighting& lighting);
+void carry_lighting(const Motion& motion, const Surfels& surfels, Lighting& lighting);
 
 // How far pictures are from the photographs where surfels show that no body carries.
 struct Unrest {

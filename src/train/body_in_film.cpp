@@ -24,7 +24,7 @@ BodyInFilm::BodyInFilm(const Surfels& surfels, int32_t of_body, const raster::Op
   choose_points();
 }
 
-void BodyInFilm::look_at(FilmViews views) {
+void BodyInFilm::observe(FilmViews views) {
   film = std::move(views);
   looks.clear();
   for (const FilmView& view : *film) {

@@ -91,7 +91,7 @@ struct BodyInFilm {
   float* shift(size_t n, int64_t time) const { return &all_nodes->shift(nodes[n], time, 0); }
 
   // Takes views instead of those it had.
-  void look_at(FilmViews views);
+  void observe(FilmViews views);
   // By pictures of all bodies where they stand.
   void find_what_is_in_front();
   // What each view shows where the body stands.

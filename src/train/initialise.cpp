@@ -14,7 +14,7 @@
 #include "scene/rows.h"
 #include "train/bodies.h"
 #include "train/common_view.h"
-#include "train/sightings.h"
+#include "train/initial_observations.h"
 #include "train/true_poses.h"
 
 namespace traceflow {
@@ -66,18 +66,18 @@ void set_rotations_from_neighbours(Surfels& s) {
 }
 
 // Grey where nothing is known.
-void set_colours(Surfels& s, const Sightings& sightings) {
+void set_colours(Surfels& s, const InitialObservations& observations) {
   for (int64_t i = 0; i < s.count(); ++i) {
-    if (!sightings.any[static_cast<size_t>(i)]) continue;
+    if (!observations.any[static_cast<size_t>(i)]) continue;
     for (int64_t c = 0; c < 3; ++c) {
-      s.sh(i, 0, c) = (sightings.colour(i, c) - 0.5F) / static_cast<float>(sh_c0);
+      s.sh(i, 0, c) = (observations.colour(i, c) - 0.5F) / static_cast<float>(sh_c0);
     }
   }
 }
 
-void set_tint_from_masks(Surfels& s, const Sightings& sightings, const InitialOptions& options) {
+void set_tint_from_masks(Surfels& s, const InitialObservations& observations, const InitialOptions& options) {
   for (int64_t i = 0; i < s.count(); ++i) {
-    const bool on_object = sightings.outside[static_cast<size_t>(i)] < 0;
+    const bool on_object = observations.outside[static_cast<size_t>(i)] < 0;
     s.tint_logit[i] = logit(on_object ? options.tint_in_mask : options.tint_outside_mask);
   }
 }
@@ -221,11 +221,11 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   Surfels s = surfels_at_points(thinned(points, limit, random), as_environment, random);
   s.tint_logit = s.roughness_logit = {};
   // What the camera sees beside the object is also what the object mirrors.
-  const Sightings sightings = look_at(s, earliest_photographs(capture));
-  set_colours(s, sightings);
+  const InitialObservations observations = observe(s, earliest_photographs(capture));
+  set_colours(s, observations);
   RowEdit surroundings;
   for (int64_t i = 0; i < s.count(); ++i) {
-    if (sightings.outside[static_cast<size_t>(i)] > 0) surroundings.keep(i);
+    if (observations.outside[static_cast<size_t>(i)] > 0) surroundings.keep(i);
   }
   edit_rows(s, surroundings);
   return s;
@@ -305,9 +305,9 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks &&
                         !capture.masks_are_estimated && !capture.masks_are_found;
   if (options.initial.colours_from_views || by_masks) {
-    const Sightings sightings = look_at(scene.main, earliest_photographs(capture));
-    if (options.initial.colours_from_views) set_colours(scene.main, sightings);
-    if (by_masks) set_tint_from_masks(scene.main, sightings, options.initial);
+    const InitialObservations observations = observe(scene.main, earliest_photographs(capture));
+    if (options.initial.colours_from_views) set_colours(scene.main, observations);
+    if (by_masks) set_tint_from_masks(scene.main, observations, options.initial);
   }
   if (follows_bodies(capture, options)) scene.main_motion = find_bodies(capture, made.at_points, scene.main);
   if (options.deform.track.true_poses) take_true_poses(capture, scene);

@@ -95,8 +95,8 @@ struct PhotometricAdjustment::State : BodyInFilm {
   }
   int64_t block_of(int64_t key) const { return block_of_key[static_cast<size_t>(key)]; }
 
-  void look_at(FilmViews views) {
-    BodyInFilm::look_at(std::move(views));
+  void observe(FilmViews views) {
+    BodyInFilm::observe(std::move(views));
     pair_views();
     find_rays();
   }
@@ -471,7 +471,7 @@ PhotometricAdjustment::PhotometricAdjustment(const Surfels& main, int32_t body,
 PhotometricAdjustment::~PhotometricAdjustment() = default;
 PhotometricAdjustment::PhotometricAdjustment(PhotometricAdjustment&&) noexcept = default;
 
-void PhotometricAdjustment::look_at(FilmViews views) { state_->look_at(std::move(views)); }
+void PhotometricAdjustment::observe(FilmViews views) { state_->observe(std::move(views)); }
 
 void PhotometricAdjustment::solve(int steps) {
   for (int k = 0; k < steps && !state_->pairs.empty(); ++k) {

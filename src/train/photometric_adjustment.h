@@ -33,7 +33,7 @@ class PhotometricAdjustment {
   PhotometricAdjustment(PhotometricAdjustment&&) noexcept;
 
   // Takes views of another size.
-  void look_at(FilmViews views);
+  void observe(FilmViews views);
   // Up to so many steps, as long as the cost falls.
   void solve(int steps);
   // The robust cost of the views, without what keeps the shape: a mean over compared points.

@@ -356,7 +356,7 @@ std::vector<Tracker::Adjusted> Tracker::adjust(const Surfels& main, const std::v
     const FilmViews views = film_views(motion, widest, blur, normals);
     for (std::vector<PhotometricAdjustment>* tried : {&as_rigid, &as_bent}) {
       for (PhotometricAdjustment& adjustment : *tried) {
-        adjustment.look_at(views);
+        adjustment.observe(views);
         adjustment.solve(options_.adjust);
       }
     }

@@ -35,10 +35,10 @@ double seconds_since(Clock::time_point start) {
 }
 
 // Bonds are among what the field moves.
-void leave_others(const Tensor<int32_t>& body, Tensor<int32_t>& bonds) {
-  for (int64_t i = 0; i < bonds.dim(0); ++i) {
-    for (int64_t k = 0; k < bonds.dim(1); ++k) {
-      int32_t& other = bonds(i, k);
+void leave_others(const Tensor<int32_t>& body, Tensor<int32_t>& edges) {
+  for (int64_t i = 0; i < edges.dim(0); ++i) {
+    for (int64_t k = 0; k < edges.dim(1); ++k) {
+      int32_t& other = edges(i, k);
       if (other >= 0 && (body[i] != moved_by_field || body[other] != moved_by_field)) other = -1;
     }
   }
@@ -131,7 +131,7 @@ Trainer::Trainer(const TrainOptions& options, Capture capture, const std::filesy
       cloud_radius_(points_in_view_ > 0 ? cloud_radius(capture_.points) : cloud_radius({})),
       environment_radius_(half_diagonal(scene_.environment.position.on(Device::cpu))),
       views_(static_cast<int64_t>(capture_.train.size())),
-      health_(options.non_finite, options.collapse_decibels),
+      divergence_(options.non_finite, options.collapse_decibels),
       renderer_(options.render, memory_.kept),
       meter_(device),
       before_step_{random_, views_, -1, {}, {}, {}, {}, {}, false} {
@@ -286,14 +286,14 @@ void Trainer::set_refined_cameras() {
 
 void Trainer::add_rigidity(const Frame& frame) {
   if (frame.main.count() == 0) return;
-  if (bonds_.index.empty()) {
-    Neighbours bonds = spread_neighbours(scene_.main.position.on(Device::cpu), bonds_each, bond_stride);
-    if (scene_.main_motion) leave_others(scene_.main.body.on(Device::cpu), bonds.index);
-    bonds_ = bonds.on(device_);
+  if (neighbour_edges_.index.empty()) {
+    Neighbours edges = spread_neighbours(scene_.main.position.on(Device::cpu), neighbours_each, bond_stride);
+    if (scene_.main_motion) leave_others(scene_.main.body.on(Device::cpu), edges.index);
+    neighbour_edges_ = edges.on(device_);
   }
   grad_frame_.main_position.reset(frame.main.position.shape());
   grad_rest_.reset(scene_.main.position.shape());
-  loss::rigidity(scene_.main.position, frame.main.position, frame.subset, bonds_,
+  loss::rigidity(scene_.main.position, frame.main.position, frame.subset, neighbour_edges_,
                  options_.loss.rigidity_strain, options_.loss.rigidity, grad_rest_, grad_frame_.main_position,
                  means_.add(LossMeans::rigidity, options_.loss.rigidity));
 }
@@ -316,7 +316,7 @@ void Trainer::control_density(int done, const Surfels& new_surface) {
   };
   if (new_surface.count() > 0) {
     tell(main_density_.add(scene_.main, optimiser_.main(), new_surface), false);
-    bonds_ = {};
+    neighbour_edges_ = {};
   }
   // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
   if (tracking(done - 1).goes_on) return;
@@ -327,7 +327,7 @@ void Trainer::control_density(int done, const Surfels& new_surface) {
                                schedule_.prunes_large_main(done),
                                schedule_.prunes_faint_main(done)};
     tell(main_density_.update(scene_.main, optimiser_.main(), limits, random_), reset);
-    bonds_ = {};
+    neighbour_edges_ = {};
   }
   if (scene_.environment.count() > 0 && schedule_.densifies_environment(done)) {
     const bool reset = schedule_.resets_environment_opacity(done);
@@ -339,11 +339,11 @@ void Trainer::control_density(int done, const Surfels& new_surface) {
   }
   if (schedule_.resets_main_opacity(done)) {
     main_density_.reset_opacity(scene_.main, optimiser_.main());
-    health_.expect_fall();
+    divergence_.expect_fall();
   }
   if (scene_.environment.count() > 0 && schedule_.resets_environment_opacity(done)) {
     environment_density_.reset_opacity(scene_.environment, optimiser_.environment());
-    health_.expect_fall();
+    divergence_.expect_fall();
   }
 }
 
@@ -364,7 +364,7 @@ events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
                  {"silhouette", terms.silhouette},
                  {"environment_residual", terms.environment_residual}};
   if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
-  event.psnr = health_.smoothed_psnr();
+  event.psnr = divergence_.smoothed_psnr();
   event.seconds = seconds_;
   event.rate = rate_;
   event.surfels = counts();
@@ -373,7 +373,7 @@ events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
 }
 
 events::Finished Trainer::finish(events::Ending ending, const std::string& reason) {
-  events::Finished event{ending, iteration_, seconds_, health_.smoothed_psnr(), counts(), reason};
+  events::Finished event{ending, iteration_, seconds_, divergence_.smoothed_psnr(), counts(), reason};
   stream_.emit(event);
   return event;
 }
@@ -424,7 +424,7 @@ std::string Trainer::tell_iteration() {
     const StepMeter::Iteration measured(meter_, iteration_);
     terms = step();
   }
-  std::string trouble = health_.check(terms, non_finite_);
+  std::string trouble = divergence_.check(terms, non_finite_);
   const double step_seconds = seconds_since(start);
   seconds_ += step_seconds;
   tell_density();
@@ -432,8 +432,8 @@ std::string Trainer::tell_iteration() {
   return trouble;
 }
 
-std::string Trainer::against_collapse() const {
-  if (health_.sound() || !schedule_.deforms_main(iteration_ - 1)) return "";
+std::string Trainer::collapse_advice() const {
+  if (divergence_.sound() || !schedule_.deforms_main(iteration_ - 1)) return "";
   const RateOptions& rates = options_.rates;
   return "; where it began with the motion, begin again with slower fields: --set rates.field=" +
          number_text(slower_fields * rates.field) +
@@ -443,7 +443,7 @@ std::string Trainer::against_collapse() const {
 std::string Trainer::when_there_is_room() const {
   if (!torn_) return "; --resume goes on when there is room, or with a lower --memory-budget";
   const std::string lost = ", in the middle of a change that is not saved; ";
-  return lost + (standing_ == Standing::none
+  return lost + (checkpoint_state_ == CheckpointState::none
                      ? "begin again when there is room, or with a lower --memory-budget"
                      : "--resume goes on from the checkpoint before when there is room, or with a lower "
                        "--memory-budget");
@@ -454,8 +454,8 @@ Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
     tell_start();
     while (iteration_ < options_.iterations && !stop && !stop_soon_) {
       const std::string trouble = tell_iteration();
-      if (!trouble.empty()) return {events::Ending::diverged, trouble + against_collapse()};
-      if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && health_.sound())
+      if (!trouble.empty()) return {events::Ending::diverged, trouble + collapse_advice()};
+      if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && divergence_.sound())
         save_on_the_way();
     }
   } catch (const memory::OutOfMemory& error) {
@@ -473,11 +473,12 @@ Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
 
 events::Finished Trainer::run(const std::atomic<bool>& stop) {
   const End end = iterate(stop);
-  if (end.ending == events::Ending::out_of_memory || end.ending == events::Ending::no_input) step_back();
+  if (end.ending == events::Ending::out_of_memory || end.ending == events::Ending::no_input) rollback_draws();
   if (torn_) return finish(end.ending, end.reason);
   // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
   // still good.
-  if (end.ending != events::Ending::diverged || health_.sound() || standing_ == Standing::none)
+  if (end.ending != events::Ending::diverged || divergence_.sound() ||
+      checkpoint_state_ == CheckpointState::none)
     save_or_say_why_not();
   return finish(end.ending, end.reason);
 }
@@ -487,9 +488,10 @@ void Trainer::save() {
   const Clock::time_point start = Clock::now();
   Safetensors file = checkpoint();
   file.metadata["train_seconds"] = std::to_string(seconds_);
-  write_checkpoint(run_, std::move(file),
-                   standing_ == Standing::unsound ? Current::is_dropped : Current::becomes_previous);
-  standing_ = health_.sound() ? Standing::sound : Standing::unsound;
+  write_checkpoint(
+      run_, std::move(file),
+      checkpoint_state_ == CheckpointState::unsound ? Current::is_dropped : Current::becomes_previous);
+  checkpoint_state_ = divergence_.sound() ? CheckpointState::sound : CheckpointState::unsound;
   const double took = seconds_since(start);
   seconds_ += took;
   stream_.emit(events::Saved{iteration_, run_.checkpoint(), took});
@@ -514,12 +516,12 @@ void Trainer::save_on_the_way() {
   try {
     save_or_say_why_not();
   } catch (const NotSaved& error) {
-    if (standing_ == Standing::none) throw;
+    if (checkpoint_state_ == CheckpointState::none) throw;
     warn(std::string(error.what()) + "; training goes on and tries again at the next checkpoint");
   }
 }
 
-void Trainer::step_back() {
+void Trainer::rollback_draws() {
   if (iteration_ == before_step_.iteration) {
     random_ = before_step_.random;
     views_ = before_step_.views;

@@ -14,8 +14,8 @@
 #include "scene/run_folder.h"
 #include "train/camera_refinement.h"
 #include "train/density.h"
+#include "train/divergence_monitor.h"
 #include "train/events.h"
-#include "train/health.h"
 #include "train/initialise.h"
 #include "train/memory.h"
 #include "train/objective.h"
@@ -179,7 +179,7 @@ class Trainer {
   // What to do about memory that ran out.
   std::string when_there_is_room() const;
   // What to try where the fields made the scene fly apart.
-  std::string against_collapse() const;
+  std::string collapse_advice() const;
   // Throw NotSaved where save() fails, the second only where no checkpoint stands.
   void save_or_say_why_not();
   void save_on_the_way();
@@ -198,7 +198,7 @@ class Trainer {
   };
   // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
   // again.
-  void step_back();
+  void rollback_draws();
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
   events::Step step_event(const LossTerms& terms, double step_seconds);
@@ -212,7 +212,7 @@ class Trainer {
   std::string capture_folder_;  // whole paths both, so that neither needs the working directory again
   RunFolder run_;
   // Of the current checkpoint.
-  enum class Standing { none, sound, unsound } standing_ = Standing::none;
+  enum class CheckpointState { none, sound, unsound } checkpoint_state_ = CheckpointState::none;
   Schedule schedule_;
   std::optional<lpips::Network> perceptual_;
   Random random_;
@@ -226,13 +226,13 @@ class Trainer {
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
-  static constexpr int bonds_each = 8;  // of a surfel
-  Neighbours bonds_;                    // of the main surfels, for loss.rigidity; empty until wanted
-  Tensor<float> grad_rest_;             // dL/d(stored positions) of that term
-  float cloud_radius_;                  // of the capture's points
-  float environment_radius_;            // half the diagonal of the box that the environment began in
+  static constexpr int neighbours_each = 8;  // of a surfel
+  Neighbours neighbour_edges_;               // of the main surfels, for loss.rigidity; empty until wanted
+  Tensor<float> grad_rest_;                  // dL/d(stored positions) of that term
+  float cloud_radius_;                       // of the capture's points
+  float environment_radius_;                 // half the diagonal of the box that the environment began in
   ViewOrder views_;
-  Health health_;
+  DivergenceMonitor divergence_;
   Renderer renderer_;
   SceneGradient gradient_;
   FrameGradient grad_frame_;

@@ -59,7 +59,7 @@ Mat3<double> rotation_in(const Tensor<double>& rows) {
 }
 
 // each: bonds of a surfel.
-void check_bonds(const Neighbours& bonds, int64_t surfels, int64_t each) {
+void check_neighbour_edges(const Neighbours& bonds, int64_t surfels, int64_t each) {
   bool fits = bonds.index.shape() == Shape{surfels, each} && bonds.distance2.shape() == bonds.index.shape();
   for (const int32_t j : bonds.index.values()) fits = fits && j >= -1 && j < surfels;
   if (!fits) {
@@ -76,9 +76,9 @@ Safetensors Trainer::checkpoint() const {
   optimiser_.put(file);
   main_density_.put(file);
   environment_density_.put(file);
-  if (!bonds_.index.empty()) {
-    file.add("bonds/index", bonds_.index);
-    file.add("bonds/distance2", bonds_.distance2);
+  if (!neighbour_edges_.index.empty()) {
+    file.add("bonds/index", neighbour_edges_.index);
+    file.add("bonds/distance2", neighbour_edges_.distance2);
   }
   if (!texture_trust_.turned.empty()) {
     file.add("texture_trust/turned", texture_trust_.turned);
@@ -92,8 +92,8 @@ Safetensors Trainer::checkpoint() const {
   Tensor<int64_t> random(Shape{4});
   for (size_t i = 0; i < 4; ++i) random[static_cast<int64_t>(i)] = std::bit_cast<int64_t>(random_.state()[i]);
   file.add("random", random);
-  const Health::State health = health_.state();
-  file.add("health", row_of<3>({health.smoothed, health.best, static_cast<double>(health.steps)}));
+  const DivergenceMonitor::State monitor = divergence_.state();
+  file.add("health", row_of<3>({monitor.smoothed, monitor.best, static_cast<double>(monitor.steps)}));
   file.metadata["iteration"] = std::to_string(iteration_);
   file.metadata["views_next"] = std::to_string(views_.next());
   file.metadata["options"] = options_to_json(options_);
@@ -132,11 +132,11 @@ void Trainer::resume() {
   environment_density_ =
       DensityControl("environment", options_.environment_density, scene_.environment.count(), device_);
   environment_density_.get(file);
-  bonds_ = {};
+  neighbour_edges_ = {};
   if (file.has("bonds/index")) {
-    bonds_ = {file.tensor<int32_t>("bonds/index"), file.tensor<float>("bonds/distance2")};
-    check_bonds(bonds_, scene_.main.count(), bonds_each);
-    bonds_ = bonds_.on(device_);
+    neighbour_edges_ = {file.tensor<int32_t>("bonds/index"), file.tensor<float>("bonds/distance2")};
+    check_neighbour_edges(neighbour_edges_, scene_.main.count(), neighbours_each);
+    neighbour_edges_ = neighbour_edges_.on(device_);
   }
   texture_trust_ = {};
   if (file.has("texture_trust/turned")) {
@@ -162,14 +162,14 @@ void Trainer::resume() {
   if (cameras_.is_begun()) set_refined_cameras();
   views_.set_state(file.tensor<int32_t>("views/order"), count_in(file, "views_next"));
   const Tensor<int64_t> random = file.tensor<int64_t>("random");
-  const Tensor<double> health = file.tensor<double>("health");
-  if (random.size() != 4 || health.size() != 3) {
+  const Tensor<double> monitor = file.tensor<double>("health");
+  if (random.size() != 4 || monitor.size() != 3) {
     throw InputError("checkpoint", "random", random.shape().to_string(), "4 words of state");
   }
   Random::State state{};
   for (size_t i = 0; i < 4; ++i) state[i] = std::bit_cast<uint64_t>(random[static_cast<int64_t>(i)]);
   random_.set_state(state);
-  health_.set_state({health[0], health[1], static_cast<int64_t>(health[2])});
+  divergence_.set_state({monitor[0], monitor[1], static_cast<int64_t>(monitor[2])});
   iteration_ = static_cast<int>(count_in(file, "iteration"));
   seconds_ = file.number("train_seconds");
   initial_main_count_ = file.metadata.contains("initial_main_count")
@@ -181,7 +181,7 @@ void Trainer::resume() {
   // Drawn with as many surfels as there was memory for then.
   const bool tells_radius = file.metadata.contains("environment_radius");
   environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;
-  standing_ = health_.sound() ? Standing::sound : Standing::unsound;
+  checkpoint_state_ = divergence_.sound() ? CheckpointState::sound : CheckpointState::unsound;
   keep_caps(file);
   for (const std::string& other : {other_arithmetic(file, device_), other_version(file)}) {
     if (!other.empty()) warn(other);

@@ -92,7 +92,7 @@ Surfels Trainer::follow_bodies(const Tracking& now) {
   Surfels made;
   if (now.enters && now.key == 1) see_whether_bodies_stand();
   if (now.enters && now.key == 1 && skips_following()) {
-    health_.expect_fall();
+    divergence_.expect_fall();
     let_strays_go(scene_.main_motion->keys() - 1);
     settle();
     return made;
@@ -161,7 +161,7 @@ void Trainer::follow_again() {
   scene_.main_motion = motion.on(device_);
   if (!scene_.lighting) return;
   Lighting lighting = scene_.lighting->on(Device::cpu);
-  take_light_along(motion, main, lighting);
+  carry_lighting(motion, main, lighting);
   scene_.lighting = lighting.on(device_);
 }
 
@@ -177,7 +177,7 @@ void Trainer::see_whether_bodies_stand() {
 bool Trainer::skips_following() const { return bodies_stand_ && capture_.has_normal_priors; }
 
 void Trainer::follow(int64_t key) {
-  health_.expect_fall();
+  divergence_.expect_fall();
   if (options_.deform.track.true_poses || bodies_stand_) return;
   const Surfels main = scene_.main.on(Device::cpu);
   Motion motion = scene_.main_motion->on(Device::cpu);

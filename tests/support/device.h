@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 #include "support/gradients.h"
 
 // What the parity tests share: the same op on the CPU and on the CUDA device, or on its emulation.

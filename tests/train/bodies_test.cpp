@@ -474,7 +474,7 @@ TEST(Bodies, TakeTheMiddleOfTheirLightAlong) {
   // Poses that are solved again take it along.
   for (int64_t i = 0; i < motion.shift.size(); i += 3) motion.shift[i] += 0.25F;
   Lighting after = lighting;
-  take_light_along(motion, main, after);
+  carry_lighting(motion, main, after);
   for (int64_t i = 0; i < after.middle.size(); ++i)
     EXPECT_NEAR(after.middle[i], lighting.middle[i] + (i % 3 == 0 ? 0.25F : 0), 1e-5);
   EXPECT_EQ(lighting_around(motion, main, 8, 3, false).bodies(), 0);

@@ -123,7 +123,7 @@ TEST(PhotometricAdjustment, TheEquationsHoldTheCostsDerivative) {
   Motion start = film.motion;
   Nodes start_nodes = film.nodes;
   PhotometricAdjustment adjustment(film.surfels, 0, {}, start, &start_nodes);
-  adjustment.look_at(film.views(2));
+  adjustment.observe(film.views(2));
   start = motion;
   start_nodes = nodes;
   using Derivatives = PhotometricAdjustment::Derivatives;
@@ -161,7 +161,7 @@ TEST(PhotometricAdjustment, FindsHowABodyMovesAndBends) {
     PhotometricAdjustment adjustment(film.surfels, 0, {}, motion, bends ? &nodes : nullptr);
     double cost = 0;
     for (const double blur : {2.0, 1.0, 0.0}) {
-      adjustment.look_at(film.views(blur));
+      adjustment.observe(film.views(blur));
       cost = adjustment.mean_texture_cost();
       adjustment.solve(4);
     }
@@ -179,7 +179,7 @@ TEST(PhotometricAdjustment, NoiseDoesNotHoldWhatIsOffAtAllTimes) {
   for (int64_t k = 1; k < film_keys; ++k) set_turn(motion, k, turn_at(motion, k) + Vec3<double>(0, 0.04, 0));
   const double before = film.off(motion, {});
   PhotometricAdjustment adjustment(film.surfels, 0, {}, motion, nullptr);
-  adjustment.look_at(film.views(0, 0.02));
+  adjustment.observe(film.views(0, 0.02));
   adjustment.solve(4);
   EXPECT_LT(film.off(motion, {}), 0.4 * before);
 }
@@ -191,7 +191,7 @@ TEST(PhotometricAdjustment, IsTheSameAtAnyThreadCount) {
     for (int64_t k = 1; k < film_keys; ++k) set_turn(motion, k, 0.9 * turn_at(motion, k));
     Nodes nodes = film.nodes;
     PhotometricAdjustment adjustment(film.surfels, 0, {}, motion, &nodes);
-    adjustment.look_at(film.views(1));
+    adjustment.observe(film.views(1));
     adjustment.solve(2);
     return std::vector<Tensor<float>>{motion.rotation, motion.shift, nodes.turn, nodes.shift};
   });

@@ -354,7 +354,7 @@ TEST(Trainer, BondsThatDoNotFitTheSurfelsAreRefused) {
   options.deform.kind = "network";  // which bonds hold from the first iterations on
   Trainer trainer = make_trainer(options, "bonds");
   trainer.run(never);
-  const RunFolder run{fs::path(::testing::TempDir()) / ("bonds_" + std::to_string(::getpid()))};
+  const RunFolder run{fs::path(::testing::TempDir()) / ("neighbour_edges_" + std::to_string(::getpid()))};
   const Safetensors sound = Safetensors::read(run.checkpoint());
   const Tensor<int32_t> index = sound.tensor<int32_t>("bonds/index");
   ASSERT_GT(index.size(), 0);

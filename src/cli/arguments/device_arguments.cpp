@@ -8,7 +8,7 @@
 #include "base/device_memory.h"
 #include "base/error.h"
 #include "base/parallel.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 
 namespace traceflow::cli {
 

@@ -209,9 +209,9 @@ void round_to_bf16(const float* from, int64_t count, uint16_t* to) {
   HWY_DYNAMIC_DISPATCH(round_values)(from, count, to);
 }
 
-void mask_by_activation(const void* activation, Number number, int64_t rows, int64_t columns, float* gradient,
+void mask_by_activation(const void* activation, DType number, int64_t rows, int64_t columns, float* gradient,
                         uint16_t* rounded, float* column_sum) {
-  if (number == Number::fp32) {
+  if (number == DType::fp32) {
     HWY_DYNAMIC_DISPATCH(mask_fp32)
     (static_cast<const float*>(activation), rows, columns, gradient, column_sum);
   } else {

@@ -5,7 +5,7 @@
 
 #include "base/device.h"
 #include "ops/field/field.h"
-#include "ops/field/products.h"
+#include "ops/field/gemm.h"
 
 // The element-wise steps between the network's matrix products, with SIMD. Matrices are dense and row-major,
 // and have a multiple of 16 columns.
@@ -29,7 +29,7 @@ void round_to_bf16(const float* from, int64_t count, uint16_t* to);
 
 // Backward of ReLU, in place: gradient = 0 where the activation is not > 0. Adds the columns' sums to
 // column_sum. With bf16 activations the result is also written, rounded, to `rounded`.
-void mask_by_activation(const void* activation, Number number, int64_t rows, int64_t columns, float* gradient,
+void mask_by_activation(const void* activation, DType number, int64_t rows, int64_t columns, float* gradient,
                         uint16_t* rounded, float* column_sum);
 
 // to[i] += Σ_k from[k·stride + i] for i < count, each sum in the order of k.

@@ -17,10 +17,10 @@ int padded(int columns) { return (columns + 15) / 16 * 16; }
 constexpr int64_t block_values = 65536;
 
 // Packs a product's B = weightᵀ, or `weight` itself, from `columns` columns of a row-major matrix.
-void pack(const Product& product, const float* weight, int64_t columns, bool transposed,
+void pack(const Gemm& gemm, const float* weight, int64_t columns, bool transposed,
           Tensor<std::byte>& packed) {
-  packed.resize({product.packed_bytes()});
-  product.pack(weight, transposed ? 1 : columns, transposed ? columns : 1, packed.data());
+  packed.resize({gemm.packed_bytes()});
+  gemm.pack(weight, transposed ? 1 : columns, transposed ? columns : 1, packed.data());
 }
 
 // The first columns of a matrix, with zeros around them where the new shape is larger.
@@ -59,7 +59,7 @@ Layout::Layout(const Field& field, Precision precision)
       time_encoding(encoding_size(1, field.shape.time_frequencies)),
       padded_encoding(padded(encoding)),
       padded_outputs(padded(outputs)),
-      hidden(precision == Precision::bf16 ? Number::bf16 : Number::fp32),
+      hidden(precision == Precision::bf16 ? DType::bf16 : DType::fp32),
       block_rows(std::clamp<int64_t>(block_values / width / 64 * 64, 64, 1024)) {
   field.shape.validate();
   require(field.weight.size() == static_cast<size_t>(depth) && field.bias.size() == field.weight.size(),
@@ -74,7 +74,7 @@ std::vector<double> encode_time(const Layout& layout, float time) {
 }
 
 void ForwardWeights::fill(const Layout& layout, const Field& field, float time) {
-  const ForwardProducts products(layout, layout.block_rows);
+  const ForwardGemms gemms(layout, layout.block_rows);
   const std::vector<double> time_encoding = encode_time(layout, time);
   const auto layers = static_cast<size_t>(layout.depth);
   bias.resize(layers);
@@ -87,107 +87,106 @@ void ForwardWeights::fill(const Layout& layout, const Field& field, float time) 
     if (layout.sees_encoding(layer)) {
       add_time(layout, weight, time_encoding, bias[layer]);
       const auto part = padded_copy(weight, layout.encoding, {layout.width, layout.padded_encoding});
-      const Product& product = layer == 0 ? products.first : products.skip_encoding;
-      pack(product, part.data(), layout.padded_encoding, true, encoding[layer]);
+      const Gemm& gemm = layer == 0 ? gemms.first : gemms.skip_encoding;
+      pack(gemm, part.data(), layout.padded_encoding, true, encoding[layer]);
     }
     if (layer > 0) {
-      const Product& product = layer == layout.skip ? products.skip_hidden : products.hidden;
-      pack(product, weight.data() + hidden_column(layout, layer), weight.dim(1), true, hidden[layer]);
+      const Gemm& gemm = layer == layout.skip ? gemms.skip_hidden : gemms.hidden;
+      pack(gemm, weight.data() + hidden_column(layout, layer), weight.dim(1), true, hidden[layer]);
     }
   };
   parallel_for("field weights", layout.depth, fill_layer, 1);
   const auto padded_head =
       padded_copy(field.head_weight, layout.width, {layout.padded_outputs, layout.width});
-  pack(products.head, padded_head.data(), layout.width, true, head);
+  pack(gemms.head, padded_head.data(), layout.width, true, head);
   head_bias.reset({layout.padded_outputs});
   std::copy_n(field.head_bias.data(), layout.outputs, head_bias.data());
 }
 
 void BackwardWeights::fill(const Layout& layout, const Field& field) {
-  const BackwardProducts products(layout, layout.block_rows);
+  const BackwardGemms gemms(layout, layout.block_rows);
   hidden.resize(static_cast<size_t>(layout.depth));
   const auto fill_layer = [&](int64_t index) {
     const int layer = static_cast<int>(index) + 1;
     const Tensor<float>& weight = field.weight[layer];
-    pack(products.hidden, weight.data() + hidden_column(layout, layer), weight.dim(1), false, hidden[layer]);
+    pack(gemms.hidden, weight.data() + hidden_column(layout, layer), weight.dim(1), false, hidden[layer]);
   };
   parallel_for("field weights", layout.depth - 1, fill_layer, 1);
   const auto padded_head =
       padded_copy(field.head_weight, layout.width, {layout.padded_outputs, layout.width});
-  pack(products.head, padded_head.data(), layout.width, false, head);
+  pack(gemms.head, padded_head.data(), layout.width, false, head);
 }
 
-ForwardProducts::ForwardProducts(const Layout& l, int64_t rows)
-    : first(product({.m = rows,
-                     .k = l.padded_encoding,
-                     .n = l.width,
-                     .packed_for = l.block_rows,
-                     .bias = true,
-                     .relu = true})),
-      skip_encoding(product(
-          {.m = rows, .k = l.padded_encoding, .n = l.width, .packed_for = l.block_rows, .bias = true})),
-      skip_hidden(product({.m = rows,
-                           .k = l.width,
-                           .n = l.width,
-                           .operands = l.hidden,
-                           .packed_for = l.block_rows,
-                           .accumulate = true,
-                           .relu = true})),
-      hidden(product({.m = rows,
-                      .k = l.width,
+ForwardGemms::ForwardGemms(const Layout& l, int64_t rows)
+    : first(gemm({.m = rows,
+                  .k = l.padded_encoding,
+                  .n = l.width,
+                  .packed_for = l.block_rows,
+                  .bias = true,
+                  .relu = true})),
+      skip_encoding(
+          gemm({.m = rows, .k = l.padded_encoding, .n = l.width, .packed_for = l.block_rows, .bias = true})),
+      skip_hidden(gemm({.m = rows,
+                        .k = l.width,
+                        .n = l.width,
+                        .operands = l.hidden,
+                        .packed_for = l.block_rows,
+                        .accumulate = true,
+                        .relu = true})),
+      hidden(gemm({.m = rows,
+                   .k = l.width,
+                   .n = l.width,
+                   .operands = l.hidden,
+                   .result = l.hidden,
+                   .packed_for = l.block_rows,
+                   .bias = true,
+                   .relu = true})),
+      head(gemm({.m = rows,
+                 .k = l.width,
+                 .n = l.padded_outputs,
+                 .operands = l.hidden,
+                 .packed_for = l.block_rows,
+                 .bias = true})) {}
+
+BackwardGemms::BackwardGemms(const Layout& l, int64_t rows)
+    : head(gemm({.m = rows,
+                 .k = l.padded_outputs,
+                 .n = l.width,
+                 .operands = l.hidden,
+                 .packed_for = l.block_rows})),
+      hidden(gemm({.m = rows, .k = l.width, .n = l.width, .operands = l.hidden, .packed_for = l.block_rows})),
+      grad_encoding(
+          gemm({.m = l.width, .k = rows, .n = l.padded_encoding, .transposed = true, .accumulate = true})),
+      grad_hidden(gemm({.m = l.width,
+                        .k = rows,
+                        .n = l.width,
+                        .operands = l.hidden,
+                        .transposed = true,
+                        .accumulate = true})),
+      grad_head(gemm({.m = l.padded_outputs,
+                      .k = rows,
                       .n = l.width,
                       .operands = l.hidden,
-                      .result = l.hidden,
-                      .packed_for = l.block_rows,
-                      .bias = true,
-                      .relu = true})),
-      head(product({.m = rows,
-                    .k = l.width,
-                    .n = l.padded_outputs,
-                    .operands = l.hidden,
-                    .packed_for = l.block_rows,
-                    .bias = true})) {}
-
-BackwardProducts::BackwardProducts(const Layout& l, int64_t rows)
-    : head(product({.m = rows,
-                    .k = l.padded_outputs,
-                    .n = l.width,
-                    .operands = l.hidden,
-                    .packed_for = l.block_rows})),
-      hidden(
-          product({.m = rows, .k = l.width, .n = l.width, .operands = l.hidden, .packed_for = l.block_rows})),
-      grad_encoding(
-          product({.m = l.width, .k = rows, .n = l.padded_encoding, .transposed = true, .accumulate = true})),
-      grad_hidden(product({.m = l.width,
-                           .k = rows,
-                           .n = l.width,
-                           .operands = l.hidden,
-                           .transposed = true,
-                           .accumulate = true})),
-      grad_head(product({.m = l.padded_outputs,
-                         .k = rows,
-                         .n = l.width,
-                         .operands = l.hidden,
-                         .transposed = true,
-                         .accumulate = true})) {}
+                      .transposed = true,
+                      .accumulate = true})) {}
 
 void forward_hidden(const Layout& layout, const ForwardWeights& weights, const Block& block) {
-  const ForwardProducts products(layout, block.rows);
-  const bool rounds = layout.hidden == Number::bf16;
+  const ForwardGemms gemms(layout, block.rows);
+  const bool rounds = layout.hidden == DType::bf16;
   for (int layer = 0; layer < layout.depth; ++layer) {
     std::byte* values = block.layer(layout, layer);
     const float* bias = weights.bias[layer].data();
     if (!layout.sees_encoding(layer)) {
-      products.hidden.run(block.layer(layout, layer - 1), weights.hidden[layer].data(), bias, values);
+      gemms.hidden.run(block.layer(layout, layer - 1), weights.hidden[layer].data(), bias, values);
       continue;
     }
     float* sums = rounds ? block.fp32 : reinterpret_cast<float*>(values);
     const std::byte* encoding_weight = weights.encoding[layer].data();
     if (layer == 0) {
-      products.first.run(block.encoding, encoding_weight, bias, sums);
+      gemms.first.run(block.encoding, encoding_weight, bias, sums);
     } else {
-      products.skip_encoding.run(block.encoding, encoding_weight, bias, sums);
-      products.skip_hidden.run(block.layer(layout, layer - 1), weights.hidden[layer].data(), nullptr, sums);
+      gemms.skip_encoding.run(block.encoding, encoding_weight, bias, sums);
+      gemms.skip_hidden.run(block.layer(layout, layer - 1), weights.hidden[layer].data(), nullptr, sums);
     }
     if (rounds) round_to_bf16(sums, block.rows * layout.width, reinterpret_cast<uint16_t*>(values));
   }

@@ -6,7 +6,7 @@
 
 #include "base/tensor.h"
 #include "ops/field/field.h"
-#include "ops/field/products.h"
+#include "ops/field/gemm.h"
 
 // How the fast path sees a network (method §1.2). Points go through all layers in blocks small enough that a
 // block's hidden values stay in a core's second-level cache. The time's encoding is the same for every point,
@@ -23,7 +23,7 @@ struct Layout {
   int time_encoding;    // and of the time's, behind them
   int padded_encoding;  // multiples of 16
   int padded_outputs;
-  Number hidden;       // number type of the hidden values
+  DType hidden;        // number type of the hidden values
   int64_t block_rows;  // points in a block
 
   bool sees_encoding(int layer) const { return layer == 0 || layer == skip; }
@@ -31,30 +31,30 @@ struct Layout {
   // Rows that a block of the given number of points is padded to: few different ones, so that few products
   // are compiled.
   int64_t padded_rows(int64_t points) const { return (points + 63) / 64 * 64; }
-  int64_t hidden_bytes(int64_t rows) const { return rows * width * (hidden == Number::fp32 ? 4 : 2); }
+  int64_t hidden_bytes(int64_t rows) const { return rows * width * (hidden == DType::fp32 ? 4 : 2); }
 };
 
 // γ(t).
 std::vector<double> encode_time(const Layout& layout, float time);
 
 // The products that take `rows` points through the layers. Their weights are packed for full blocks.
-struct ForwardProducts {
-  ForwardProducts(const Layout& layout, int64_t rows);
+struct ForwardGemms {
+  ForwardGemms(const Layout& layout, int64_t rows);
 
-  const Product& first;          // encoding → hidden values of layer 0, fp32
-  const Product& skip_encoding;  // encoding → its part of the skip layer, fp32
-  const Product& skip_hidden;    // onto that part → hidden values of the skip layer, fp32
-  const Product& hidden;         // hidden → hidden values of the other layers
-  const Product& head;           // hidden → outputs, fp32
+  const Gemm& first;          // encoding → hidden values of layer 0, fp32
+  const Gemm& skip_encoding;  // encoding → its part of the skip layer, fp32
+  const Gemm& skip_hidden;    // onto that part → hidden values of the skip layer, fp32
+  const Gemm& hidden;         // hidden → hidden values of the other layers
+  const Gemm& head;           // hidden → outputs, fp32
 };
-struct BackwardProducts {
-  BackwardProducts(const Layout& layout, int64_t rows);
+struct BackwardGemms {
+  BackwardGemms(const Layout& layout, int64_t rows);
 
-  const Product& head;           // gradient of the outputs → of the last hidden values, fp32
-  const Product& hidden;         // gradient of a layer's values → of those before it, fp32
-  const Product& grad_encoding;  // the three add to a weight's gradient, fp32
-  const Product& grad_hidden;
-  const Product& grad_head;
+  const Gemm& head;           // gradient of the outputs → of the last hidden values, fp32
+  const Gemm& hidden;         // gradient of a layer's values → of those before it, fp32
+  const Gemm& grad_encoding;  // the three add to a weight's gradient, fp32
+  const Gemm& grad_hidden;
+  const Gemm& grad_head;
 };
 
 // The parameters as the products read them, packed anew by each pass over the points.

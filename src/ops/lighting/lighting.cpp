@@ -5,7 +5,7 @@
 
 #include "base/parallel.h"
 #include "ops/lighting/lighting_kernels.h"
-#include "primitives/lists.h"
+#include "primitives/group_by_key.h"
 #include "primitives/sums.h"
 
 namespace traceflow::lighting {
@@ -15,7 +15,7 @@ struct Saved {
   // Memory of backward.
   Tensor<float> pulls;
   Tensor<int32_t> cells;
-  cuda::Lists lists;
+  cuda::KeyGroups lists;
 };
 void SavedDeleter::operator()(Saved* saved) const { delete saved; }
 SavedPtr make_saved() { return SavedPtr(new Saved); }
@@ -33,8 +33,8 @@ Bodies bodies_of(const Lighting& lighting) {
   return {lighting.middle.data(), lighting.radius.data(), lighting.body_brightness.data(), lighting.bodies()};
 }
 
-// Lists 0 to n − 1 by their keys, as cuda::list_by_key does.
-void list_by_key_on_host(const Tensor<int32_t>& key, int64_t keys, cuda::Lists& lists) {
+// Lists 0 to n − 1 by their keys, as cuda::group_by_key does.
+void group_by_key_on_host(const Tensor<int32_t>& key, int64_t keys, cuda::KeyGroups& lists) {
   lists.begin.reset({keys + 1});
   for (const int32_t k : key.values()) {
     if (k >= 0) ++lists.begin[k + 1];
@@ -81,9 +81,9 @@ void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Sav
                 grad_posed.sh.data(), grad_posed.position.data(), saved.pulls.data(), saved.cells.data()});
   if (grad_lighting == nullptr) return;
   if (device == Device::cpu)
-    list_by_key_on_host(saved.cells, grid.size.points(), saved.lists);
+    group_by_key_on_host(saved.cells, grid.size.points(), saved.lists);
   else
-    cuda::list_by_key(saved.cells.data(), count, grid.size.points(), saved.lists);
+    cuda::group_by_key(saved.cells.data(), count, grid.size.points(), saved.lists);
   parallel_for(device, "lighting: collect", grid.size.points(),
                CollectAtPoint{grid, saved.lists.begin.data(), saved.lists.entry.data(), saved.places.data(),
                               saved.pulls.data(), grad_lighting->brightness.data()});

@@ -4,7 +4,7 @@
 
 #include "ops/loss/loss_kernels.h"
 #include "ops/loss/rigidity_kernels.h"
-#include "primitives/lists.h"
+#include "primitives/group_by_key.h"
 #include "primitives/sum_kernels.h"
 
 // Edges are measured twice: once for the term's mean, which weighs the gradient, and once by either end,
@@ -99,7 +99,7 @@ void rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tenso
   const int64_t count = posed.dim(0), k = edges.index.dim(1), all = count * k;
   require(all < std::numeric_limits<int32_t>::max(), "edges are counted in 32 bits", std::to_string(all));
   static thread_local Tensor<int32_t> posed_at, far;
-  static thread_local traceflow::cuda::Lists arriving;
+  static thread_local traceflow::cuda::KeyGroups arriving;
   posed_at.place(Device::cuda).reset({rest.dim(0)});
   far.place(Device::cuda).resize({all});
   const Cloud cloud{rest.data(),
@@ -113,7 +113,7 @@ void rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tenso
                     static_cast<float>(strain * strain)};
   for_each_index("loss: place posed surfels", count, PlacePosed{cloud});
   sum_each_index<CountedSum>("loss: rigidity edges", all, MeasureEdge{cloud}, MeanOverCounted{mean});
-  traceflow::cuda::list_by_key(far.data(), all, count, arriving);
+  traceflow::cuda::group_by_key(far.data(), all, count, arriving);
   for_each_index("loss: rigidity gradient", count,
                  CollectPulls{cloud, arriving.begin.data(), arriving.entry.data(), weight, mean,
                               grad_rest.data(), grad_posed.data()});

@@ -38,7 +38,7 @@ struct Setting {
 __global__ void __launch_bounds__(adam_threads) step(const __grid_constant__ AdamTable table) {
   __shared__ float rates[most_rates];
   const auto thread = static_cast<int>(threadIdx.x), block = static_cast<int>(blockIdx.x);
-  const int k = traceflow::cuda::part_of(table.tensor.data(), table.tensors, block);
+  const int k = traceflow::cuda::part_of_block(table.tensor.data(), table.tensors, block);
   // A copy: what the compiler reads through the table it does not know apart from what it writes, and then it
   // stores number by number.
   const AdamTensor t = table.tensor[static_cast<size_t>(k)];
@@ -77,7 +77,7 @@ __global__ void __launch_bounds__(adam_threads) step(const __grid_constant__ Ada
 }  // namespace
 
 void adam_step(AdamTable& table) {
-  const int64_t blocks = traceflow::cuda::deal_blocks(
+  const int64_t blocks = traceflow::cuda::assign_blocks(
       std::span(table.tensor).first(static_cast<size_t>(table.tensors)),
       [](const AdamTensor& tensor) { return traceflow::cuda::blocks_for(tensor.count, block_entries); });
   traceflow::cuda::launch("optimize: adam", {blocks, adam_threads}, step, table);

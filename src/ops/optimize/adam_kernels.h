@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "ops/optimize/adam.h"
-#include "primitives/parts.h"
+#include "primitives/multi_tensor.h"
 
 namespace traceflow::optimize {
 

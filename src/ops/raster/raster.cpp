@@ -67,7 +67,7 @@ void forward(const PosedSurfels& surfels, const Camera<float>& camera, const Opt
   check_input(surfels, camera);
   Saved local;
   Saved& kept = saved != nullptr ? *saved : local;
-  prepare(surfels, camera, options, kept);
+  project_surfels(surfels, camera, options, kept);
   if (surfels.position.device() == Device::cuda) {
     cuda_stage::bin(options.sort, kept);
     cuda_stage::blend(options, output, kept);
@@ -89,7 +89,7 @@ void backward(const PosedSurfels& surfels, const Camera<float>& camera, const Op
   } else {
     blend_backward(options, saved, grad_output);
   }
-  chain(surfels, camera, saved, gradient);
+  project_surfels_backward(surfels, camera, saved, gradient);
 }
 
 void visible(const Saved& saved, Tensor<uint8_t>& flags) {

@@ -6,10 +6,10 @@
 #include "ops/raster/raster.h"
 
 // What the stages of the fast path share. The image is cut into tiles of 16×16 pixels and these into blocks
-// of 4×4, in which the pixels of a vector stand. Forward: prepare() projects every surfel, bin() lists the
-// surfels of each tile front to back, then every tile is blended alone. Backward: every tile alone, its sums
-// kept per (tile, surfel); then these are added up per surfel in tile order and chained to the surfel's
-// values.
+// of 4×4, in which the pixels of a vector stand. Forward: project_surfels() projects every surfel, bin()
+// lists the surfels of each tile front to back, then every tile is blended alone. Backward: every tile alone,
+// its sums kept per (tile, surfel); then these are added up per surfel in tile order and propagated to its
+// parameters.
 namespace traceflow::raster {
 
 inline constexpr int tile_edge = 16;
@@ -174,15 +174,16 @@ struct IsVisible {
 };
 
 // Fills splats and bounds.
-void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved);
+void project_surfels(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
+                     Saved& saved);
 // Fills entry_begin, tile_begin and entries.
 void bin(SortOrder order, Saved& saved);
 // Blends every tile.
 void blend(const Options& options, Output& output, Saved& saved);
 // Fills scratch.gradients where touched is not zero.
 void blend_backward(const Options& options, const Saved& saved, const OutputGradient& grad_output);
-// From scratch.gradients to the surfels' values and the camera.
-void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved& saved,
-           InputGradient& gradient);
+// From scratch.gradients to the gradients of the surfels and the camera.
+void project_surfels_backward(const PosedSurfels& surfels, const Camera<float>& camera, const Saved& saved,
+                              InputGradient& gradient);
 
 }  // namespace traceflow::raster

@@ -21,7 +21,7 @@ using Vector2 = Vec2<double>;
 using Vector3 = Vec3<double>;
 
 // What of a surfel does not depend on the pixel.
-struct Prepared {
+struct Projected {
   bool drawn = false;
   SurfelFrame<double> frame;
   Vector3 normal;  // turned to the camera
@@ -71,10 +71,10 @@ class Scene {
  public:
   Scene(const Surfels& surfels, const Camera<double>& camera, const Options& options)
       : surfels_(surfels), camera_(camera), options_(options) {
-    for (int64_t i = 0; i < surfels.count(); ++i) prepared_.push_back(prepare(i));
+    for (int64_t i = 0; i < surfels.count(); ++i) projected_.push_back(project(i));
   }
 
-  const Prepared& prepared(int64_t i) const { return prepared_[static_cast<size_t>(i)]; }
+  const Projected& projected(int64_t i) const { return projected_[static_cast<size_t>(i)]; }
   int sh_degree() const { return traceflow::sh_degree(surfels_.sh.dim(1)); }
   // Of the low-pass, over the squared distance in pixels.
   double rho_per_pixel2() const { return 2 / (double{options_.low_pass} * options_.low_pass); }
@@ -106,8 +106,8 @@ class Scene {
            (!s.has_roughness() || std::isfinite(s.roughness[i])) && s.scale(i, 0) > 0 && s.scale(i, 1) > 0;
   }
 
-  Prepared prepare(int64_t i) const {
-    Prepared p;
+  Projected project(int64_t i) const {
+    Projected p;
     if (!usable(i)) return p;
     const auto& s = surfels_;
     p.frame = {load3<double>(s.position.row(i)),
@@ -135,7 +135,7 @@ class Scene {
   // Method §3.1 and §3.2. A plane hit in front of the near plane counts by its distance in the surfel; the
   // projected centre by its distance on the screen; the nearer wins.
   std::optional<Hit> hit_at(const Vector2& pixel, int64_t i) const {
-    const Prepared& p = prepared(i);
+    const Projected& p = projected(i);
     if (!p.drawn) return std::nullopt;
     constexpr double infinity = std::numeric_limits<double>::infinity();
     Hit hit{};
@@ -157,7 +157,7 @@ class Scene {
 
   void sort(std::vector<Hit>& hits) const {
     const auto key = [&](const Hit& h) {
-      return options_.sort == SortOrder::centre ? prepared(h.surfel).centre.z : h.z;
+      return options_.sort == SortOrder::centre ? projected(h.surfel).centre.z : h.z;
     };
     std::stable_sort(hits.begin(), hits.end(), [&](const Hit& a, const Hit& b) { return key(a) < key(b); });
   }
@@ -177,7 +177,7 @@ class Scene {
   const Surfels& surfels_;
   const Camera<double>& camera_;
   const Options& options_;
-  std::vector<Prepared> prepared_;
+  std::vector<Projected> projected_;
 };
 
 void resize(const Surfels& surfels, const Camera<double>& camera, BasicOutput<double>& output) {
@@ -198,7 +198,7 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
   Vector3 colour = pixel.transmittance * Vector3(options.background);
   Vector3 normal(0.0);
   for (const Blended& b : pixel.blended) {
-    const Prepared& p = scene.prepared(b.hit.surfel);
+    const Projected& p = scene.projected(b.hit.surfel);
     colour += b.weight * p.colour;
     normal += b.weight * p.normal;
     output.tint[index] += b.weight * p.tint;
@@ -235,7 +235,7 @@ struct PixelGradient {
 };
 
 // dL/d what of a surfel does not depend on the pixel.
-struct PreparedGradient {
+struct ProjectedGradient {
   SurfelHitGradient<double> frame;
   Vector3 normal{0.0}, colour{0.0}, centre{0.0};
   Vector2 pixel{0.0};
@@ -250,7 +250,7 @@ class Backward {
         camera_(camera),
         options_(options),
         scene_(surfels, camera, options),
-        prepared_(static_cast<size_t>(surfels.count())),
+        projected_(static_cast<size_t>(surfels.count())),
         gradient_(gradient) {}
 
   void add_pixel(const Vector2& position, const PixelGradient& g) {
@@ -270,13 +270,13 @@ class Backward {
 
   void finish() {
     for (int64_t i = 0; i < surfels_.count(); ++i) {
-      if (scene_.prepared(i).drawn) chain(i);
+      if (scene_.projected(i).drawn) project_surfel_backward(i);
     }
   }
 
  private:
   double weight_gradient(const Pixel& pixel, const Blended& b, const PixelGradient& g) const {
-    const Prepared& p = scene_.prepared(b.hit.surfel);
+    const Projected& p = scene_.projected(b.hit.surfel);
     const double from_depth = g.depth * (b.hit.z - pixel.depth()) / pixel.alpha();
     const double from_distortion = b.m * b.m * pixel.alpha() + pixel.m2_sum - 2 * b.m * pixel.m_sum;
     return dot(g.colour, p.colour - Vector3(options_.background)) + dot(g.normal, p.normal) +
@@ -291,7 +291,7 @@ class Backward {
   }
 
   void add_values(const Blended& b, const PixelGradient& g) {
-    PreparedGradient& to = prepared_[static_cast<size_t>(b.hit.surfel)];
+    ProjectedGradient& to = projected_[static_cast<size_t>(b.hit.surfel)];
     to.colour += b.weight * g.colour;
     to.normal += b.weight * g.normal;
     to.tint += b.weight * g.tint;
@@ -300,8 +300,8 @@ class Backward {
 
   // From dL/d(o·G) and dL/dz of one hit.
   void add_hit(const Vector2& position, const Hit& hit, double grad_raw, double grad_z) {
-    const Prepared& p = scene_.prepared(hit.surfel);
-    PreparedGradient& to = prepared_[static_cast<size_t>(hit.surfel)];
+    const Projected& p = scene_.projected(hit.surfel);
+    ProjectedGradient& to = projected_[static_cast<size_t>(hit.surfel)];
     to.opacity += grad_raw * hit.gaussian;
     const double grad_rho = -grad_raw * p.opacity * hit.gaussian / 2;
     if (!hit.on_plane) {
@@ -321,9 +321,9 @@ class Backward {
         outerProduct(camera_.ray_in_camera(position.x, position.y), g.direction);
   }
 
-  void chain(int64_t i) {
-    const Prepared& p = scene_.prepared(i);
-    PreparedGradient& g = prepared_[static_cast<size_t>(i)];
+  void project_surfel_backward(int64_t i) {
+    const Projected& p = scene_.projected(i);
+    ProjectedGradient& g = projected_[static_cast<size_t>(i)];
     const Vector3 from_camera = p.frame.position - camera_.position;
     if (p.has_low_pass) g.centre += project_backward(camera_, p.centre, g.pixel);
     const Vector3 grad_direction = sh_colour_backward(scene_.sh_degree(), surfels_.sh.row(i), p.direction,
@@ -351,7 +351,7 @@ class Backward {
   const Camera<double>& camera_;
   const Options& options_;
   Scene scene_;
-  std::vector<PreparedGradient> prepared_;
+  std::vector<ProjectedGradient> projected_;
   BasicInputGradient<double>& gradient_;
 };
 

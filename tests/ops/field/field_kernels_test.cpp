@@ -59,8 +59,8 @@ TEST(FieldKernels, MasksBySignOfTheActivationAndSumsColumns) {
     field::round_to_bf16(activation.data(), activation.size(), activation_bf16.data());
     const Tensor<float> gradient = random_tensor<float>({rows, columns}, random, -1, 1);
 
-    for (const Number number : {Number::fp32, Number::bf16}) {
-      const bool half = number == Number::bf16;
+    for (const DType number : {DType::fp32, DType::bf16}) {
+      const bool half = number == DType::bf16;
       Tensor<float> masked = gradient, sums(Shape{columns});
       Tensor<uint16_t> rounded(gradient.shape());
       sums.fill(5);

@@ -112,8 +112,8 @@ void backward_block(const Pass& pass, int64_t index, const float* points, const 
   const Layout& layout = pass.layout;
   const GradientLayout& at = pass.gradients;
   const int64_t rows = layout.padded_rows(count);
-  const BackwardProducts products(layout, rows);
-  const bool rounds = layout.hidden == Number::bf16;
+  const BackwardGemms gemms(layout, rows);
+  const bool rounds = layout.hidden == DType::bf16;
   scratch.resize(layout, rows);
   encode_points(points, count, rows, layout.octaves, layout.padded_encoding, scratch.encoding.data());
   const Block block = restore(pass, index, count, rows, scratch);
@@ -124,21 +124,21 @@ void backward_block(const Pass& pass, int64_t index, const float* points, const 
     round_to_bf16(scratch.grad_output.data(), scratch.grad_output.size(), scratch.grad_output_bf16.data());
     grad = scratch.grad_output_bf16.data();
   }
-  products.grad_head.run(grad, block.layer(layout, layout.depth - 1), nullptr, sums + at.head);
+  gemms.grad_head.run(grad, block.layer(layout, layout.depth - 1), nullptr, sums + at.head);
   float* current = scratch.grad[0].data();
   float* next = scratch.grad[1].data();
-  products.head.run(grad, pass.backward.head.data(), nullptr, current);
+  gemms.head.run(grad, pass.backward.head.data(), nullptr, current);
 
   for (int layer = layout.depth - 1; layer >= 0; --layer) {
     mask_by_activation(block.layer(layout, layer), layout.hidden, rows, layout.width, current,
                        scratch.grad_bf16.data(), sums + at.bias[layer]);
     if (layout.sees_encoding(layer)) {
-      products.grad_encoding.run(current, block.encoding, nullptr, sums + at.encoding[layer]);
+      gemms.grad_encoding.run(current, block.encoding, nullptr, sums + at.encoding[layer]);
     }
     if (layer == 0) break;
     grad = rounds ? static_cast<const void*>(scratch.grad_bf16.data()) : current;
-    products.grad_hidden.run(grad, block.layer(layout, layer - 1), nullptr, sums + at.hidden[layer]);
-    products.hidden.run(grad, pass.backward.hidden[layer].data(), nullptr, next);
+    gemms.grad_hidden.run(grad, block.layer(layout, layer - 1), nullptr, sums + at.hidden[layer]);
+    gemms.hidden.run(grad, pass.backward.hidden[layer].data(), nullptr, next);
     std::swap(current, next);
   }
 }

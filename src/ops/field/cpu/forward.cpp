@@ -43,7 +43,7 @@ void forward_block(const Layout& layout, const ForwardWeights& weights, const fl
                     .keep_all = keep != nullptr,
                     .fp32 = scratch.fp32.data()};
   forward_hidden(layout, weights, block);
-  ForwardProducts(layout, rows)
+  ForwardGemms(layout, rows)
       .head.run(block.layer(layout, layout.depth - 1), weights.head.data(), weights.head_bias.data(),
                 scratch.head.data());
   for (int64_t i = 0; i < count; ++i) {

@@ -75,7 +75,7 @@ void add_weight_gradient(const Pass& pass, int layer, const Segment& segment, co
                              .stride_b = stride,
                              .stride_c = layout.gradient_columns(layer),
                              .operands = layout.hidden,
-                             .result = Number::fp32,
+                             .result = DType::fp32,
                              .accumulate = true,
                              .batches = pass.sums.slots,
                              .batch_a = slot_rows * outputs,

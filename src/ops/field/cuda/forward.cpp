@@ -31,7 +31,7 @@ void forward_heads(const DeviceLayout& layout, const Segment& segment, const std
                              .stride_b = layout.width,
                              .stride_c = layout.padded_outputs,
                              .operands = layout.hidden,
-                             .result = Number::fp32},
+                             .result = DType::fp32},
                             {.a = hidden, .b = weights, .c = sums});
 }
 

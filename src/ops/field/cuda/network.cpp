@@ -9,16 +9,16 @@ namespace traceflow::field::device {
 
 namespace {
 
+using traceflow::cuda::GemmAddresses;
+using traceflow::cuda::GemmDescription;
 using traceflow::cuda::Mask;
-using traceflow::cuda::ProductAddresses;
-using traceflow::cuda::ProductDescription;
 
 // Rows are padded to a multiple of this.
 int64_t row_quantum(int64_t points) { return points > 8192 ? 1024 : 128; }
 int64_t rounded_up(int64_t n, int64_t to) { return (n + to - 1) / to * to; }
 
 // The product of a layer: its input by its weights, transposed.
-ProductDescription forward_product(const DeviceLayout& l, int layer, int64_t rows, bool masks) {
+GemmDescription forward_gemm(const DeviceLayout& l, int layer, int64_t rows, bool masks) {
   return {.m = rows,
           .k = l.input_columns(layer),
           .n = l.width,
@@ -35,7 +35,7 @@ ProductDescription forward_product(const DeviceLayout& l, int layer, int64_t row
 }
 
 // The product that takes the gradient of a layer's output, or of the heads', to its hidden input.
-ProductDescription backward_product(const DeviceLayout& l, int layer, int64_t rows, bool masks) {
+GemmDescription backward_gemm(const DeviceLayout& l, int layer, int64_t rows, bool masks) {
   const int64_t outputs = layer == l.depth ? l.padded_outputs : l.width;
   return {.m = rows,
           .k = outputs,
@@ -50,11 +50,11 @@ ProductDescription backward_product(const DeviceLayout& l, int layer, int64_t ro
 }
 
 // The product alone, where the library has no code for it with what follows.
-ProductDescription without_epilogue(ProductDescription product) {
-  product.bias = product.relu = false;
-  product.mask = Mask::none;
-  product.mask_stride = 0;
-  return product;
+GemmDescription without_epilogue(GemmDescription gemm) {
+  gemm.bias = gemm.relu = false;
+  gemm.mask = Mask::none;
+  gemm.mask_stride = 0;
+  return gemm;
 }
 
 template <class T>
@@ -70,8 +70,8 @@ DeviceLayout::DeviceLayout(const Field& field, Precision precision, int64_t coun
     : Layout(field, precision),
       points(count),
       segment_rows(rounded_up(std::max<int64_t>(segment_values / width, 1), row_quantum(count))),
-      parts(hidden == Number::bf16 ? 3 : 1),
-      number_bytes(hidden == Number::bf16 ? 2 : 4) {}
+      parts(hidden == DType::bf16 ? 3 : 1),
+      number_bytes(hidden == DType::bf16 ? 2 : 4) {}
 
 int64_t DeviceLayout::points_in(int64_t segment) const {
   return std::min(segment_rows, points - segment * segment_rows);
@@ -146,8 +146,8 @@ Tensor<std::byte>& passing_memory() {
 
 bool masks_supported(const DeviceLayout& layout, int64_t rows) {
   for (int layer = 0; layer < layout.depth; ++layer) {
-    if (!traceflow::cuda::supported(forward_product(layout, layer, rows, true)) ||
-        !traceflow::cuda::supported(backward_product(layout, layer + 1, rows, true))) {
+    if (!traceflow::cuda::supported(forward_gemm(layout, layer, rows, true)) ||
+        !traceflow::cuda::supported(backward_gemm(layout, layer + 1, rows, true))) {
       return false;
     }
   }
@@ -160,23 +160,23 @@ void forward_hidden(const DeviceLayout& layout, const std::byte* weights, const 
   with_number(layout, [&]<class T>(T) {
     encode<T>(layout, segment);
     for (int layer = 0; layer < layout.depth; ++layer) {
-      const ProductDescription product = forward_product(layout, layer, segment.rows, segment.masks);
-      const ProductAddresses at{
+      const GemmDescription gemm = forward_gemm(layout, layer, segment.rows, segment.masks);
+      const GemmAddresses at{
           .a = activations.input(layout, layer, segment.memory),
           .b = weights + places.weight[layer],
           .c = activations.output(layout, layer, segment.memory),
-          .bias = product.bias ? weights + places.bias[layer] : nullptr,
+          .bias = gemm.bias ? weights + places.bias[layer] : nullptr,
           .mask = segment.masks ? activations.mask(layer, segment.memory) : nullptr,
       };
-      if (traceflow::cuda::supported(product)) {
-        traceflow::cuda::multiply(product, at);
+      if (traceflow::cuda::supported(gemm)) {
+        traceflow::cuda::multiply(gemm, at);
         continue;
       }
-      traceflow::cuda::multiply(without_epilogue(product), at);
+      traceflow::cuda::multiply(without_epilogue(gemm), at);
       const int groups = layout.width / Numbers<T>::count;
       parallel_for(
           Device::cuda, "field: bias and ReLU", segment.rows * groups,
-          AddBiasAndRelu<T>{static_cast<T*>(at.c), static_cast<const T*>(at.bias), groups, product.stride_c});
+          AddBiasAndRelu<T>{static_cast<T*>(at.c), static_cast<const T*>(at.bias), groups, gemm.stride_c});
     }
   });
 }
@@ -185,12 +185,12 @@ void backward_hidden(const DeviceLayout& layout, int layer, const std::byte* wei
                      const Activations& activations, const Segment& segment, const std::byte* gradient,
                      std::byte* grad_input) {
   const int64_t hidden_column = layout.sees_encoding(layer) ? layout.parts * layout.padded_encoding : 0;
-  const ProductDescription product = backward_product(layout, layer, segment.rows, segment.masks);
+  const GemmDescription gemm = backward_gemm(layout, layer, segment.rows, segment.masks);
   traceflow::cuda::multiply(
-      product, {.a = gradient,
-                .b = weights + PackedWeights(layout).weight[layer] + hidden_column * layout.number_bytes,
-                .c = grad_input,
-                .mask = segment.masks ? activations.mask(layer - 1, segment.memory) : nullptr});
+      gemm, {.a = gradient,
+             .b = weights + PackedWeights(layout).weight[layer] + hidden_column * layout.number_bytes,
+             .c = grad_input,
+             .mask = segment.masks ? activations.mask(layer - 1, segment.memory) : nullptr});
   if (segment.masks) return;
   with_number(layout, [&]<class T>(T) {
     const std::byte* const input = activations.output(layout, layer - 1, segment.memory);
@@ -204,8 +204,8 @@ void backward_hidden(const DeviceLayout& layout, int layer, const std::byte* wei
 Precision precision_on_device(const Field& field, Precision wanted) {
   if (wanted == Precision::fp32) return wanted;
   const DeviceLayout layout(field, wanted, 1024);
-  const ProductDescription product = forward_product(layout, 0, 1024, false);
-  return traceflow::cuda::supported(without_epilogue(product)) ? wanted : Precision::fp32;
+  const GemmDescription gemm = forward_gemm(layout, 0, 1024, false);
+  return traceflow::cuda::supported(without_epilogue(gemm)) ? wanted : Precision::fp32;
 }
 
 }  // namespace traceflow::field::device

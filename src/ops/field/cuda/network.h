@@ -8,7 +8,7 @@
 #include "math/bf16.h"
 #include "ops/field/field.h"
 #include "ops/field/network.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 
 // How the CUDA device sees a network (method §1.2). Points go through all layers in segments, whose hidden
 // values of two layers stay in a large device's second-level cache. The encoding and the hidden values before
@@ -116,7 +116,7 @@ void backward_hidden(const DeviceLayout& layout, int layer, const std::byte* wei
 // f(T{}) with the hidden values' number type.
 template <class F>
 void with_number(const DeviceLayout& layout, F&& f) {
-  if (layout.hidden == Number::bf16) {
+  if (layout.hidden == DType::bf16) {
     f(Bf16{});
   } else {
     f(float{});

@@ -6,16 +6,16 @@
 
 #include "ops/lpips/cuda/compare.h"
 #include "ops/lpips/cuda/kernels.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 #include "primitives/sums.h"
 
 namespace traceflow::lpips::device {
 
 namespace {
 
+using traceflow::cuda::GemmAddresses;
+using traceflow::cuda::GemmDescription;
 using traceflow::cuda::multiply;
-using traceflow::cuda::ProductAddresses;
-using traceflow::cuda::ProductDescription;
 
 constexpr size_t layers = 13;
 constexpr int64_t sum_grain = 4096;
@@ -106,24 +106,24 @@ void convolve(const Layer& layer, const Size& size, const Tensor<float>& x, Tens
     parallel_for(Device::cuda, "lpips: gather", (end - begin) * 9 * layer.inputs / 4,
                  GatherPatches{fours(x.data()), size.extent(layer.inputs), static_cast<uint32_t>(begin),
                                fours(patches)});
-    ProductDescription product{.m = blocks.rows,
-                               .k = 9 * layer.inputs,
-                               .n = layer.outputs,
-                               .stride_a = 9 * layer.inputs,
-                               .stride_b = layer.outputs,
-                               .stride_c = layer.outputs,
-                               .operands = Number::fp32,
-                               .result = Number::fp32,
-                               .bias = true,
-                               .relu = true};
-    const ProductAddresses at{
+    GemmDescription gemm{.m = blocks.rows,
+                         .k = 9 * layer.inputs,
+                         .n = layer.outputs,
+                         .stride_a = 9 * layer.inputs,
+                         .stride_b = layer.outputs,
+                         .stride_c = layer.outputs,
+                         .operands = DType::fp32,
+                         .result = DType::fp32,
+                         .bias = true,
+                         .relu = true};
+    const GemmAddresses at{
         .a = patches, .b = layer.matrix, .c = to + begin * layer.outputs, .bias = layer.bias};
-    if (traceflow::cuda::supported(product)) {
-      multiply(product, at);
+    if (traceflow::cuda::supported(gemm)) {
+      multiply(gemm, at);
       continue;
     }
-    product.bias = product.relu = false;
-    multiply(product, at);
+    gemm.bias = gemm.relu = false;
+    multiply(gemm, at);
     parallel_for(Device::cuda, "lpips: bias and ReLU", (end - begin) * layer.outputs / 4,
                  AddBiasAndRelu{fours(to + begin * layer.outputs), fours(layer.bias),
                                 static_cast<uint32_t>(layer.outputs / 4)});
@@ -147,8 +147,8 @@ void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>
               .stride_a = layer.outputs,
               .stride_b = layer.outputs,
               .stride_c = 9 * layer.inputs,
-              .operands = Number::fp32,
-              .result = Number::fp32},
+              .operands = DType::fp32,
+              .result = DType::fp32},
              {.a = grad_y.row(begin), .b = layer.matrix, .c = grad_patches});
     const int64_t first = std::max<int64_t>(begin - reach, 0), last = std::min(end + reach, pixels);
     parallel_for(Device::cuda, "lpips: scatter", (last - first) * layer.inputs / 4,

@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace traceflow::raster::HWY_NAMESPACE {
 
-// dL/doutput of a block, and how far its pixels have been unblended.
+// dL/doutput of a block, and up to which hit its pixels have been processed.
 struct BlockState {
   alignas(64) float colour[3][pixels_per_block];
   alignas(64) float normal[3][pixels_per_block];
@@ -314,8 +314,8 @@ class TileUnblender {
 };
 
 template <Asked asked>
-HWY_INLINE void unblend(SortOrder order, const KernelOptions& o, const TileLists& lists,
-                        const SavedBlock* blocks, const Saved& saved, TileState& state) {
+HWY_INLINE void blend_backward(SortOrder order, const KernelOptions& o, const TileLists& lists,
+                               const SavedBlock* blocks, const Saved& saved, TileState& state) {
   TileUnblender<asked> tile(o, lists, blocks, saved, state);
   if (order == SortOrder::centre) {
     tile.in_list_order();
@@ -324,8 +324,8 @@ HWY_INLINE void unblend(SortOrder order, const KernelOptions& o, const TileLists
   }
 }
 
-void unblend_tile(SortOrder order, const KernelOptions& o, int64_t index, TileMemory& memory,
-                  const Saved& saved, const OutputGradient& grad_output) {
+void blend_backward_tile(SortOrder order, const KernelOptions& o, int64_t index, TileMemory& memory,
+                         const Saved& saved, const OutputGradient& grad_output) {
   const TileLists lists =
       order == SortOrder::centre ? tile_entries(saved, index) : tile_lists(saved, index, memory);
   const SavedBlock* const blocks = &saved.blocks[index * blocks_per_tile];
@@ -335,11 +335,11 @@ void unblend_tile(SortOrder order, const KernelOptions& o, int64_t index, TileMe
                saved.height, blocks[block], state.blocks[block]);
   }
   if (!grad_output.distortion.empty() || !grad_output.median_depth.empty()) {
-    unblend<Asked::all>(order, o, lists, blocks, saved, state);
+    blend_backward<Asked::all>(order, o, lists, blocks, saved, state);
   } else if (!grad_output.normal.empty() || !grad_output.depth.empty()) {
-    unblend<Asked::geometry>(order, o, lists, blocks, saved, state);
+    blend_backward<Asked::geometry>(order, o, lists, blocks, saved, state);
   } else {
-    unblend<Asked::colour>(order, o, lists, blocks, saved, state);
+    blend_backward<Asked::colour>(order, o, lists, blocks, saved, state);
   }
 }
 
@@ -349,15 +349,15 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace traceflow::raster {
 
-HWY_EXPORT(unblend_tile);
+HWY_EXPORT(blend_backward_tile);
 
 void blend_backward(const Options& options, const Saved& saved, const OutputGradient& grad_output) {
   saved.scratch.gradients.resize({saved.entries.size()});
   const KernelOptions kernel_options(options);
-  const auto unblend_one = HWY_DYNAMIC_DISPATCH(unblend_tile);
+  const auto blend_backward_one = HWY_DYNAMIC_DISPATCH(blend_backward_tile);
   parallel_blocks("raster: blend backward", saved.tiles(), 1, [&](int64_t tile, int64_t) {
     static thread_local TileMemory memory;
-    unblend_one(options.sort, kernel_options, tile, memory, saved, grad_output);
+    blend_backward_one(options.sort, kernel_options, tile, memory, saved, grad_output);
   });
 }
 

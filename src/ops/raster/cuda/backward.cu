@@ -146,8 +146,8 @@ __device__ float transposed_sum(float (&value)[cuda::warp_lanes], int lane) {
 
 template <Asked asked>
 __global__ void __launch_bounds__(pixels_per_tile)
-    unblend_by_centre(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
-                      SplatGradient* gradients) {
+    blend_backward_by_centre(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
+                             SplatGradient* gradients) {
   __shared__ BatchSplat batch[backward_batch];
   __shared__ float partial[warps_per_tile][backward_batch][sums_stored];
   __shared__ unsigned written[warps_per_tile];
@@ -215,8 +215,8 @@ __global__ void __launch_bounds__(pixels_per_tile)
 // all, and for what is behind each. in_turn: one thread of a tile after the other, so that sums have a fixed
 // order.
 template <Asked asked>
-__global__ void unblend_by_hit(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
-                               SplatGradient* gradients, bool in_turn) {
+__global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
+                                      SplatGradient* gradients, bool in_turn) {
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
   const uint32_t begin = saved.tile_begin[tile];
@@ -266,7 +266,7 @@ __global__ void unblend_by_hit(SavedView saved, KernelOptions o, GradientView gr
 }
 
 template <Asked asked>
-void unblend(const Options& options, const Saved& saved, const GradientView& grad) {
+void blend_backward(const Options& options, const Saved& saved, const GradientView& grad) {
   const Saved::Pixels& p = saved.pixels;
   const KeptPixels left{p.transmittance.data(), p.alpha.data(), p.depth.data(), p.m.data(), p.m2.data(),
                         p.inverse_z.data(),     p.last.data(),  p.median.data()};
@@ -276,12 +276,12 @@ void unblend(const Options& options, const Saved& saved, const GradientView& gra
   const KernelOptions kernel_options(options);
   const cuda::Grid grid{saved.tiles(), pixels_per_tile};
   if (options.sort == SortOrder::centre) {
-    cuda::launch("raster: unblend", grid, unblend_by_centre<asked>, view, kernel_options, grad, left,
-                 gradients.data());
+    cuda::launch("raster: blend backward", grid, blend_backward_by_centre<asked>, view, kernel_options, grad,
+                 left, gradients.data());
   } else {
     gradients.zero();
-    cuda::launch("raster: unblend by hit", grid, unblend_by_hit<asked>, view, kernel_options, grad, left,
-                 gradients.data(), cuda::deterministic());
+    cuda::launch("raster: blend backward by hit", grid, blend_backward_by_hit<asked>, view, kernel_options,
+                 grad, left, gradients.data(), cuda::deterministic());
   }
 }
 
@@ -293,11 +293,11 @@ void blend_backward(const Options& options, const Saved& saved, const OutputGrad
                           asked(g.silhouette), asked(g.roughness),    asked(g.normal),
                           asked(g.depth),      asked(g.median_depth), asked(g.distortion)};
   if (!g.median_depth.empty() || !g.distortion.empty()) {
-    unblend<Asked::all>(options, saved, grad);
+    blend_backward<Asked::all>(options, saved, grad);
   } else if (!g.normal.empty() || !g.depth.empty()) {
-    unblend<Asked::geometry>(options, saved, grad);
+    blend_backward<Asked::geometry>(options, saved, grad);
   } else {
-    unblend<Asked::colour>(options, saved, grad);
+    blend_backward<Asked::colour>(options, saved, grad);
   }
 }
 

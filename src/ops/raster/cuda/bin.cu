@@ -3,10 +3,10 @@
 #include <string>
 
 #include "base/kernel.h"
-#include "ops/raster/cuda/reach.h"
 #include "ops/raster/cuda/stages.h"
-#include "ops/raster/raster_chain.h"
-#include "ops/raster/raster_prepare.h"
+#include "ops/raster/cuda/tile_overlap.h"
+#include "ops/raster/project.h"
+#include "ops/raster/project_backward.h"
 #include "primitives/sort.h"
 #include "primitives/sum_kernels.h"
 
@@ -14,8 +14,8 @@
 // that order; a stable sort by tile then leaves each tile's list front to back.
 namespace traceflow {
 
-template void cuda::for_each_index(const char*, int64_t, const raster::Prepare&);
-template void cuda::for_each_index(const char*, int64_t, const raster::ChainStep&);
+template void cuda::for_each_index(const char*, int64_t, const raster::ProjectSurfel&);
+template void cuda::for_each_index(const char*, int64_t, const raster::ProjectBackwardStep&);
 template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t, const raster::CameraShareOf&,
                                                            const raster::KeepCamera&);
 

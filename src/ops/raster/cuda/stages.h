@@ -2,9 +2,9 @@
 
 #include "ops/raster/raster_kernels.h"
 
-// The stages of the fast path on the CUDA device, where they are not the CPU's own (prepare() and chain()
-// are). A block of threads is a tile, a thread a pixel; a warp holds 8×4 pixels, so that it can pass over the
-// splats that reach none of them.
+// The stages of the fast path on the CUDA device, where they are not the CPU's own (project_surfels() and
+// project_surfels_backward() are). A block of threads is a tile, a thread a pixel; a warp holds 8×4 pixels,
+// so that it can pass over the splats that reach none of them.
 namespace traceflow::raster::cuda_stage {
 
 // Where a thread has a surfel, one in more tiles is shared among the lanes of the warp.

@@ -54,8 +54,8 @@ HWY_INLINE Vec dot(Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
 // load(row) gives a vector of one of the leaf's rows: 16 disks, or one disk in all lanes. A lane's result is
 // the same to the bit whichever it is.
 template <class LoadRow>
-HWY_INLINE DiskHit meet_disk(const RayVec& ray, const DiskRules& rules, Vec far, LoadRow&& load,
-                             const BvhLeaf& leaf) {
+HWY_INLINE DiskHit intersect_disk(const RayVec& ray, const DiskRules& rules, Vec far, LoadRow&& load,
+                                  const BvhLeaf& leaf) {
   const Tag d;
   const Vec qx = hn::Sub(ray.ox, load(leaf.position[0]));
   const Vec qy = hn::Sub(ray.oy, load(leaf.position[1]));

@@ -119,7 +119,7 @@ HWY_INLINE void packet_colours(const PosedSurfels& surfels, const Packet& packet
 
 template <int degree>
 void trace_packet(const BlockTask& task, const DiskRules& rules, const Packet& packet, Scratch& scratch) {
-  PacketWalk(task.bvh, task.surfels.sh, rules, packet.rays, packet.count, scratch.packet, scratch.sorter)
+  PacketTraversal(task.bvh, task.surfels.sh, rules, packet.rays, packet.count, scratch.packet, scratch.sorter)
       .run();
   const std::vector<uint32_t>& candidates = scratch.packet.candidates;
   scratch.packet_weights.assign(candidates.size() * packet_rays, 0.0F);

@@ -53,11 +53,11 @@ HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
   return bits;
 }
 
-class PacketWalk {
+class PacketTraversal {
  public:
   // Lanes beyond `count` repeat the last ray and find nothing.
-  HWY_INLINE PacketWalk(const Bvh& bvh, const Tensor<float>& sh, const DiskRules& rules, const UnitRay* rays,
-                        size_t count, PacketHits& hits, HitSorter& sorter)
+  HWY_INLINE PacketTraversal(const Bvh& bvh, const Tensor<float>& sh, const DiskRules& rules,
+                             const UnitRay* rays, size_t count, PacketHits& hits, HitSorter& sorter)
       : bvh_(bvh),
         sh_(sh.data()),
         sh_row_(static_cast<size_t>(sh.row_size())),
@@ -157,7 +157,7 @@ class PacketWalk {
                       hn::Load(d, width_)};
     for (; disks; disks &= disks - 1) {
       const auto k = static_cast<size_t>(__builtin_ctz(disks));
-      const DiskHit hit = meet_disk(
+      const DiskHit hit = intersect_disk(
           rays, rules_, hn::Load(d, far_), [k, d](const float* row) HWY_ATTR { return hn::Set(d, row[k]); },
           leaf);
       if (!hn::AllFalse(d, hit.mask)) append(hit, leaf.surfel[k]);
@@ -178,7 +178,7 @@ class PacketWalk {
                        hn::Set(d, direction_[1][lane]), hn::Set(d, direction_[2][lane]),
                        hn::Set(d, width_[lane])};
       for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
-        const DiskHit hit = meet_disk(
+        const DiskHit hit = intersect_disk(
             ray, rules_, hn::Set(d, far_[lane]),
             [i, d](const float* row) HWY_ATTR { return hn::Load(d, row + i); }, leaf);
         const uint32_t disks = mask_bits(hit.mask);

@@ -25,7 +25,7 @@ HWY_INLINE void meet_leaf(const BvhLeaf& leaf, const UnitRay& ray, const DiskRul
                  hn::Set(d, ray.direction.x), hn::Set(d, ray.direction.y), hn::Set(d, ray.direction.z),
                  hn::Set(d, ray.width)};
   for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
-    const DiskHit hit = meet_disk(
+    const DiskHit hit = intersect_disk(
         r, rules, hn::Set(d, far), [&](const float* row) HWY_ATTR { return hn::Load(d, row + i); }, leaf);
     if (hn::AllFalse(d, hit.mask)) continue;
     const Vec alpha = disk_alpha(hit, rules);

@@ -19,9 +19,9 @@ struct Rows {
 };
 
 // A ray's records from the last hit to the first.
-class RecordWalk {
+class RecordIterator {
  public:
-  __device__ RecordWalk(const Record* records, uint32_t last_head)
+  __device__ RecordIterator(const Record* records, uint32_t last_head)
       : records_(records), next_head_(last_head) {}
 
   // Whether there is another hit, at place().
@@ -129,8 +129,9 @@ __device__ void add_rows(const Rows& rows, bool mine, const BackwardTask& task) 
 }
 
 // Keeps a lane's row for sums in a fixed order.
-__device__ void keep_row(const Rows& rows, int64_t i, const RecordWalk& walk, const BackwardTask& task) {
-  const uint32_t place = walk.place();
+__device__ void keep_row(const Rows& rows, int64_t i, const RecordIterator& record,
+                         const BackwardTask& task) {
+  const uint32_t place = record.place();
   HitParts parts{};
   for (size_t k = 0; k < part::count; ++k) parts.part[k] = rows.part[threadIdx.x][k];
   for (int c = 0; c < 3; ++c) parts.passed[c] = rows.passed[threadIdx.x][c];
@@ -138,9 +139,9 @@ __device__ void keep_row(const Rows& rows, int64_t i, const RecordWalk& walk, co
   store_quads(parts, task.parts[place]);
   task.keys[place] = uint64_t{rows.surfel[threadIdx.x]} << task.ray_bits | static_cast<uint64_t>(i);
   task.places[place] = place;
-  if (!walk.is_first_of_pass()) return;
-  task.keys[walk.head()] = task.head_key;
-  task.places[walk.head()] = walk.head();
+  if (!record.is_first_of_pass()) return;
+  task.keys[record.head()] = task.head_key;
+  task.places[record.head()] = record.head();
 }
 
 // A thread a ray, back to front.
@@ -159,20 +160,20 @@ __global__ void __launch_bounds__(backward_threads) backward_kernel(BackwardTask
     ray.load(task, i, r);
     for (int k = 0; in_order && k < sh_coefficients(degree); ++k) task.basis[16 * i + k] = basis[k];
   }
-  RecordWalk walk(task.records, last_head);
-  bool mine = walk.next();
+  RecordIterator record(task.records, last_head);
+  bool mine = record.next();
   while (__any_sync(full_warp, mine)) {
     if (mine) {
-      const Record hit = load_quads(task.records[walk.place()]);
+      const Record hit = load_quads(task.records[record.place()]);
       rows.surfel[threadIdx.x] = hit.name;
       ray.pass(task, hit, basis, rows.passed[threadIdx.x], rows.part[threadIdx.x]);
     }
     if constexpr (in_order) {
-      if (mine) keep_row(rows, i, walk, task);
+      if (mine) keep_row(rows, i, record, task);
     } else {
       add_rows<degree>(rows, mine, task);
     }
-    mine = mine && walk.next();
+    mine = mine && record.next();
   }
   if (!exists) return;
   if (last_head != no_record) {

@@ -203,7 +203,7 @@ __global__ void __launch_bounds__(build_threads)
   }
 }
 
-void make_room(int64_t count, Tree& tree) {
+void ensure_capacity(int64_t count, Tree& tree) {
   constexpr Device device = Device::cuda;
   const int64_t nodes = std::max<int64_t>(1, count - 1);
   tree.nodes.place(device).resize({nodes});
@@ -228,7 +228,7 @@ void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh) {
   tree.surfels = count;
   ++tree.builds;
   if (count == 0) return;
-  make_room(count, tree);
+  ensure_capacity(count, tree);
   const BuildInput input{surfels, count, {options.alpha_min, options.alpha_max, options.transmittance_min}};
   const TreeView view{tree.nodes.data(), tree.disk_parent.data(), tree.node_parent.data(),
                       tree.arrived.data()};

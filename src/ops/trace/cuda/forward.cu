@@ -1,5 +1,5 @@
 #include "ops/trace/cuda/sh.h"
-#include "ops/trace/cuda/walk.h"
+#include "ops/trace/cuda/traverse.h"
 
 namespace traceflow::trace::cuda {
 
@@ -18,7 +18,7 @@ struct Blending {
 
 // Blends the hits front to back. Returns how many: a ray that ends does so in front of a hit.
 template <int degree>
-__device__ int blend_hits(const RayInput& input, bool coloured, HeldHits& hits, const float* basis,
+__device__ int blend_hits(const RayInput& input, bool coloured, KBuffer& hits, const float* basis,
                           Blending& ray) {
   constexpr int numbers = 3 * sh_coefficients(degree);
   int i = 0;
@@ -51,7 +51,7 @@ __device__ unsigned long long take_records(unsigned long long* used, unsigned wa
 
 // Keeps the first `count` hits of a pass that met them with this transmittance. All lanes of the warp take
 // part.
-__device__ void keep_hits(const RecordStore& store, HeldHits& hits, int count, float transmittance,
+__device__ void keep_hits(const RecordStore& store, KBuffer& hits, int count, float transmittance,
                           uint32_t& last_head) {
   const unsigned wanted = count > 0 ? static_cast<unsigned>(count) + 1 : 0;
   const unsigned long long place = take_records(store.used, wanted);
@@ -95,10 +95,10 @@ __global__ void __launch_bounds__(walk_threads)
   uint32_t last_head = no_record;
   while (__any_sync(full_warp, goes_on)) {
     const float transmittance = blending.remaining;
-    HeldHits hits(columns, input.rules.blend, transmittance, after);
+    KBuffer hits(columns, input.rules.blend, transmittance, after);
     int blended = 0;
     if (goes_on) {
-      walk(input, ray, 0.999999F * std::fmax(after.distance, input.rules.t_min), hits);
+      traverse(input, ray, 0.999999F * std::fmax(after.distance, input.rules.t_min), hits);
       blended = blend_hits<degree>(input, output.colour != nullptr, hits, basis, blending);
       goes_on = blended == held_hits;
       if (goes_on) after = {hits.distance(held_hits - 1), hits.surfel(held_hits - 1)};

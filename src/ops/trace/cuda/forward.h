@@ -29,14 +29,14 @@ __device__ void store_quads(const T& value, T& at) {
   for (size_t i = 0; i < count; ++i) reinterpret_cast<float4*>(&at)[i] = quads[i];
 }
 
-struct WalkRules {
+struct TraversalRules {
   BlendRules<float> blend;
   float log_alpha_min;
   float t_min;
   float deviations;  // cone_deviations()
 
-  WalkRules() = default;
-  explicit WalkRules(const Options& o)
+  TraversalRules() = default;
+  explicit TraversalRules(const Options& o)
       : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
         log_alpha_min(std::log(o.alpha_min)),
         t_min(o.t_min),
@@ -51,7 +51,7 @@ struct RayInput {
   RayView rays;
   const uint32_t* order;  // the caller's index of each ray; null where that is the tracer's
   int64_t first, last;
-  WalkRules rules;
+  TraversalRules rules;
   Vec3<float> background;
 
   // The ray of this thread.

@@ -3,7 +3,7 @@
 #include <numeric>
 
 #include "math/spherical_harmonics.h"
-#include "ops/trace/cuda/walk.h"
+#include "ops/trace/cuda/traverse.h"
 #include "ops/trace/trace_bvh.h"
 
 // What the host does for both passes. Forward keeps hits as long as there is room. Where it ran out, backward
@@ -52,7 +52,7 @@ SavedHits& hits_of(const Saved& saved) {
   return *saved.on_device;
 }
 
-void make_room(const Saved& saved, int64_t rays, SavedHits& hits) {
+void allocate(const Saved& saved, int64_t rays, SavedHits& hits) {
   const int64_t allowed = allowed_records(saved);
   const int64_t wanted = std::min(allowed, std::max(expected_records * rays, hits.most_wanted / 4 * 5));
   if (hits.records.size() < wanted) room_within(allowed, hits.records, wanted);
@@ -67,7 +67,7 @@ void make_room(const Saved& saved, int64_t rays, SavedHits& hits) {
 }
 
 // All of the gradient is set, but for dL/dsh, which hits are added to, and tints, which no ray sees.
-void make_room(const PosedSurfels& surfels, const Rays& rays, InputGradient& gradient) {
+void allocate(const PosedSurfels& surfels, const Rays& rays, InputGradient& gradient) {
   PosedSurfels& g = gradient.surfels;
   room(g.position, surfels.position.shape());
   room(g.scale, surfels.scale.shape());
@@ -102,7 +102,7 @@ RayInput input_of(const PosedSurfels& surfels, const Tree* tree, const Rays& ray
           nullptr,
           0,
           rays.count(),
-          WalkRules(options),
+          TraversalRules(options),
           options.background};
 }
 
@@ -145,7 +145,7 @@ class Backward {
     task_.rays.first = first;
     task_.rays.last = last;
     task_.records = hits_.records.data();
-    if (deterministic()) make_room_in_order(records);
+    if (deterministic()) allocate_in_order(records);
     trace_backward(degree_, task_);
     if (task_.parts) {
       sum_in_order(degree_, records, surfels_, task_.ray_bits, hits_, task_.surfel_sums, task_.grad_sh);
@@ -172,7 +172,7 @@ class Backward {
   }
 
  private:
-  void make_room_in_order(int64_t records) {
+  void allocate_in_order(int64_t records) {
     task_.parts = room(hits_.parts, {std::max<int64_t>(1, records)});
     task_.keys = room(hits_.keys, {records});
     task_.places = room(hits_.places, {records});
@@ -213,7 +213,7 @@ void forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays, cons
   if (saved) {
     if (!saved->on_device) saved->on_device = std::make_shared<SavedHits>();
     SavedHits& hits = *saved->on_device;
-    make_room(*saved, count, hits);
+    allocate(*saved, count, hits);
     hits.tree = bvh.on_device;
     hits.builds = bvh.on_device ? bvh.on_device->builds : 0;
     hits.is_sorted = sorts;
@@ -230,7 +230,7 @@ void backward(const PosedSurfels& surfels, const Rays& rays, const Options& opti
   SavedHits& hits = hits_of(saved);
   const int64_t count = surfels.count();
   require(hits.rays == rays.count(), "the hits were saved for these rays");
-  make_room(surfels, rays, gradient);
+  allocate(surfels, rays, gradient);
   room(hits.surfel_sums, {count});
   hits.surfel_sums.zero();
   parallel_for(Device::cuda, "trace: frames", count, MakeFrame{surfels, room(hits.frames, {count})});

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "ops/lpips/cuda/distance.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 #include "support/device.h"
 #include "support/narrow_lpips.h"
 

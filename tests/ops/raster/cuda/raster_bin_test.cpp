@@ -91,7 +91,7 @@ Lists expect_plain_lists(SortOrder order, const TestScene<double>& scene) {
   Options options;
   options.sort = order;
   Saved saved;
-  prepare(placed.surfels.on(Device::cuda), placed.camera, options, saved);
+  project_surfels(placed.surfels.on(Device::cuda), placed.camera, options, saved);
   cuda_stage::bin(order, saved);
   Lists found = lists_of(saved);
   const Lists expected = plain_lists(order, saved);

@@ -1,4 +1,4 @@
-#include "train/sightings.h"
+#include "train/initial_observations.h"
 
 #include <gtest/gtest.h>
 
@@ -64,7 +64,7 @@ class SlabBeforeAWall : public ::testing::Test {
 };
 
 TEST_F(SlabBeforeAWall, EveryPointIsLabelledByWhatItBelongsTo) {
-  const Sightings s = look_at(surfels_, photographs_);
+  const InitialObservations s = observe(surfels_, photographs_);
   for (size_t i = 0; i < points_.size(); ++i) {
     const bool wall = points_[i].z == wall_z;
     ASSERT_TRUE(s.any[i]);
@@ -92,7 +92,7 @@ TEST_F(SlabBeforeAWall, ASlantedPlaneDoesNotHideItself) {
   }
   Photograph photograph = photographs_.front();
   photograph.images = images;
-  const Sightings s = look_at(surfels, {&photograph, 1});
+  const InitialObservations s = observe(surfels, {&photograph, 1});
   for (int64_t i = 0; i < surfels.count(); ++i) {
     const Vec2<float> at = photograph.camera.project(load3<float>(floor.row(i)));
     if (!(at.x >= 0 && at.x < side && at.y < side)) continue;
@@ -103,7 +103,7 @@ TEST_F(SlabBeforeAWall, ASlantedPlaneDoesNotHideItself) {
 }
 
 TEST_F(SlabBeforeAWall, WithoutPhotographsNothingIsKnown) {
-  const Sightings s = look_at(surfels_, {});
+  const InitialObservations s = observe(surfels_, {});
   EXPECT_EQ(s.any, std::vector<uint8_t>(points_.size(), 0));
 }
 

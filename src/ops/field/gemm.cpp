@@ -1,4 +1,4 @@
-#include "ops/field/products.h"
+#include "ops/field/gemm.h"
 
 #include <omp.h>
 
@@ -32,11 +32,11 @@ const dnnl::engine& engine() {
   return cpu;
 }
 
-dnnl::memory::data_type data_type(Number number) {
-  return number == Number::fp32 ? dnnl::memory::data_type::f32 : dnnl::memory::data_type::bf16;
+dnnl::memory::data_type data_type(DType number) {
+  return number == DType::fp32 ? dnnl::memory::data_type::f32 : dnnl::memory::data_type::bf16;
 }
 
-dnnl::memory::desc matrix(int64_t rows, int64_t columns, Number number, bool transposed = false) {
+dnnl::memory::desc matrix(int64_t rows, int64_t columns, DType number, bool transposed = false) {
   const dnnl::memory::dims strides =
       transposed ? dnnl::memory::dims{1, rows} : dnnl::memory::dims{columns, 1};
   return {{rows, columns}, data_type(number), strides};
@@ -50,7 +50,7 @@ dnnl::memory::dims dims_of(const dnnl::memory::desc& description) {
 #endif
 }
 
-dnnl::primitive_attr attributes(const ProductShape& shape) {
+dnnl::primitive_attr attributes(const GemmShape& shape) {
   dnnl::post_ops after;
   if (shape.accumulate) after.append_sum(1.0F);
 #if DNNL_VERSION_MAJOR >= 3
@@ -64,12 +64,12 @@ dnnl::primitive_attr attributes(const ProductShape& shape) {
   return attributes;
 }
 
-dnnl::memory::desc operand_b(const ProductShape& shape);
+dnnl::memory::desc operand_b(const GemmShape& shape);
 
-dnnl::matmul::primitive_desc describe(const ProductShape& shape) {
+dnnl::matmul::primitive_desc describe(const GemmShape& shape) {
   const auto a = matrix(shape.m, shape.k, shape.operands, shape.transposed);
   const auto b = operand_b(shape);
-  const auto bias = shape.bias ? matrix(1, shape.n, Number::fp32) : dnnl::memory::desc();
+  const auto bias = shape.bias ? matrix(1, shape.n, DType::fp32) : dnnl::memory::desc();
   const auto c = matrix(shape.m, shape.n, shape.result);
 #if DNNL_VERSION_MAJOR >= 3
   return {engine(), a, b, bias, c, attributes(shape)};
@@ -79,12 +79,12 @@ dnnl::matmul::primitive_desc describe(const ProductShape& shape) {
 }
 
 // A product that B is packed for may choose the order; the others take it as it is.
-dnnl::memory::desc operand_b(const ProductShape& shape) {
+dnnl::memory::desc operand_b(const GemmShape& shape) {
   if (shape.packed_for == 0) return matrix(shape.k, shape.n, shape.operands);
   if (shape.packed_for == shape.m) {
     return {{shape.k, shape.n}, data_type(shape.operands), dnnl::memory::format_tag::any};
   }
-  ProductShape chooser = shape;
+  GemmShape chooser = shape;
   chooser.m = shape.packed_for;
   return describe(chooser).weights_desc();
 }
@@ -107,8 +107,8 @@ void* scratchpad(size_t bytes) {
 
 }  // namespace
 
-struct Product::Compiled {
-  explicit Compiled(const ProductShape& shape) : description(describe(shape)), primitive(description) {}
+struct Gemm::Compiled {
+  explicit Compiled(const GemmShape& shape) : description(describe(shape)), primitive(description) {}
   dnnl::matmul::primitive_desc description;
   dnnl::matmul primitive;
   dnnl::memory::desc a = description.src_desc();
@@ -118,16 +118,16 @@ struct Product::Compiled {
   dnnl::memory::desc scratch = description.scratchpad_desc();
 };
 
-Product::Product(const ProductShape& shape) {
+Gemm::Gemm(const GemmShape& shape) {
   const OneThread one_thread;
   compiled_ = std::make_unique<const Compiled>(shape);
 }
 
-Product::~Product() = default;
+Gemm::~Gemm() = default;
 
-int64_t Product::packed_bytes() const { return static_cast<int64_t>(compiled_->b.get_size()); }
+int64_t Gemm::packed_bytes() const { return static_cast<int64_t>(compiled_->b.get_size()); }
 
-void Product::pack(const float* b, int64_t row_stride, int64_t column_stride, void* packed) const {
+void Gemm::pack(const float* b, int64_t row_stride, int64_t column_stride, void* packed) const {
   const OneThread one_thread;
   const dnnl::memory::desc from(dims_of(compiled_->b), dnnl::memory::data_type::f32,
                                 dnnl::memory::dims{row_stride, column_stride});
@@ -144,7 +144,7 @@ void Product::pack(const float* b, int64_t row_stride, int64_t column_stride, vo
 
 // The operands of a product as oneDNN's objects. Each thread has its own, made once: they cost more than a
 // small product.
-struct Product::Arguments {
+struct Gemm::Arguments {
   explicit Arguments(const Compiled& p)
       : a(view(p.a, nullptr)),
         b(view(p.b, nullptr)),
@@ -162,7 +162,7 @@ struct Product::Arguments {
   std::unordered_map<int, dnnl::memory> all;
 };
 
-void Product::run(const void* a, const void* b, const float* bias, void* c) const {
+void Gemm::run(const void* a, const void* b, const float* bias, void* c) const {
   const OneThread one_thread;
   const Compiled& p = *compiled_;
   thread_local std::unordered_map<const Compiled*, Arguments> made;
@@ -176,12 +176,12 @@ void Product::run(const void* a, const void* b, const float* bias, void* c) cons
   stream().wait();
 }
 
-const Product& product(const ProductShape& shape) {
+const Gemm& gemm(const GemmShape& shape) {
   static std::mutex mutex;
-  static std::map<ProductShape, std::unique_ptr<const Product>> compiled;
+  static std::map<GemmShape, std::unique_ptr<const Gemm>> compiled;
   const std::lock_guard lock(mutex);
-  std::unique_ptr<const Product>& entry = compiled[shape];
-  if (!entry) entry.reset(new Product(shape));
+  std::unique_ptr<const Gemm>& entry = compiled[shape];
+  if (!entry) entry.reset(new Gemm(shape));
   return *entry;
 }
 

@@ -1,4 +1,4 @@
-#include "train/health.h"
+#include "train/divergence_monitor.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ constexpr int64_t settling_steps = 300;
 
 }  // namespace
 
-std::string Health::check(const LossTerms& terms, const NonFiniteGradients& gradients) {
+std::string DivergenceMonitor::check(const LossTerms& terms, const NonFiniteGradients& gradients) {
   if (!std::isfinite(terms.total)) return "the loss is not a number";
   if (gradients.count > 0) {
     dropped_ += gradients.count;
@@ -34,17 +34,17 @@ std::string Health::check(const LossTerms& terms, const NonFiniteGradients& grad
   return "";
 }
 
-void Health::expect_fall() {
+void DivergenceMonitor::expect_fall() {
   best_ = 0;
   steps_ = 0;
 }
 
-bool Health::sound() const {
+bool DivergenceMonitor::sound() const {
   return steps_ < settling_steps || collapse_decibels_ <= 0 ||
          smoothed_ > best_ - static_cast<double>(collapse_decibels_) / 2;
 }
 
-void Health::set_state(const State& state) {
+void DivergenceMonitor::set_state(const State& state) {
   smoothed_ = state.smoothed;
   best_ = state.best;
   steps_ = state.steps;

@@ -8,11 +8,12 @@
 #include "ops/raster/raster_kernels.h"
 #include "scene/surfel_views.h"
 
-// From the sums over pixels to the surfels' values and the camera's pose: Prepare in reverse.
+// Backward pass of ProjectSurfel: from the sums over pixels to the gradients of the surfels and the camera's
+// pose.
 namespace traceflow::raster {
 
 // One surfel; on either device.
-struct Chain {
+struct ProjectBackward {
   PosedSurfelsView surfels;
   Camera<double> camera;
   const Splat* splats;
@@ -20,7 +21,7 @@ struct Chain {
   const uint32_t* entry_begin;
   const uint16_t* touched;
   const SplatGradient* gradients;  // by entry
-  uint32_t tiles_walked;           // a surfel of more entries has the sum of all in its first
+  uint32_t max_tiles;              // a surfel of more entries has the sum of all in its first
   MutablePosedSurfelsView to;
   float* screen_gradient;
 
@@ -30,7 +31,7 @@ struct Chain {
     clear(i);
     SplatGradient sums{};
     CameraGradient<double> camera_gradient;
-    if (add_tiles(i, sums)) chain(i, sums, camera_gradient);
+    if (add_tiles(i, sums)) backward(i, sums, camera_gradient);
     return camera_gradient;
   }
 
@@ -57,11 +58,11 @@ struct Chain {
     screen_gradient[i] = 0;
   }
 
-  // Adds the tiles that blended the surfel, in their order; false if there is nothing to chain.
+  // Adds the tiles that blended the surfel, in their order; false if there is nothing to propagate.
   TRACEFLOW_HD bool add_tiles(int64_t i, SplatGradient& sums) const {
     const uint32_t begin = entry_begin[i];
     const uint32_t end = entry_begin[i + 1];
-    if (end - begin > tiles_walked) {
+    if (end - begin > max_tiles) {
       sums = gradients[begin];
       return !is_zero(sums);
     }
@@ -84,8 +85,8 @@ struct Chain {
     return true;
   }
 
-  TRACEFLOW_HD void chain(int64_t i, const SplatGradient& sums,
-                          CameraGradient<double>& camera_gradient) const {
+  TRACEFLOW_HD void backward(int64_t i, const SplatGradient& sums,
+                             CameraGradient<double>& camera_gradient) const {
     const SurfelFrame<double> frame = surfel_frame(surfels, i);
     const Vec3<double> from_camera = frame.position - camera.position;
     const Vec3<double> centre = camera.camera_from_world * from_camera;
@@ -145,13 +146,14 @@ struct Chain {
   }
 };
 
-// The same as a step for every surfel that keeps the camera's shares, where they are wanted.
-struct ChainStep {
-  Chain chain;
+// Runs ProjectBackward for each surfel and keeps the surfel's share of the camera gradient where it is
+// wanted.
+struct ProjectBackwardStep {
+  ProjectBackward op;
   CameraGradient<double>* camera;  // N, may be null
 
   TRACEFLOW_HD void operator()(int64_t i) const {
-    const CameraGradient<double> share = chain.run(i);
+    const CameraGradient<double> share = op.run(i);
     if (camera != nullptr) camera[i] = share;
   }
 };

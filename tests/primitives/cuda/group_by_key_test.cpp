@@ -1,4 +1,4 @@
-#include "primitives/lists.h"
+#include "primitives/group_by_key.h"
 
 #include "support/device.h"
 
@@ -10,12 +10,12 @@ using namespace traceflow::testing;
 using ListsOnDevice = OnDevice;
 
 TEST_F(ListsOnDevice, HoldEveryEntryUnderItsKeyInOrder) {
-  cuda::Lists lists;
+  cuda::KeyGroups lists;
   Random random(1);
   for (const auto& [n, keys] : {std::pair{0, 3}, {1, 1}, {500, 7}, {300, 1}, {40, 900}}) {
     Tensor<int32_t> key({n});
     for (int32_t& k : key.values()) k = static_cast<int32_t>(random.below(keys + 1)) - 1;
-    cuda::list_by_key(key.on(Device::cuda).data(), n, keys, lists);
+    cuda::group_by_key(key.on(Device::cuda).data(), n, keys, lists);
 
     const Tensor<int32_t> begin = lists.begin.on(Device::cpu), entry = lists.entry.on(Device::cpu);
     for (int32_t k = 0; k < keys; ++k) {

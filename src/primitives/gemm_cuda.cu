@@ -1,4 +1,4 @@
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 
 #include <map>
 #include <memory>
@@ -30,9 +30,9 @@ void check_blas(cublasStatus_t result, const char* what) {
           result == CUBLAS_STATUS_SUCCESS ? "" : lt().status_string(result));
 }
 
-cudaDataType_t type_of(Number number) { return number == Number::bf16 ? CUDA_R_16BF : CUDA_R_32F; }
+cudaDataType_t type_of(DType number) { return number == DType::bf16 ? CUDA_R_16BF : CUDA_R_32F; }
 
-cublasLtEpilogue_t epilogue_of(const ProductDescription& p) {
+cublasLtEpilogue_t epilogue_of(const GemmDescription& p) {
   if (p.mask == Mask::read) return CUBLASLT_EPILOGUE_DRELU;
   if (p.mask == Mask::written) {
     return p.bias ? CUBLASLT_EPILOGUE_RELU_AUX_BIAS : CUBLASLT_EPILOGUE_RELU_AUX;
@@ -45,20 +45,19 @@ cublasLtEpilogue_t epilogue_of(const ProductDescription& p) {
 // C = A·B becomes Cᵀ = Bᵀ·Aᵀ. So the library's first operand is B.
 class Plan {
  public:
-  explicit Plan(const ProductDescription& p, cublasLtHandle_t handle);
+  explicit Plan(const GemmDescription& p, cublasLtHandle_t handle);
   Plan(const Plan&) = delete;
   Plan& operator=(const Plan&) = delete;
 
   bool found() const { return found_; }
-  void run(const ProductDescription& p, const ProductAddresses& at, cublasLtHandle_t handle,
-           void* workspace) const;
+  void run(const GemmDescription& p, const GemmAddresses& at, cublasLtHandle_t handle, void* workspace) const;
 
  private:
   template <class T>
   void set(cublasLtMatmulDescAttributes_t attribute, const T& value) const {
     check_blas(lt().set_operation(operation_, attribute, &value, sizeof(value)), "a product is described");
   }
-  void point(const ProductDescription& p, const void* bias, const void* mask) const {
+  void point(const GemmDescription& p, const void* bias, const void* mask) const {
     if (p.bias) set(CUBLASLT_MATMUL_DESC_BIAS_POINTER, bias);
     if (p.mask != Mask::none) set(CUBLASLT_MATMUL_DESC_EPILOGUE_AUX_POINTER, mask);
   }
@@ -71,7 +70,7 @@ class Plan {
   bool found_ = false;
 };
 
-cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored_columns, int64_t stride,
+cublasLtMatrixLayout_t layout(DType number, int64_t stored_rows, int64_t stored_columns, int64_t stride,
                               int64_t batches, int64_t batch_stride) {
   cublasLtMatrixLayout_t made = nullptr;
   check_blas(lt().create_layout(&made, type_of(number), static_cast<uint64_t>(stored_columns),
@@ -88,7 +87,7 @@ cublasLtMatrixLayout_t layout(Number number, int64_t stored_rows, int64_t stored
   return made;
 }
 
-Plan::Plan(const ProductDescription& p, cublasLtHandle_t handle) {
+Plan::Plan(const GemmDescription& p, cublasLtHandle_t handle) {
   check_blas(lt().create_operation(&operation_, CUBLAS_COMPUTE_32F, CUDA_R_32F), "a product is described");
   set(CUBLASLT_MATMUL_DESC_TRANSA, p.transposed_b ? CUBLAS_OP_T : CUBLAS_OP_N);
   set(CUBLASLT_MATMUL_DESC_TRANSB, p.transposed_a ? CUBLAS_OP_T : CUBLAS_OP_N);
@@ -129,7 +128,7 @@ void Plan::choose(cublasLtHandle_t handle) {
   if (found_) algorithm_ = result.algo;
 }
 
-void Plan::run(const ProductDescription& p, const ProductAddresses& at, cublasLtHandle_t handle,
+void Plan::run(const GemmDescription& p, const GemmAddresses& at, cublasLtHandle_t handle,
                void* workspace) const {
   point(p, at.bias, at.mask);
   const float one = 1, before = p.accumulate ? 1.0F : 0.0F;
@@ -146,18 +145,18 @@ class Library {
     static Library* const library = new Library;
     return *library;
   }
-  bool supported(const ProductDescription& product) {
-    if (product.has_epilogue() && !allows_epilogues) return false;
-    if (product.operands == Number::bf16 && !multiplies_bf16_) return false;
-    return plan(product).found();
+  bool supported(const GemmDescription& gemm) {
+    if (gemm.has_epilogue() && !allows_epilogues) return false;
+    if (gemm.operands == DType::bf16 && !multiplies_bf16_) return false;
+    return plan(gemm).found();
   }
-  void multiply(const ProductDescription& product, const ProductAddresses& at) {
+  void multiply(const GemmDescription& gemm, const GemmAddresses& at) {
     const std::lock_guard lock(mutex_);
-    const Plan& chosen = plan_locked(product);
+    const Plan& chosen = plan_locked(gemm);
     require(chosen.found(), "cuBLASLt has the product",
-            std::to_string(product.m) + "×" + std::to_string(product.k) + "×" + std::to_string(product.n));
+            std::to_string(gemm.m) + "×" + std::to_string(gemm.k) + "×" + std::to_string(gemm.n));
     const profile::Scope scope("matrix product");
-    chosen.run(product, at, handle_, workspace_.data());
+    chosen.run(gemm, at, handle_, workspace_.data());
     if (profile::is_on()) synchronise();
   }
 
@@ -171,13 +170,13 @@ class Library {
                            "the CUDA device's compute capability");
     multiplies_bf16_ = major >= 8;
   }
-  const Plan& plan(const ProductDescription& product) {
+  const Plan& plan(const GemmDescription& gemm) {
     const std::lock_guard lock(mutex_);
-    return plan_locked(product);
+    return plan_locked(gemm);
   }
-  const Plan& plan_locked(const ProductDescription& product) {
-    std::unique_ptr<const Plan>& made = plans_[product];
-    if (!made) made = std::make_unique<const Plan>(product, handle_);
+  const Plan& plan_locked(const GemmDescription& gemm) {
+    std::unique_ptr<const Plan>& made = plans_[gemm];
+    if (!made) made = std::make_unique<const Plan>(gemm, handle_);
     return *made;
   }
 
@@ -186,18 +185,18 @@ class Library {
   // Older devices have no units for it, and the library's products in their place are slower than fp32's.
   bool multiplies_bf16_ = false;
   Tensor<std::byte> workspace_;
-  std::map<ProductDescription, std::unique_ptr<const Plan>> plans_;
+  std::map<GemmDescription, std::unique_ptr<const Plan>> plans_;
 };
 
 }  // namespace
 
-bool products_answer(std::string& why_not) {
+bool cublas_lt_answers(std::string& why_not) {
   why_not = CublasLt::instance().why_not();
   return CublasLt::instance().found();
 }
-bool supported(const ProductDescription& product) { return Library::instance().supported(product); }
-void multiply(const ProductDescription& product, const ProductAddresses& at) {
-  Library::instance().multiply(product, at);
+bool supported(const GemmDescription& gemm) { return Library::instance().supported(gemm); }
+void multiply(const GemmDescription& gemm, const GemmAddresses& at) {
+  Library::instance().multiply(gemm, at);
 }
 void allow_epilogues(bool allowed) { Library::instance().allows_epilogues = allowed; }
 

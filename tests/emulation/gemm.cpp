@@ -5,7 +5,7 @@
 #include "base/profile.h"
 #include "emulation/device.h"
 #include "math/bf16.h"
-#include "primitives/products.h"
+#include "primitives/gemm.h"
 
 // Stands in for cuBLASLt: the same products in plain loops.
 namespace traceflow::cuda {
@@ -14,13 +14,13 @@ namespace {
 
 bool epilogues_allowed = true;
 
-float load(Number number, const void* values, int64_t at) {
-  return number == Number::fp32 ? static_cast<const float*>(values)[at]
-                                : to_float(static_cast<const Bf16*>(values)[at]);
+float load(DType number, const void* values, int64_t at) {
+  return number == DType::fp32 ? static_cast<const float*>(values)[at]
+                               : to_float(static_cast<const Bf16*>(values)[at]);
 }
 
-void save(Number number, float value, void* values, int64_t at) {
-  if (number == Number::fp32) {
+void save(DType number, float value, void* values, int64_t at) {
+  if (number == DType::fp32) {
     static_cast<float*>(values)[at] = value;
   } else {
     store(value, static_cast<Bf16*>(values)[at]);
@@ -28,7 +28,7 @@ void save(Number number, float value, void* values, int64_t at) {
 }
 
 // A stored matrix, or its transpose, dense and in fp32.
-std::vector<float> dense(Number number, const void* from, int64_t first, int64_t rows, int64_t columns,
+std::vector<float> dense(DType number, const void* from, int64_t first, int64_t rows, int64_t columns,
                          int64_t stride, bool transposed) {
   std::vector<float> to(static_cast<size_t>(rows * columns));
   for (int64_t i = 0; i < rows; ++i) {
@@ -40,7 +40,7 @@ std::vector<float> dense(Number number, const void* from, int64_t first, int64_t
   return to;
 }
 
-int64_t bytes_of(Number number) { return number == Number::fp32 ? 4 : 2; }
+int64_t bytes_of(DType number) { return number == DType::fp32 ? 4 : 2; }
 
 // A stored matrix's bytes, row after row, of all batches.
 struct Stored {
@@ -61,7 +61,7 @@ struct Stored {
   }
 };
 
-Stored stored(Number number, const void* address, int64_t rows, int64_t columns, int64_t stride,
+Stored stored(DType number, const void* address, int64_t rows, int64_t columns, int64_t stride,
               int64_t batches, int64_t batch_stride) {
   const int64_t size = bytes_of(number);
   return {reinterpret_cast<uintptr_t>(address),
@@ -73,7 +73,7 @@ Stored stored(Number number, const void* address, int64_t rows, int64_t columns,
 }
 
 // What the library refuses, or leaves undefined.
-void check(const ProductDescription& p) {
+void check(const GemmDescription& p) {
   require(p.m > 0 && p.n > 0 && p.k > 0 && p.batches > 0, "a product has numbers");
   require(p.stride_a >= (p.transposed_a ? p.m : p.k) && p.stride_b >= (p.transposed_b ? p.k : p.n) &&
               p.stride_c >= p.n && (p.batches == 1 || p.batch_c >= p.m * p.stride_c),
@@ -83,14 +83,14 @@ void check(const ProductDescription& p) {
           "rows are aligned");
   require(p.batch_a * operands % 16 == 0 && p.batch_b * operands % 16 == 0 && p.batch_c * result % 16 == 0,
           "batches are aligned");
-  require(p.operands == p.result || p.result == Number::fp32, "the library has the numbers' types");
+  require(p.operands == p.result || p.result == DType::fp32, "the library has the numbers' types");
   require(!p.has_epilogue() || p.batches == 1, "what follows a product follows one alone");
   require(p.mask == Mask::none || (p.mask_stride % 128 == 0 && p.mask_stride >= p.n), "a mask's rows fit");
   require(p.mask != Mask::written || p.relu, "a ReLU writes the mask");
   require(p.mask != Mask::read || (!p.bias && !p.relu && p.k > 1), "the mask alone follows the product");
 }
 
-void check(const ProductDescription& p, const ProductAddresses& at) {
+void check(const GemmDescription& p, const GemmAddresses& at) {
   require((at.bias != nullptr || !p.bias) && (at.mask != nullptr || p.mask == Mask::none),
           "a product has what follows it");
   for (const void* address :
@@ -106,7 +106,7 @@ void check(const ProductDescription& p, const ProductAddresses& at) {
   require(c.apart_from(a) && c.apart_from(b), "a product does not write what it reads");
 }
 
-void finish_row(const ProductDescription& p, const ProductAddresses& at, int64_t batch, int64_t i,
+void finish_row(const GemmDescription& p, const GemmAddresses& at, int64_t batch, int64_t i,
                 std::vector<float>& row) {
   const int64_t first = batch * p.batch_c + i * p.stride_c;
   auto* const bits = static_cast<uint8_t*>(at.mask) + (at.mask == nullptr ? 0 : i * p.mask_stride / 8);
@@ -128,11 +128,11 @@ void finish_row(const ProductDescription& p, const ProductAddresses& at, int64_t
 
 }  // namespace
 
-bool products_answer(std::string&) { return true; }
-bool supported(const ProductDescription& product) { return epilogues_allowed || !product.has_epilogue(); }
+bool cublas_lt_answers(std::string&) { return true; }
+bool supported(const GemmDescription& gemm) { return epilogues_allowed || !gemm.has_epilogue(); }
 void allow_epilogues(bool allowed) { epilogues_allowed = allowed; }
 
-void multiply(const ProductDescription& p, const ProductAddresses& at) {
+void multiply(const GemmDescription& p, const GemmAddresses& at) {
   const profile::Scope scope("matrix product");
   require(supported(p), "the product is supported");
   check(p);

@@ -1,4 +1,4 @@
-#include "ops/raster/raster_chain.h"
+#include "ops/raster/project_backward.h"
 
 #include <limits>
 #include <vector>
@@ -15,22 +15,23 @@ constexpr int64_t surfels_per_block = 256;
 using CameraShare = CameraGradient<double>;
 
 // Per block of surfels first, then over the blocks.
-CameraShare run_on_cpu(const Chain& chain, int64_t n) {
+CameraShare run_on_cpu(const ProjectBackward& op, int64_t n) {
   std::vector<CameraShare> partial(static_cast<size_t>((n + surfels_per_block - 1) / surfels_per_block));
-  parallel_blocks("raster: chain", n, surfels_per_block, [&](int64_t begin, int64_t end) {
+  parallel_blocks("raster: project backward", n, surfels_per_block, [&](int64_t begin, int64_t end) {
     CameraShare& sum = partial[static_cast<size_t>(begin / surfels_per_block)];
-    for (int64_t i = begin; i < end; ++i) sum += chain.run(i);
+    for (int64_t i = begin; i < end; ++i) sum += op.run(i);
   });
   CameraShare total;
   for (const CameraShare& share : partial) total += share;
   return total;
 }
 
-CameraShare run_on_device(const Chain& chain, int64_t n, bool wants_camera, const Saved& saved) {
+CameraShare run_on_device(const ProjectBackward& op, int64_t n, bool wants_camera, const Saved& saved) {
   Tensor<CameraShare>& shares = saved.scratch.camera;
   shares.place(Device::cuda).resize({wants_camera ? n + 1 : 0});  // the last is their sum
   cuda_stage::add_tiles(saved);
-  parallel_for(Device::cuda, "raster: chain", n, ChainStep{chain, wants_camera ? shares.data() : nullptr});
+  parallel_for(Device::cuda, "raster: project backward", n,
+               ProjectBackwardStep{op, wants_camera ? shares.data() : nullptr});
   CameraShare total;
   if (wants_camera) {
     ordered_sum<CameraShare>(Device::cuda, "raster: camera", n, CameraShareOf{shares.data()},
@@ -43,8 +44,8 @@ CameraShare run_on_device(const Chain& chain, int64_t n, bool wants_camera, cons
 
 }  // namespace
 
-void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved& saved,
-           InputGradient& gradient) {
+void project_surfels_backward(const PosedSurfels& surfels, const Camera<float>& camera, const Saved& saved,
+                              InputGradient& gradient) {
   const int64_t n = surfels.count();
   const Device device = surfels.position.device();
   auto& g = gradient.surfels;
@@ -57,20 +58,20 @@ void chain(const PosedSurfels& surfels, const Camera<float>& camera, const Saved
   g.roughness.place(device).resize(surfels.roughness.shape());
   gradient.screen_gradient.place(device).resize({n});
 
-  const uint32_t tiles_walked =
+  const uint32_t max_tiles =
       device == Device::cpu ? std::numeric_limits<uint32_t>::max() : cuda_stage::tiles_of_one_lane;
-  const Chain chain{view_of(surfels),
-                    convert<double>(camera),
-                    saved.splats.data(),
-                    saved.rho_per_pixel2,
-                    saved.entry_begin.data(),
-                    saved.touched.data(),
-                    saved.scratch.gradients.data(),
-                    tiles_walked,
-                    view_of(g),
-                    gradient.screen_gradient.data()};
+  const ProjectBackward op{view_of(surfels),
+                           convert<double>(camera),
+                           saved.splats.data(),
+                           saved.rho_per_pixel2,
+                           saved.entry_begin.data(),
+                           saved.touched.data(),
+                           saved.scratch.gradients.data(),
+                           max_tiles,
+                           view_of(g),
+                           gradient.screen_gradient.data()};
   const CameraShare total =
-      device == Device::cpu ? run_on_cpu(chain, n) : run_on_device(chain, n, gradient.wants_camera, saved);
+      device == Device::cpu ? run_on_cpu(op, n) : run_on_device(op, n, gradient.wants_camera, saved);
   gradient.camera = {};
   if (gradient.wants_camera) {
     gradient.camera = {Mat3<float>(total.camera_from_world), Vec3<float>(total.position)};

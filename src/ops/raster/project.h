@@ -104,11 +104,11 @@ TRACEFLOW_HD inline bool all_finite(const float* values, int64_t count) {
 }
 
 // One surfel to its splat and bounds; on either device.
-class Prepare {
+class ProjectSurfel {
  public:
   // splats, bounds: N each.
-  Prepare(const PosedSurfelsView& surfels, const Camera<float>& camera, const Options& options, Splat* splats,
-          Bounds* bounds)
+  ProjectSurfel(const PosedSurfelsView& surfels, const Camera<float>& camera, const Options& options,
+                Splat* splats, Bounds* bounds)
       : surfels_(surfels),
         camera_(convert<double>(camera)),
         near_plane_(options.near_plane),

@@ -13,7 +13,7 @@ namespace traceflow {
 // A surfel counts as seen in a photograph where no other one stands clearly before it; one that is seen in
 // none takes over what its nearest seen neighbour has: the back of an object belongs to its front, and the
 // wall behind an object to the wall beside it.
-struct Sightings {
+struct InitialObservations {
   Tensor<float> colour;      // N×3, the median of its colours: it forgives the odd wrong one
   std::vector<int> outside;  // sightings outside the masks less those inside: < 0 on the moving object,
                              // 0 where no photograph with a mask shows it
@@ -35,6 +35,6 @@ struct Photograph {
 std::vector<Photograph> earliest_photographs(const Capture& capture);
 
 // `surfels` as they start: as wide as their neighbours are apart.
-Sightings look_at(const Surfels& surfels, std::span<const Photograph> photographs);
+InitialObservations observe(const Surfels& surfels, std::span<const Photograph> photographs);
 
 }  // namespace traceflow

@@ -5,7 +5,7 @@
 #include <tuple>
 
 #include "base/device_memory.h"
-#include "primitives/number.h"
+#include "primitives/dtype.h"
 
 // Matrix products on the CUDA device, by cuBLASLt. All matrices are row-major.
 namespace traceflow::cuda {
@@ -19,12 +19,12 @@ enum class Mask {
 
 // What a product computes: C = A·B, then the parts that are asked for, in this order. A is m×k, B k×n, C m×n.
 // Sums are fp32 (never TF32). Rows start at multiples of 16 bytes.
-struct ProductDescription {
+struct GemmDescription {
   int64_t m, k, n;
   bool transposed_a = false;                      // A is stored k×m
   bool transposed_b = false;                      // B is stored n×k
   int64_t stride_a, stride_b, stride_c;           // numbers from a stored row to the next
-  Number operands, result;                        // of A and B, and of C
+  DType operands, result;                         // of A and B, and of C
   bool accumulate = false;                        // C += what C held before
   bool bias = false;                              // C += bias: n numbers of C's type
   bool relu = false;                              // C = max(C, 0)
@@ -39,12 +39,12 @@ struct ProductDescription {
     return std::tie(m, k, n, transposed_a, transposed_b, stride_a, stride_b, stride_c, operands, result,
                     accumulate, bias, relu, mask, mask_stride, batches, batch_a, batch_b, batch_c);
   }
-  friend bool operator<(const ProductDescription& left, const ProductDescription& right) {
+  friend bool operator<(const GemmDescription& left, const GemmDescription& right) {
     return left.key() < right.key();
   }
 };
 
-struct ProductAddresses {
+struct GemmAddresses {
   const void* a;
   const void* b;
   void* c;
@@ -53,16 +53,16 @@ struct ProductAddresses {
 };
 
 // Whether the library of products is there; where not, why.
-TRACEFLOW_WITH_CUDA bool products_answer(std::string& why_not);
+TRACEFLOW_WITH_CUDA bool cublas_lt_answers(std::string& why_not);
 // Whether the device can be used: code for it, an answer from it, and that library; where not, why.
 inline bool is_ready(std::string& why_not) {
   why_not = "this program was built without CUDA";
-  return answers != nullptr && answers(why_not) && products_answer(why_not);
+  return answers != nullptr && answers(why_not) && cublas_lt_answers(why_not);
 }
 // Whether there is code for the product on this device. Asking once makes the product ready.
-TRACEFLOW_WITH_CUDA bool supported(const ProductDescription& product);
+TRACEFLOW_WITH_CUDA bool supported(const GemmDescription& gemm);
 // Puts the product on the stream; the same bytes every time. Throws InternalError where it is not supported.
-TRACEFLOW_WITH_CUDA void multiply(const ProductDescription& product, const ProductAddresses& at);
+TRACEFLOW_WITH_CUDA void multiply(const GemmDescription& gemm, const GemmAddresses& at);
 // With false, products with a bias, a ReLU or a mask count as not supported: how tests reach what stands in
 // for them.
 TRACEFLOW_WITH_CUDA void allow_epilogues(bool allowed);

@@ -4,7 +4,7 @@
 #include <memory>
 #include <tuple>
 
-#include "primitives/number.h"
+#include "primitives/dtype.h"
 
 // Matrix products on one thread, by oneDNN. All matrices are dense and row-major, but for a B that is used
 // often: it can be packed into the order in which the product reads it.
@@ -12,32 +12,30 @@ namespace traceflow::field {
 
 // What a product computes: C = A·B, then the parts that are asked for, in this order. A is m×k, or stored k×m
 // and read transposed; B is k×n; C is m×n. Sums are fp32.
-struct ProductShape {
+struct GemmShape {
   int64_t m, k, n;
-  Number operands = Number::fp32;  // of A and B
-  Number result = Number::fp32;    // of C
-  bool transposed = false;         // A is stored k×m
-  int64_t packed_for = 0;          // B is packed as the same product with this m wants it; 0: not packed
-  bool bias = false;               // C += bias, one fp32 number per column
-  bool accumulate = false;         // C += what C held before
-  bool relu = false;               // C = max(C, 0)
+  DType operands = DType::fp32;  // of A and B
+  DType result = DType::fp32;    // of C
+  bool transposed = false;       // A is stored k×m
+  int64_t packed_for = 0;        // B is packed as the same product with this m wants it; 0: not packed
+  bool bias = false;             // C += bias, one fp32 number per column
+  bool accumulate = false;       // C += what C held before
+  bool relu = false;             // C = max(C, 0)
 
   // All of it, so that shapes can be compared.
   auto key() const {
     return std::tie(m, k, n, operands, result, transposed, packed_for, bias, accumulate, relu);
   }
-  friend bool operator<(const ProductShape& left, const ProductShape& right) {
-    return left.key() < right.key();
-  }
+  friend bool operator<(const GemmShape& left, const GemmShape& right) { return left.key() < right.key(); }
 };
 
 // One compiled product. run() may be called from any number of threads at once and never starts others; its
 // result does not depend on how many the program uses.
-class Product {
+class Gemm {
  public:
-  ~Product();
-  Product(const Product&) = delete;
-  Product& operator=(const Product&) = delete;
+  ~Gemm();
+  Gemm(const Gemm&) = delete;
+  Gemm& operator=(const Gemm&) = delete;
 
   // Bytes of a packed B.
   int64_t packed_bytes() const;
@@ -47,8 +45,8 @@ class Product {
   void run(const void* a, const void* b, const float* bias, void* c) const;
 
  private:
-  friend const Product& product(const ProductShape& shape);
-  explicit Product(const ProductShape& shape);
+  friend const Gemm& gemm(const GemmShape& shape);
+  explicit Gemm(const GemmShape& shape);
 
   struct Compiled;
   struct Arguments;
@@ -56,6 +54,6 @@ class Product {
 };
 
 // The product of a shape, compiled when it is first asked for and kept until the program ends.
-const Product& product(const ProductShape& shape);
+const Gemm& gemm(const GemmShape& shape);
 
 }  // namespace traceflow::field

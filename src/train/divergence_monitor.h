@@ -8,9 +8,9 @@
 namespace traceflow {
 
 // Watches a run for divergence: losses or gradients that are not numbers, and a PSNR that collapses.
-class Health {
+class DivergenceMonitor {
  public:
-  Health(NonFinite policy, float collapse_decibels)
+  DivergenceMonitor(NonFinite policy, float collapse_decibels)
       : policy_(policy), collapse_decibels_(collapse_decibels) {}
 
   // After each iteration. Returns why the run must stop, or nothing.

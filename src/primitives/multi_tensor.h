@@ -15,7 +15,7 @@ inline constexpr size_t most_parameter_bytes = 4096;
 
 // Gives each part its first block; blocks_of(part) is how many it wants. Returns how many there are.
 template <class Part, class F>
-int64_t deal_blocks(std::span<Part> parts, const F& blocks_of) {
+int64_t assign_blocks(std::span<Part> parts, const F& blocks_of) {
   int64_t blocks = 0;
   for (Part& part : parts) {
     part.first_block = static_cast<int32_t>(blocks);
@@ -26,7 +26,7 @@ int64_t deal_blocks(std::span<Part> parts, const F& blocks_of) {
 
 // The part that a block works on: the last one that begins at or before it.
 template <class Part>
-TRACEFLOW_HD int part_of(const Part* parts, int count, int block) {
+TRACEFLOW_HD int part_of_block(const Part* parts, int count, int block) {
   int first = 0, last = count - 1;
   while (first < last) {
     const int middle = (first + last + 1) / 2;

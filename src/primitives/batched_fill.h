@@ -16,15 +16,15 @@ struct Range {
   int32_t first_block = 0;  // of the kernel's blocks, the first that works on it
 };
 // Fills all of them with zeros. Sets first_block.
-TRACEFLOW_WITH_CUDA void zero(std::vector<Range>& ranges);
+TRACEFLOW_WITH_CUDA void fill_zero(std::vector<Range>& ranges);
 
 }  // namespace cuda
 
 // Tensors that are filled with zeros together: on the CUDA device by one kernel, where each would need a fill
 // of its own.
-class Zeros {
+class BatchedZeroFill {
  public:
-  // The tensor must be neither resized nor released before fill(). One of the host is zero at once.
+  // The tensor must be neither resized nor released before fill(). One of the host is fill_zero at once.
   template <class T>
   void add(Tensor<T>& tensor) {
     if (tensor.device() == Device::cpu) {
@@ -35,7 +35,7 @@ class Zeros {
     }
   }
   void fill() {
-    if (!ranges_.empty()) cuda::zero(ranges_);
+    if (!ranges_.empty()) cuda::fill_zero(ranges_);
     ranges_.clear();
   }
 

@@ -3,6 +3,6 @@
 namespace traceflow {
 
 // The number types of matrices.
-enum class Number { fp32, bf16 };
+enum class DType { fp32, bf16 };
 
 }  // namespace traceflow

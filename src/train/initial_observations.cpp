@@ -1,4 +1,4 @@
-#include "train/sightings.h"
+#include "train/initial_observations.h"
 
 #include <algorithm>
 #include <array>
@@ -73,10 +73,10 @@ float median(std::vector<float>& values) {
 }
 
 // What nothing was seen of takes over what the nearest seen surfel has.
-void fill_unseen(const Surfels& s, Sightings& sightings) {
+void fill_unseen(const Surfels& s, InitialObservations& observations) {
   std::vector<int64_t> seen, unseen;
   for (int64_t i = 0; i < s.count(); ++i)
-    (sightings.any[static_cast<size_t>(i)] ? seen : unseen).push_back(i);
+    (observations.any[static_cast<size_t>(i)] ? seen : unseen).push_back(i);
   if (seen.empty() || unseen.empty()) return;
   const auto rows = [&](const std::vector<int64_t>& listed) {
     Tensor<float> points({static_cast<int64_t>(listed.size()), 3});
@@ -88,9 +88,9 @@ void fill_unseen(const Surfels& s, Sightings& sightings) {
   const Tensor<int32_t> nearest = nearest_of(rows(seen), rows(unseen));
   for (size_t k = 0; k < unseen.size(); ++k) {
     const int64_t from = seen[static_cast<size_t>(nearest[static_cast<int64_t>(k)])];
-    std::copy_n(sightings.colour.row(from), 3, sightings.colour.row(unseen[k]));
-    sightings.outside[static_cast<size_t>(unseen[k])] = sightings.outside[static_cast<size_t>(from)];
-    sightings.any[static_cast<size_t>(unseen[k])] = 1;
+    std::copy_n(observations.colour.row(from), 3, observations.colour.row(unseen[k]));
+    observations.outside[static_cast<size_t>(unseen[k])] = observations.outside[static_cast<size_t>(from)];
+    observations.any[static_cast<size_t>(unseen[k])] = 1;
   }
 }
 
@@ -129,10 +129,11 @@ std::vector<Photograph> earliest_photographs(const Capture& capture) {
   return photographs;
 }
 
-Sightings look_at(const Surfels& surfels, std::span<const Photograph> photographs) {
+InitialObservations observe(const Surfels& surfels, std::span<const Photograph> photographs) {
   const int64_t count = surfels.count();
   const auto n = static_cast<size_t>(count);
-  Sightings sightings{Tensor<float>({count, 3}), std::vector<int>(n, 0), std::vector<uint8_t>(n, 0)};
+  InitialObservations observations{Tensor<float>({count, 3}), std::vector<int>(n, 0),
+                                   std::vector<uint8_t>(n, 0)};
   std::vector<Tensor<float>> hidden_from;
   hidden_from.reserve(photographs.size());
   for (const Photograph& photograph : photographs) {
@@ -146,17 +147,17 @@ Sightings look_at(const Surfels& surfels, std::span<const Photograph> photograph
       if (!at.in_frame || at.z > hidden_from[v](at.row, at.column)) continue;
       const ViewImages& images = *photographs[v].images;
       if (!images.known.empty() && images.known(at.row, at.column) == 0) continue;
-      sightings.any[k] = 1;
-      if (!images.mask.empty()) sightings.outside[k] += images.mask(at.row, at.column) != 0 ? -1 : 1;
+      observations.any[k] = 1;
+      if (!images.mask.empty()) observations.outside[k] += images.mask(at.row, at.column) != 0 ? -1 : 1;
       for (size_t c = 0; c < 3; ++c) {
         colours[c].push_back(images.colour(at.row, at.column, static_cast<int64_t>(c)));
       }
     }
-    if (!sightings.any[k]) return;
-    for (size_t c = 0; c < 3; ++c) sightings.colour(i, static_cast<int64_t>(c)) = median(colours[c]);
+    if (!observations.any[k]) return;
+    for (size_t c = 0; c < 3; ++c) observations.colour(i, static_cast<int64_t>(c)) = median(colours[c]);
   });
-  fill_unseen(surfels, sightings);
-  return sightings;
+  fill_unseen(surfels, observations);
+  return observations;
 }
 
 }  // namespace traceflow

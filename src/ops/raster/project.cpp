@@ -1,10 +1,11 @@
-#include "ops/raster/raster_prepare.h"
+#include "ops/raster/project.h"
 
 #include "base/parallel.h"
 
 namespace traceflow::raster {
 
-void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options, Saved& saved) {
+void project_surfels(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
+                     Saved& saved) {
   saved.count = surfels.count();
   saved.has_silhouette = !surfels.carried.empty();
   saved.has_roughness = surfels.has_roughness();
@@ -16,8 +17,9 @@ void prepare(const PosedSurfels& surfels, const Camera<float>& camera, const Opt
   const Device device = surfels.position.device();
   saved.splats.place(device).resize({saved.count});
   saved.bounds.place(device).resize({saved.count});
-  parallel_for(device, "raster: prepare", saved.count,
-               Prepare(view_of(surfels), camera, options, saved.splats.data(), saved.bounds.data()), 256);
+  parallel_for(device, "raster: project", saved.count,
+               ProjectSurfel(view_of(surfels), camera, options, saved.splats.data(), saved.bounds.data()),
+               256);
 }
 
 }  // namespace traceflow::raster

@@ -1,4 +1,4 @@
-#include "primitives/zeros.h"
+#include "primitives/batched_fill.h"
 
 #include "support/device.h"
 
@@ -20,7 +20,7 @@ TEST_F(ZerosOnDevice, FillWhatWasAddedAndNothingElse) {
       if (bytes > 5000 && i > 2) break;
     }
   }
-  Zeros zeros;
+  BatchedZeroFill zeros;
   for (Tensor<uint8_t>& tensor : filled) zeros.add(tensor);
   zeros.fill();
   for (size_t k = 0; k < filled.size(); ++k) {
@@ -35,7 +35,7 @@ TEST_F(ZerosOnDevice, FillWhatWasAddedAndNothingElse) {
 TEST_F(ZerosOnDevice, FillTensorsOfTheHostToo) {
   Tensor<float> tensor({5});
   tensor.fill(1);
-  Zeros zeros;
+  BatchedZeroFill zeros;
   zeros.add(tensor);
   zeros.fill();
   for (const float value : tensor.values()) EXPECT_EQ(value, 0);

@@ -1,4 +1,4 @@
-#include "primitives/lists.h"
+#include "primitives/group_by_key.h"
 
 #include "base/kernel.h"
 #include "primitives/list_where.h"
@@ -53,7 +53,7 @@ __global__ void sort_lists(int64_t keys, const int32_t* begin, int32_t* entry) {
 
 }  // namespace
 
-void list_by_key(const int32_t* key, int64_t n, int64_t keys, Lists& lists) {
+void group_by_key(const int32_t* key, int64_t n, int64_t keys, KeyGroups& lists) {
   lists.begin.place(Device::cuda).reset({keys + 1});
   lists.filled.place(Device::cuda).reset({keys});
   lists.entry.place(Device::cuda).resize({n});

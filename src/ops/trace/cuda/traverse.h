@@ -30,10 +30,9 @@ struct HitColumns {
 
 // The nearest hits of this thread's ray behind `after`, in order: at most held_hits, and fewer where the ray
 // ends among them.
-class HeldHits {
+class KBuffer {
  public:
-  __device__ HeldHits(HitColumns& columns, const BlendRules<float>& rules, float transmittance,
-                      HitPlace after)
+  __device__ KBuffer(HitColumns& columns, const BlendRules<float>& rules, float transmittance, HitPlace after)
       : columns_(columns),
         rules_(rules),
         transmittance_(transmittance),
@@ -140,8 +139,8 @@ __device__ inline float dot_fused(const Vec3<float>& a, const Vec3<float>& b) {
   return std::fma(a.z, b.z, std::fma(a.y, b.y, a.x * b.x));
 }
 
-__device__ inline void meet_disk(const Disk& disk, const UnitRay& ray, const WalkRules& rules,
-                                 HeldHits& hits) {
+__device__ inline void intersect_disk(const Disk& disk, const UnitRay& ray, const TraversalRules& rules,
+                                      KBuffer& hits) {
   const DiskPlane plane = load_quads(disk.plane);
   const Vec3<float> q = ray.origin - plane.position;
   // The sum turns -0 into 0, which is a distance.
@@ -166,7 +165,7 @@ __device__ inline void meet_disk(const Disk& disk, const UnitRay& ray, const Wal
 }
 
 // Boxes that wait, nearest on top.
-class WalkStack {
+class TraversalStack {
  public:
   __device__ void push(float near, uint32_t child) { waiting_[depth_++] = {near, child}; }
   // The next one that is entered before `far`, or no_child.
@@ -189,9 +188,9 @@ class WalkStack {
 
 // Meets all disks of the tree that can have a hit for `hits`, none of which is before `near`; near boxes
 // first.
-__device__ inline void walk(const RayInput& input, const UnitRay& ray, float near, HeldHits& hits) {
+__device__ inline void traverse(const RayInput& input, const UnitRay& ray, float near, KBuffer& hits) {
   const BoxRay box_ray(ray, input.rules.deviations * ray.width);
-  WalkStack stack;
+  TraversalStack stack;
   for (uint32_t at = 0; at != no_child; at = stack.pop(hits.far())) {
     // Down to a disk. no_child has the disk's bit too.
     while ((at & disk_bit) == 0) {
@@ -205,7 +204,7 @@ __device__ inline void walk(const RayInput& input, const UnitRay& ray, float nea
       at = std::fmin(left, right) < INFINITY ? first : stack.pop(hits.far());
     }
     if (at == no_child) return;
-    meet_disk(input.disks[at & ~disk_bit], ray, input.rules, hits);
+    intersect_disk(input.disks[at & ~disk_bit], ray, input.rules, hits);
   }
 }
 
