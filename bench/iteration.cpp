@@ -109,8 +109,8 @@ void iteration_on_device(benchmark::State& state) {
     rates.sh = rates.opacity = rates.log_scale = rates.rotation = rates.tint = 1e-30F;
     optimiser.step(s.scene, gradient, trainable, schedule, rates, 0);
     benchmark::DoNotOptimize(optimiser.left_alone());
-    parallel_for(Device::cuda, "train: follow the reach", 1,
-                 FollowReach{frame.reach.data(), s.scene.main_reach.data()});
+    parallel_for(Device::cuda, "train: follow the displacement", 1,
+                 FollowMaxDisplacement{frame.max_displacement.data(), s.scene.main_max_displacement.data()});
     if (k == 1) tell(state, frame);
   };
   for (int i = 0; i < views; ++i) step();

@@ -4,9 +4,9 @@
 
 #include "capture/synth/synth.h"
 #include "render/renderer.h"
-#include "show/ellipses.h"
-#include "show/probe.h"
 #include "train/initialise.h"
+#include "viz/ellipses.h"
+#include "viz/probe.h"
 
 // What a viewer waits for on the CPU: frames while only the camera moves, with the pose made anew or reused,
 // one pixel's probe, and surfels as ellipses.
@@ -73,7 +73,7 @@ void probe(benchmark::State& state) {
   SeenScene s(20000, 8000, 960);
   Renderer renderer(s.options.render);
   s.request.reuse_pose = state.range(0) != 0;
-  for (auto _ : state) benchmark::DoNotOptimize(show::probe(renderer, s.scene, s.request, 480, 270));
+  for (auto _ : state) benchmark::DoNotOptimize(viz::probe(renderer, s.scene, s.request, 480, 270));
 }
 BENCHMARK(probe)->Unit(benchmark::kMillisecond)->UseRealTime()->ArgName("reuse")->Arg(0)->Arg(1);
 
@@ -81,7 +81,7 @@ void ellipses(benchmark::State& state) {
   const SeenScene s(static_cast<int>(state.range(0)), 8, 960);
   PosedSurfels posed;
   deform::forward(s.scene.main, nullptr, 0, {}, 1, field::Precision::fp32, posed, nullptr);
-  for (auto _ : state) benchmark::DoNotOptimize(show::surfel_ellipses(posed, s.request.camera, {}).data());
+  for (auto _ : state) benchmark::DoNotOptimize(viz::surfel_ellipses(posed, s.request.camera, {}).data());
 }
 BENCHMARK(ellipses)->Unit(benchmark::kMillisecond)->UseRealTime()->Arg(20000)->Arg(200000);
 

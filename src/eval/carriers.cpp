@@ -14,7 +14,7 @@ namespace traceflow::eval {
 namespace {
 
 // The chosen stored surfels at a time, on the host.
-Surfels posed_rows(const show::Subject& subject, const std::vector<int32_t>& rows, float time) {
+Surfels posed_rows(const viz::Subject& subject, const std::vector<int32_t>& rows, float time) {
   if (rows.empty()) return {};
   RowEdit edit;
   for (const int32_t row : rows) edit.keep(row);
@@ -36,7 +36,7 @@ Tensor<double> in_capture(const SceneNormalisation& normalisation, const Tensor<
 
 }  // namespace
 
-Carriers carriers_of(const show::Subject& subject) {
+Carriers carriers_of(const viz::Subject& subject) {
   std::vector<int32_t> rows(static_cast<size_t>(subject.scene.main.count()));
   for (size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<int32_t>(i);
   const Surfels all = posed_rows(subject, rows, 0);

@@ -40,10 +40,10 @@ int64_t rim_of(int64_t image_width) {
 
 Tensor<uint8_t> eroded(const Tensor<uint8_t>& mask, int64_t radius) {
   const int64_t height = mask.dim(0), width = mask.dim(1);
-  // In a column `dx` aside the disk reaches as far as reach[dx].
-  std::vector<int32_t> reach;
+  // In a column `dx` aside the disk reaches as far as half_height[dx].
+  std::vector<int32_t> half_height;
   for (int64_t dx = 0; dx <= radius; ++dx) {
-    reach.push_back(static_cast<int32_t>(std::sqrt(static_cast<double>(radius * radius - dx * dx))));
+    half_height.push_back(static_cast<int32_t>(std::sqrt(static_cast<double>(radius * radius - dx * dx))));
   }
   const Tensor<int32_t> distance = distances_in_columns(mask, radius);
   Tensor<uint8_t> core(mask.shape());
@@ -53,9 +53,9 @@ Tensor<uint8_t> eroded(const Tensor<uint8_t>& mask, int64_t radius) {
         for (int64_t x = 0; x < width; ++x) {
           bool inside = mask(y, x) != 0;
           for (int64_t dx = 0; inside && dx <= radius; ++dx) {
-            const int32_t reached = reach[static_cast<size_t>(dx)];
-            inside = (x < dx || distance(y, x - dx) > reached) &&
-                     (x + dx >= width || distance(y, x + dx) > reached);
+            const int32_t half_height_here = half_height[static_cast<size_t>(dx)];
+            inside = (x < dx || distance(y, x - dx) > half_height_here) &&
+                     (x + dx >= width || distance(y, x + dx) > half_height_here);
           }
           core(y, x) = inside ? 1 : 0;
         }

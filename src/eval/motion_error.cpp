@@ -16,7 +16,7 @@ namespace {
 using Points = std::vector<Vec3<double>>;
 
 constexpr int carriers_of_a_point = 8;
-constexpr double reach = 0.02;         // standard deviation of the weights, capture units
+constexpr double kernel_width = 0.02;  // standard deviation of the weights, capture units
 constexpr double least_weight = 1e-3;  // of all carriers together: nearer than 3.7 standard deviations
 constexpr size_t least_points = 4;     // of a thing that is followed
 constexpr int sampled_times = 8;
@@ -43,7 +43,7 @@ class Hold {
         const int32_t surfel = near.index(static_cast<int64_t>(i), k);
         if (surfel < 0) continue;
         const Vec3<double> aside = load3<double>(surfels.rest.row(surfel)) - points[i];
-        const double weight = std::exp(-0.5 * dot(aside, aside) / (reach * reach));
+        const double weight = std::exp(-0.5 * dot(aside, aside) / (kernel_width * kernel_width));
         const auto [place, is_new] = places.emplace(surfel, listed_.size());
         if (is_new) listed_.push_back(surfel);
         carriers_[i].push_back({place->second, weight});

@@ -18,7 +18,7 @@ Metrics mean_of(const Report& report) {
   return mean(all);
 }
 
-void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
+void evaluate(const viz::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report) {
   using Clock = std::chrono::steady_clock;
   report.main_surfels = subject.scene.main.count();

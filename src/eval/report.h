@@ -7,7 +7,7 @@
 #include "capture/capture.h"
 #include "eval/metrics.h"
 #include "eval/motion_error.h"
-#include "show/subject.h"
+#include "viz/subject.h"
 
 namespace traceflow::eval {
 
@@ -41,7 +41,7 @@ using ViewListener = std::function<void(const View& view, const ViewImages& imag
 
 // Renders every view, measures it, and adds it to the report; sets render_fps, the surfel counts and the
 // motion. Throws InputError for truth that cannot be used.
-void evaluate(const show::Subject& subject, const Capture& capture, const std::vector<View>& views,
+void evaluate(const viz::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report);
 
 // Each figure's mean over the report's views that have it.

@@ -6,13 +6,13 @@
 #include "files/base64.h"
 #include "files/jpeg.h"
 #include "files/png.h"
-#include "show/contact_sheet.h"
+#include "viz/contact_sheet.h"
 
 namespace traceflow::eval {
 
 namespace {
 
-using show::Layer;
+using viz::Layer;
 
 constexpr size_t most_views = 12;
 constexpr int64_t longest_side = 1280;
@@ -38,7 +38,7 @@ size_t encode(const Pictures& pictures, int quality, ReportPicture& result) {
 Pictures shrunk(const Pictures& pictures, int64_t width) {
   Pictures small;
   std::transform(pictures.begin(), pictures.end(), small.begin(),
-                 [&](const Tensor<uint8_t>& picture) { return show::shrink(picture, width); });
+                 [&](const Tensor<uint8_t>& picture) { return viz::shrink(picture, width); });
   return small;
 }
 
@@ -57,12 +57,12 @@ ReportPictures::ReportPictures(size_t views, size_t budget)
 
 void ReportPictures::add(const std::string& id, const Tensor<float>& photograph, const Frame& frame,
                          const Tensor<uint8_t>& known) {
-  const Tensor<float> render = show::layer_values(frame, Layer::rgb, 1);
+  const Tensor<float> render = viz::layer_values(frame, Layer::rgb, 1);
   const auto layer = [&](Layer which) {
-    return show::in_colour(painter_.paint(which, show::layer_values(frame, which, 1)));
+    return viz::in_colour(painter_.paint(which, viz::layer_values(frame, which, 1)));
   };
   Pictures pictures = {
-      to_8bit(photograph),   to_8bit(render),        to_8bit(show::difference(photograph, render, known)),
+      to_8bit(photograph),   to_8bit(render),        to_8bit(viz::difference(photograph, render, known)),
       layer(Layer::diffuse), layer(Layer::specular), layer(Layer::normal),
       layer(Layer::depth)};
   const int64_t height = render.dim(0), width = render.dim(1);

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "show/picture.h"
+#include "viz/picture.h"
 
 namespace traceflow::eval {
 
@@ -34,7 +34,7 @@ class ReportPictures {
 
  private:
   size_t views_, shown_, share_;
-  show::Painter painter_;
+  viz::Painter painter_;
   std::vector<ReportPicture> pictures_;
 };
 

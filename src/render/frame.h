@@ -23,8 +23,8 @@ struct FrameRequest {
   bool silhouette = false;         // draw where bodies cover the picture, which only the losses need
   bool probes = false;             // training: trace a random share of the other pixels too (method §4.4)
   uint64_t probe_seed = 0;
-  // Skip main surfels that lie outside the view by more than the scene's reach. Training does; a picture does
-  // not need to.
+  // Skip main surfels that lie outside the view by more than the scene's main_max_displacement. Training
+  // does; a picture does not need to.
   bool cull = false;
   // Most samples along a pixel's side. Fewer than the photographs had (render/samples.h) are faster, and
   // small surfels look larger.
@@ -54,9 +54,9 @@ struct Frame {
   // Pixels of the picture of the samples, which has so many times the rows and columns.
   surface::TracedPixels traced;
   MirroredRays mirrored;
-  Tensor<float> specular_rays;  // P×3, the traced pixels' specular colours
-  Tensor<float> colour;         // H×W×3, the final image (method §6)
-  Tensor<float> reach;          // one number: the largest distance by which the field moved a surfel of it
+  Tensor<float> specular_rays;     // P×3, the traced pixels' specular colours
+  Tensor<float> colour;            // H×W×3, the final image (method §6)
+  Tensor<float> max_displacement;  // one number: the largest distance by which the field moved a surfel of it
 
   // The specular colours as an image on the CPU: H×W×3, means over the traced samples, black where none was.
   Tensor<float> specular_image() const;

@@ -15,7 +15,7 @@ template void cuda::for_each_index(const char*, int64_t, const ConeWidthsBackwar
 template void cuda::for_each_index(const char*, int64_t, const PlaceSignal&);
 template void cuda::for_each_index(const char*, int64_t, const IsCarried&);
 template void cuda::for_each_index(const char*, int64_t, const FlagNonZero&);
-template void cuda::for_each_index(const char*, int64_t, const FollowReach&);
+template void cuda::for_each_index(const char*, int64_t, const FollowMaxDisplacement&);
 template void cuda::for_each_index(const char*, int64_t, const FlagWhere<CanShow>&);
 template void cuda::for_each_index(const char*, int64_t, const AverageSamples&);
 template void cuda::for_each_index(const char*, int64_t, const AverageSamplesBackward&);

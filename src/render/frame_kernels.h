@@ -112,13 +112,13 @@ struct FlagNonZero {
   TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = value[i] != 0 ? 1 : 0; }
 };
 
-// The reach follows the field at once when it grows and slowly when it shrinks.
-struct FollowReach {
+// The bound follows the field at once when it grows and slowly when it shrinks.
+struct FollowMaxDisplacement {
   const float* found;
-  float* reach;
+  float* max_displacement;
   TRACEFLOW_HD void operator()(int64_t) const {
-    const float before = 0.995F * *reach;
-    *reach = *found > before ? *found : before;
+    const float before = 0.995F * *max_displacement;
+    *max_displacement = *found > before ? *found : before;
   }
 };
 
@@ -152,15 +152,15 @@ struct CanShow {
   ViewPyramid pyramid;
   const float *position, *log_scale;
   float near_plane;
-  float low_pass;       // width, pixels
-  const float* reach;   // null for 0
-  const int32_t* body;  // null: none is carried
+  float low_pass;                 // width, pixels
+  const float* max_displacement;  // null for 0
+  const int32_t* body;            // null: none is carried
 
   TRACEFLOW_HD bool operator()(int64_t i) const {
     if (body != nullptr && body[i] >= 0) return true;
     const Vec3<float> centre = camera.point_in_camera(load3<float>(position + 3 * i));
     const float a = log_scale[2 * i], b = log_scale[2 * i + 1];
-    const float moved = reach != nullptr ? *reach : 0.0F;
+    const float moved = max_displacement != nullptr ? *max_displacement : 0.0F;
     const float disk = disk_radius * std::exp(a < b ? b : a);
     const float focal = camera.focal_x < camera.focal_y ? camera.focal_x : camera.focal_y;
     const float blurred = low_pass * low_pass_pixels * (centre.z + moved) / focal;

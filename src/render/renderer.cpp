@@ -28,7 +28,7 @@ const Nodes* nodes_if(const Scene& scene) { return scene.main_nodes ? &*scene.ma
 void find_reach(const Surfels& stored, Frame& frame) {
   const SquareOfMove move{stored_row(frame), stored.position.data(), frame.main.position.data()};
   ordered_sum<LargestSquare>(stored.device(), "render: largest move", frame.main.count(), move,
-                             KeepRoot{frame.reach.data()}, 4096);
+                             KeepRoot{frame.max_displacement.data()}, 4096);
 }
 
 }  // namespace
@@ -114,7 +114,7 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
   frame_.subset.place(device).resize({0});
   if (request.cull) {
     surfels_in_view(scene.main, request.camera, frame_.drawn_with.near_plane, frame_.drawn_with.low_pass,
-                    field ? scene.main_reach.data() : nullptr, frame_.subset);
+                    field ? scene.main_max_displacement.data() : nullptr, frame_.subset);
   }
   if (request.cull && frame_.subset.empty()) {
     frame_.main.reset_like(PosedSurfels{}.on(device));
@@ -122,7 +122,7 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
     deform::forward(scene.main, field, request.time, frame_.subset, degree, options_.precision, frame_.main,
                     keep_for_backward ? &main_saved_ : nullptr);
   }
-  frame_.reach.place(device).reset({1});
+  frame_.max_displacement.place(device).reset({1});
   if (field) find_reach(scene.main, frame_);
   if (const Nodes* nodes = nodes_if(scene))
     nodes::forward(*nodes, scene.main.body, request.time, frame_.subset, frame_.main, *nodes_saved_);

@@ -6,11 +6,12 @@
 namespace traceflow {
 
 void surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane, float low_pass,
-                     const float* reach, Tensor<int32_t>& in_view) {
-  list_where(surfels.device(), "render: view culling", surfels.count(),
-             CanShow{camera, ViewPyramid(camera), surfels.position.data(), surfels.log_scale.data(),
-                     near_plane, low_pass, reach, surfels.body.empty() ? nullptr : surfels.body.data()},
-             in_view);
+                     const float* max_displacement, Tensor<int32_t>& in_view) {
+  list_where(
+      surfels.device(), "render: view culling", surfels.count(),
+      CanShow{camera, ViewPyramid(camera), surfels.position.data(), surfels.log_scale.data(), near_plane,
+              low_pass, max_displacement, surfels.body.empty() ? nullptr : surfels.body.data()},
+      in_view);
 }
 
 }  // namespace traceflow

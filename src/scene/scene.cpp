@@ -12,7 +12,7 @@ void Scene::move_to(Device device) {
   if (lighting) move(*lighting);
   if (environment_field) move(*environment_field);
   if (environment_map) move(*environment_map);
-  move(main_reach);
+  move(main_max_displacement);
 }
 
 }  // namespace traceflow

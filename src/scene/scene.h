@@ -39,7 +39,7 @@ struct Scene {
   float focal = 0;
   // One number: the largest distance by which the main field lately moved a surfel, what view culling must
   // allow for. Those that bodies carry are never culled.
-  Tensor<float> main_reach{Shape{1}};
+  Tensor<float> main_max_displacement{Shape{1}};
 
   // Where all of it lives.
   Device device() const { return main.device(); }

@@ -229,7 +229,7 @@ Scene scene_from(const JsonField& json, const Safetensors& file) {
   scene.normalisation = {json["centre"].vector(), json["scale"].number(smallest, largest)};
   scene.extent = static_cast<float>(json["extent"].number(smallest, largest));
   if (json.has("focal")) scene.focal = static_cast<float>(json["focal"].number(0, largest));
-  scene.main_reach[0] = static_cast<float>(json["main_reach"].number(0, largest));
+  scene.main_max_displacement[0] = static_cast<float>(json["main_reach"].number(0, largest));
   scene.main = get_surfels("scene/main/", file);
   if (json["environment"].yes()) scene.environment = get_surfels("scene/environment/", file);
   if (json.has("main_field"))
@@ -258,7 +258,7 @@ void put_scene(const Scene& scene, Safetensors& file) {
   json["scale"] = scene.normalisation.scale;
   json["extent"] = scene.extent;
   json["focal"] = scene.focal;
-  json["main_reach"] = scene.main_reach.on(Device::cpu)[0];
+  json["main_reach"] = scene.main_max_displacement.on(Device::cpu)[0];
   json["environment"] = scene.environment.count() > 0;
   json["map"] = scene.environment_map.has_value();
   put_surfels(scene.main, "scene/main/", file);

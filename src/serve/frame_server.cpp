@@ -9,8 +9,8 @@
 #include "render/samples.h"
 #include "serve/hello.h"
 #include "serve/look_camera.h"
-#include "show/cameras/camera_path.h"
-#include "show/probe.h"
+#include "viz/cameras/camera_path.h"
+#include "viz/probe.h"
 
 namespace traceflow::serve {
 
@@ -51,13 +51,13 @@ Tensor<uint8_t> fitted_known(const Tensor<uint8_t>& known, int64_t width, int64_
 }
 
 bool shows_reflections(const std::string& layer) {
-  const auto* const known = std::find(show::layer_names.begin(), show::layer_names.end(), layer);
-  return known == show::layer_names.end() ||
-         show::needs_reflections(static_cast<show::Layer>(known - show::layer_names.begin()));
+  const auto* const known = std::find(viz::layer_names.begin(), viz::layer_names.end(), layer);
+  return known == viz::layer_names.end() ||
+         viz::needs_reflections(static_cast<viz::Layer>(known - viz::layer_names.begin()));
 }
 
-show::Layer layer_named(const std::string& name) {
-  const std::vector<show::Layer> layers = show::parse_layers(name);
+viz::Layer layer_named(const std::string& name) {
+  const std::vector<viz::Layer> layers = viz::parse_layers(name);
   if (layers.size() != 1) throw InputError("message", "layer", name, "one layer");
   return layers[0];
 }
@@ -72,7 +72,7 @@ void check_memory_for(const FrameRequest& request, const SceneView& view) {
 
 Json vector_json(const Vec3<float>& v) { return to_json(Vec3<double>(v)); }
 
-Json probe_json(int64_t id, const std::optional<show::ProbeResult>& found) {
+Json probe_json(int64_t id, const std::optional<viz::ProbeResult>& found) {
   Json json = {{"type", "probe"}, {"id", id}, {"hit", found.has_value()}};
   if (!found) return json;
   json["surface"] = vector_json(found->surface);
@@ -114,7 +114,7 @@ Renderer& FrameServer::renderer(const SceneView& view) {
   return *renderer_;
 }
 
-show::Tracks FrameServer::tracks(const FrameRequest& request, const SceneView& view) {
+viz::Tracks FrameServer::tracks(const FrameRequest& request, const SceneView& view) {
   if (!follower_) follower_.emplace(view.scene, view.request, view.render, info_.times);
   return follower_->at(view.scene, request.time);
 }
@@ -158,24 +158,24 @@ std::shared_ptr<const ViewImages> FrameServer::photograph(const PhotoRef& photo)
 }
 
 Tensor<uint8_t> FrameServer::picture(const Look& look, const FrameRequest& request, const SceneView& view,
-                                     show::Painter& painter) {
-  painter.options() = {show::parse_colour_map(look.map), look.exposure, look.moving ? follow : 1};
+                                     viz::Painter& painter) {
+  painter.options() = {viz::parse_colour_map(look.map), look.exposure, look.moving ? follow : 1};
   const bool difference = look.layer == "difference";
   const auto* photo = std::get_if<PhotoRef>(&look.camera);
   if (difference && photo == nullptr) throw InputError("message", "layer", "difference", "a captured camera");
-  const show::Layer layer = difference ? show::Layer::rgb : layer_named(look.layer);
+  const viz::Layer layer = difference ? viz::Layer::rgb : layer_named(look.layer);
 
   const Frame& frame = renderer(view).forward(view.scene, request);
   posed_ = true;
   if (!difference) {
-    const show::Tracks paths = layer == show::Layer::tracks ? tracks(request, view) : show::Tracks();
-    return show::in_colour(
-        painter.paint(layer, show::layer_values(frame, layer, view.scene.normalisation.scale, paths)));
+    const viz::Tracks paths = layer == viz::Layer::tracks ? tracks(request, view) : viz::Tracks();
+    return viz::in_colour(
+        painter.paint(layer, viz::layer_values(frame, layer, view.scene.normalisation.scale, paths)));
   }
   const std::shared_ptr<const ViewImages> images = photograph(*photo);
   const int64_t width = request.camera.width, height = request.camera.height;
-  return painter.paint_difference(show::difference_values(frame, fitted(images->colour, width, height),
-                                                          fitted_known(images->known, width, height)));
+  return painter.paint_difference(viz::difference_values(frame, fitted(images->colour, width, height),
+                                                         fitted_known(images->known, width, height)));
 }
 
 void FrameServer::answer(const Job& job, const FrameJob& frame, const SceneView& view) {
@@ -206,7 +206,7 @@ void FrameServer::answer(const Job& job, const StillJob& still, const SceneView&
   const FrameRequest request = request_for(look, view, 1);
   check_memory_for(request, view);
   // A copy: the page's ranges stay as they are.
-  show::Painter painter = painters_[job.client];
+  viz::Painter painter = painters_[job.client];
   const std::string bytes = png_bytes(picture(look, request, view, painter));
   clients_.reply(job.client, picture_message({{"type", "still"},
                                               {"id", still.still.id},
@@ -236,11 +236,11 @@ void FrameServer::answer(const Job& job, const Photo& photo, const SceneView&) {
 
 void FrameServer::answer(const Job& job, const Path& path, const SceneView& view) {
   const SceneNormalisation& normalisation = view.scene.normalisation;
-  const show::CameraPath asked = show::parse_camera_path(path.path, "camera path");
-  check_option(show::frame_count(asked) <= max_previewed_frames, "frames", show::frame_count(asked),
+  const viz::CameraPath asked = viz::parse_camera_path(path.path, "camera path");
+  check_option(viz::frame_count(asked) <= max_previewed_frames, "frames", viz::frame_count(asked),
                "at most " + std::to_string(max_previewed_frames) + " to preview");
   Json shots = Json::array();
-  for (const show::Shot& shot : show::shots_of(asked, normalisation)) {
+  for (const viz::Shot& shot : viz::shots_of(asked, normalisation)) {
     shots.push_back(
         {{"camera", to_json(viewpoint_of(shot.camera, normalisation))}, {"time", shot.time.value_or(0.0F)}});
   }
@@ -251,9 +251,9 @@ void FrameServer::answer(const Job& job, const ProbeJob& probe, const SceneView&
   FrameRequest request = request_for(probe.look, view, 1);
   request.specular = view.request.specular;  // whatever the layer shows
   const double x = probe.probe.x * request.camera.width, y = probe.probe.y * request.camera.height;
-  std::optional<show::ProbeResult> found = show::probe(renderer(view), view.scene, request, x, y);
+  std::optional<viz::ProbeResult> found = viz::probe(renderer(view), view.scene, request, x, y);
   posed_ = true;
-  if (found) found = show::in_capture(*found, view.scene.normalisation);
+  if (found) found = viz::in_capture(*found, view.scene.normalisation);
   clients_.reply(job.client, json_message(probe_json(probe.probe.id, found)));
 }
 

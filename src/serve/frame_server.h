@@ -6,7 +6,7 @@
 #include "render/renderer.h"
 #include "serve/clients/clients.h"
 #include "serve/scene_view.h"
-#include "show/picture.h"
+#include "viz/picture.h"
 
 namespace traceflow::serve {
 
@@ -38,16 +38,16 @@ class FrameServer {
   std::shared_ptr<const ViewImages> photograph(const PhotoRef& photo) const;
   // What a Look shows, as 8-bit colours.
   Tensor<uint8_t> picture(const Look& look, const FrameRequest& request, const SceneView& view,
-                          show::Painter& painter);
+                          viz::Painter& painter);
   Renderer& renderer(const SceneView& view);
-  show::Tracks tracks(const FrameRequest& request, const SceneView& view);
+  viz::Tracks tracks(const FrameRequest& request, const SceneView& view);
 
   Clients& clients_;
   SceneInfo info_;
   std::unique_ptr<Renderer> renderer_;
-  std::optional<show::TrackFollower> follower_;  // of the scene as it is now, once a page wants paths
-  bool posed_ = false;                           // the renderer has seen the scene as it is now
-  std::map<uint64_t, show::Painter> painters_;   // of every page, whose ranges follow what it sees
+  std::optional<viz::TrackFollower> follower_;  // of the scene as it is now, once a page wants paths
+  bool posed_ = false;                          // the renderer has seen the scene as it is now
+  std::map<uint64_t, viz::Painter> painters_;   // of every page, whose ranges follow what it sees
 };
 
 }  // namespace traceflow::serve

@@ -4,10 +4,10 @@
 
 #include "base/version.h"
 #include "serve/look_camera.h"
-#include "show/cameras/look_at.h"
-#include "show/cameras/orbit.h"
-#include "show/colour_map.h"
-#include "show/layers.h"
+#include "viz/cameras/look_at.h"
+#include "viz/cameras/orbit.h"
+#include "viz/colour_map.h"
+#include "viz/layers.h"
 
 namespace traceflow::serve {
 
@@ -34,9 +34,9 @@ Json captured_json(const std::vector<CapturedCamera>& cameras, const SceneNormal
 
 Json layers(bool with_photographs) {
   Json list = Json::array();
-  for (size_t i = 0; i < show::layer_names.size(); ++i) {
-    list.push_back({{"name", show::layer_names[i]},
-                    {"kind", show::has_colours(static_cast<show::Layer>(i)) ? "colour" : "number"}});
+  for (size_t i = 0; i < viz::layer_names.size(); ++i) {
+    list.push_back({{"name", viz::layer_names[i]},
+                    {"kind", viz::has_colours(static_cast<viz::Layer>(i)) ? "colour" : "number"}});
   }
   if (with_photographs) list.push_back({{"name", "difference"}, {"kind", "number"}});
   return list;
@@ -45,17 +45,17 @@ Json layers(bool with_photographs) {
 // The page's first camera.
 struct Start {
   Camera<float> camera;
-  show::Aim aim;
+  viz::Aim aim;
 };
 
 Start start_of(const SceneView& view, const SceneInfo& info) {
   std::vector<Camera<float>> cameras;
   for (const CapturedCamera& captured : info.train) cameras.push_back(captured.camera);
   for (const CapturedCamera& captured : info.test) cameras.push_back(captured.camera);
-  if (!cameras.empty()) return {cameras.front(), show::aim_of(cameras)};
+  if (!cameras.empty()) return {cameras.front(), viz::aim_of(cameras)};
   const Tensor<float> points = view.scene.main.position.on(Device::cpu);
-  Start start{show::orbit_around_points(points, 16, 9, 1).front().camera, {}};
-  start.aim.target = show::median_point(points);
+  Start start{viz::orbit_around_points(points, 16, 9, 1).front().camera, {}};
+  start.aim.target = viz::median_point(points);
   return start;
 }
 
@@ -75,7 +75,7 @@ std::string hello_text(const SceneView& view, const SceneInfo& info) {
   const SceneNormalisation& normalisation = scene.normalisation;
   const Start start = start_of(view, info);
   Json maps = Json::array();
-  for (const std::string_view name : enum_names(show::ColourMap{})) maps.push_back(std::string(name));
+  for (const std::string_view name : enum_names(viz::ColourMap{})) maps.push_back(std::string(name));
   const Json hello = {{"type", "hello"},
                       {"version", version()},
                       {"source", info.source},

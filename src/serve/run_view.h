@@ -7,8 +7,8 @@
 #include "serve/clients/clients.h"
 #include "serve/frame_server.h"
 #include "serve/run_watch.h"
-#include "show/subject.h"
 #include "train/log_tail.h"
+#include "viz/subject.h"
 
 namespace traceflow::serve {
 
@@ -18,7 +18,7 @@ class RunView {
  public:
   // What is shown and how far it was trained.
   struct Shown {
-    show::Subject subject;
+    viz::Subject subject;
     int64_t iteration = 0;
     int64_t iterations = 0;  // that the run is to have in all; 0 for what is no run
     std::string note = {};   // one line when it is not what was saved last; else empty

@@ -8,11 +8,11 @@
 
 namespace traceflow {
 
-BandMatrix::BandMatrix(std::vector<int64_t> sizes, int64_t reach)
-    : sizes_(std::move(sizes)), first_(1, 0), reach_(reach) {
+BandMatrix::BandMatrix(std::vector<int64_t> sizes, int64_t half_bandwidth)
+    : sizes_(std::move(sizes)), first_(1, 0), half_bandwidth_(half_bandwidth) {
   for (const int64_t size : sizes_) first_.push_back(first_.back() + size);
   for (int64_t row = 0; row < blocks(); ++row) {
-    for (int64_t back = 0; back <= reach_; ++back) {
+    for (int64_t back = 0; back <= half_bandwidth_; ++back) {
       const int64_t columns = back <= row ? sizes_[static_cast<size_t>(row - back)] : 0;
       blocks_.emplace_back(Matrix::Zero(sizes_[static_cast<size_t>(row)], columns));
     }
@@ -20,7 +20,7 @@ BandMatrix::BandMatrix(std::vector<int64_t> sizes, int64_t reach)
 }
 
 BandMatrix::Matrix& BandMatrix::at(int64_t row, int64_t column) {
-  return blocks_[static_cast<size_t>(row * (reach_ + 1) + row - column)];
+  return blocks_[static_cast<size_t>(row * (half_bandwidth_ + 1) + row - column)];
 }
 
 void BandMatrix::damp(double factor) {
@@ -33,7 +33,7 @@ void BandMatrix::solve(Eigen::VectorXd& b) {
     return b.segment(first(block), sizes_[static_cast<size_t>(block)]);
   };
   for (int64_t k = 0; k < count; ++k) {
-    const int64_t last = std::min(count - 1, k + reach_);
+    const int64_t last = std::min(count - 1, k + half_bandwidth_);
     const Eigen::LLT<Matrix> llt(at(k, k));
     at(k, k) = llt.matrixL();
     at(k, k).triangularView<Eigen::Lower>().solveInPlace(part(k));
@@ -45,7 +45,7 @@ void BandMatrix::solve(Eigen::VectorXd& b) {
     }
   }
   for (int64_t k = count; k-- > 0;) {
-    for (int64_t row = k + 1; row <= std::min(count - 1, k + reach_); ++row)
+    for (int64_t row = k + 1; row <= std::min(count - 1, k + half_bandwidth_); ++row)
       part(k) -= at(row, k).transpose() * part(row);
     at(k, k).transpose().triangularView<Eigen::Upper>().solveInPlace(part(k));
   }

@@ -32,7 +32,7 @@ constexpr double label_margin = 1.0 / 120;
 constexpr double mask_margin = 1.0 / 80;
 constexpr double share_in_masks = 0.9;
 // Pictures are compared by means over squares of so many image widths to each side.
-constexpr double unrest_reach = 1.0 / 80;
+constexpr double unrest_half_window = 1.0 / 80;
 
 // Connected parts of a mask.
 struct Parts {
@@ -521,7 +521,8 @@ void Unrest::look(const Surfels& main, const View& view, const ViewImages& image
   sum.resize(n);
   count.resize(n);
   const int64_t height = view.camera.height, width = view.camera.width;
-  const int64_t reach = std::max<int64_t>(1, std::llround(unrest_reach * static_cast<double>(width)));
+  const int64_t half_window =
+      std::max<int64_t>(1, std::llround(unrest_half_window * static_cast<double>(width)));
   parallel_for("bodies: look for unrest", main.count(), [&](int64_t i) {
     const Vec3<float> point = load3<float>(main.position.row(i));
     if (main.body[i] >= 0 || !view.camera.sees(point)) return;
@@ -531,8 +532,10 @@ void Unrest::look(const Surfels& main, const View& view, const ViewImages& image
     if (in_camera.z * alpha(row, column) > behind * depth(row, column)) return;
     Vec3<double> off(0);
     double pixels = 0;
-    for (int64_t y = std::max<int64_t>(0, row - reach); y <= std::min(height - 1, row + reach); ++y) {
-      for (int64_t x = std::max<int64_t>(0, column - reach); x <= std::min(width - 1, column + reach); ++x) {
+    for (int64_t y = std::max<int64_t>(0, row - half_window); y <= std::min(height - 1, row + half_window);
+         ++y) {
+      for (int64_t x = std::max<int64_t>(0, column - half_window);
+           x <= std::min(width - 1, column + half_window); ++x) {
         if (!images.mask.empty() && images.mask(y, x) != 0) return;
         if (!images.known.empty() && images.known(y, x) == 0) return;
         off += load3<double>(&colour(y, x, 0)) - load3<double>(&images.colour(y, x, 0));

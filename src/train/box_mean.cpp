@@ -6,11 +6,11 @@
 
 namespace traceflow {
 
-Tensor<float> box_mean(const Tensor<float>& image, int64_t reach) {
+Tensor<float> box_mean(const Tensor<float>& image, int64_t half_window) {
   const int64_t height = image.dim(0), width = image.dim(1);
   const int64_t numbers = image.size() / std::max<int64_t>(1, height * width);
-  const auto first = [&](int64_t at) { return std::max<int64_t>(0, at - reach); };
-  const auto last = [&](int64_t at, int64_t size) { return std::min(size - 1, at + reach); };
+  const auto first = [&](int64_t at) { return std::max<int64_t>(0, at - half_window); };
+  const auto last = [&](int64_t at, int64_t size) { return std::min(size - 1, at + half_window); };
   Tensor<float> along(image.shape()), mean(image.shape());
   parallel_for("box mean: rows", height, [&](int64_t y) {
     for (int64_t x = 0; x < width; ++x) {

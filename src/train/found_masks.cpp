@@ -35,21 +35,23 @@ Tensor<float> per_pixel(int64_t height, int64_t width, F&& f) {
 // How far a photograph is from the still scene, whatever the brightness: a shadow is no object. The larger of
 // the mean difference over squares and of a share of their root mean square.
 Tensor<float> difference(const Tensor<float>& still, const Tensor<float>& photograph) {
-  constexpr int64_t reach = 2;
+  constexpr int64_t half_window = 2;
   constexpr float darkest = 0.55F, brightest = 1.25F, rough = 0.6F;
   const int64_t height = still.dim(0), width = still.dim(1);
   const auto mean_of = [&](auto&& f, int64_t to_each_side) {
     return box_mean(per_pixel(height, width, f), to_each_side);
   };
   const auto at = [](const Tensor<float>& image, int64_t i) { return load3<float>(&image[3 * i]); };
-  const Tensor<float> size = mean_of([&](int64_t i) { return dot(at(still, i), at(still, i)); }, reach);
-  const Tensor<float> both = mean_of([&](int64_t i) { return dot(at(still, i), at(photograph, i)); }, reach);
+  const Tensor<float> size = mean_of([&](int64_t i) { return dot(at(still, i), at(still, i)); }, half_window);
+  const Tensor<float> both =
+      mean_of([&](int64_t i) { return dot(at(still, i), at(photograph, i)); }, half_window);
   Tensor<float> off({height, width, 3});
   for (int64_t i = 0; i < size.size(); ++i) {
     const float brightness = std::clamp(both[i] / std::max(size[i], 1e-6F), darkest, brightest);
     store3(&off[3 * i], brightness * at(still, i) - at(photograph, i));
   }
-  const Tensor<float> square = mean_of([&](int64_t i) { return dot(at(off, i), at(off, i)) / 3; }, reach);
+  const Tensor<float> square =
+      mean_of([&](int64_t i) { return dot(at(off, i), at(off, i)) / 3; }, half_window);
   Tensor<float> result = per_pixel(height, width, [&](int64_t i) { return rough * std::sqrt(square[i]); });
   for (int64_t c = 0; c < 3; ++c) {
     const Tensor<float> mean = mean_of([&](int64_t i) { return off[3 * i + c]; }, 1);

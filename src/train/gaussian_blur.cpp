@@ -33,18 +33,20 @@ Box box_of(const Tensor<float>& image, int64_t height, int64_t width, int64_t nu
 void gaussian_blur(Tensor<float>& image, Tensor<float>& along, int64_t height, int64_t width, int64_t numbers,
                    double sigma) {
   if (sigma < 0.3) return;
-  const auto reach = static_cast<int64_t>(std::ceil(2.5 * sigma));
+  const auto half_window = static_cast<int64_t>(std::ceil(2.5 * sigma));
   std::vector<float> taps;
   float sum = 0;
-  for (int64_t k = -reach; k <= reach; ++k) {
+  for (int64_t k = -half_window; k <= half_window; ++k) {
     taps.push_back(static_cast<float>(std::exp(-0.5 * static_cast<double>(k * k) / (sigma * sigma))));
     sum += taps.back();
   }
   for (float& tap : taps) tap /= sum;
   along.resize(image.shape());
   const Box box = box_of(image, height, width, numbers);
-  const int64_t left = std::max<int64_t>(0, box.x0 - reach), right = std::min(width, box.x1 + reach);
-  const int64_t top = std::max<int64_t>(0, box.y0 - reach), bottom = std::min(height, box.y1 + reach);
+  const int64_t left = std::max<int64_t>(0, box.x0 - half_window),
+                right = std::min(width, box.x1 + half_window);
+  const int64_t top = std::max<int64_t>(0, box.y0 - half_window),
+                bottom = std::min(height, box.y1 + half_window);
   const auto pass = [&](const Tensor<float>& from, Tensor<float>& to, int64_t first, int64_t last,
                         bool down) {
     parallel_blocks("track: blur", last - first, 4, [&](int64_t begin, int64_t end) {
@@ -52,12 +54,12 @@ void gaussian_blur(Tensor<float>& image, Tensor<float>& along, int64_t height, i
         for (int64_t x = left; x < right; ++x) {
           float* const sums = to.data() + (y * width + x) * numbers;
           std::fill_n(sums, numbers, 0.0F);
-          for (int64_t k = -reach; k <= reach; ++k) {
+          for (int64_t k = -half_window; k <= half_window; ++k) {
             const int64_t row = down ? std::clamp<int64_t>(y + k, 0, height - 1) : y;
             const int64_t column = down ? x : std::clamp<int64_t>(x + k, 0, width - 1);
             if (row < box.y0 || row >= box.y1) continue;
             const float* const values = from.data() + (row * width + column) * numbers;
-            const float tap = taps[static_cast<size_t>(k + reach)];
+            const float tap = taps[static_cast<size_t>(k + half_window)];
             for (int64_t n = 0; n < numbers; ++n) sums[n] += tap * values[n];
           }
         }

@@ -42,7 +42,7 @@ float distance_to(const std::vector<Vec2<float>>& outline, const Vec2<float>& at
 
 std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor<uint8_t>& mask,
                                   const Camera<float>& camera, const Tensor<float>& points) {
-  constexpr float reach = 0.5F;  // of the part's size
+  constexpr float max_distance = 0.5F;  // of the part's size
   constexpr size_t beside = 8, as_near = 2, share = 10;
   const std::vector<Vec2<float>> outline = outline_of(part, camera);
   struct Seen {
@@ -57,7 +57,7 @@ std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor
     const Vec2<float> at = camera.project(in_camera);
     if (mask(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x)) == 0) seen.push_back({at, in_camera.z});
   }
-  const float farthest2 = reach * reach * static_cast<float>(part.size());
+  const float farthest2 = max_distance * max_distance * static_cast<float>(part.size());
   std::vector<float> depths;
   for (const Vec2<float>& pixel : outline) {
     if (seen.size() < beside) break;

@@ -60,7 +60,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
   // Of the equations: a block for each time of the nodes, of what they do there and of the poses up to the
   // next, or for each pose where there are none.
   std::vector<int64_t> block_of_key, first_key, block_sizes;
-  int64_t reach = 1;
+  int64_t half_bandwidth = 1;
   Motion start_motion;
   Nodes start_nodes;
   std::vector<Vec3<double>> pose_rays,
@@ -105,7 +105,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
   void pair_views() {
     constexpr std::array<int64_t, 4> keys_apart = {1, 3, 9, 27};
     pairs.clear();
-    reach = 1;
+    half_bandwidth = 1;
     for (size_t later = 0; later < looks.size(); ++later) {
       const FilmView& view = *looks[later].view;
       for (const int64_t apart : keys_apart) {
@@ -118,10 +118,11 @@ struct PhotometricAdjustment::State : BodyInFilm {
         }
         if (!nearest) continue;
         pairs.push_back({later, *nearest});
-        reach = std::max(reach, block_of(view.key) + 1 - block_of(looks[*nearest].view->key));
+        half_bandwidth =
+            std::max(half_bandwidth, block_of(view.key) + 1 - block_of(looks[*nearest].view->key));
       }
     }
-    reach = std::min<int64_t>(reach, static_cast<int64_t>(block_sizes.size()) - 1);
+    half_bandwidth = std::min<int64_t>(half_bandwidth, static_cast<int64_t>(block_sizes.size()) - 1);
   }
 
   void find_rays() {
@@ -276,7 +277,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
 
   Equations equations(Derivatives derivatives) {
     constexpr size_t at_once = 16;
-    Equations to{BandMatrix(block_sizes, reach), {}};
+    Equations to{BandMatrix(block_sizes, half_bandwidth), {}};
     to.b.setZero(to.a.size());
     show(true);
     std::array<Eigen::MatrixXd, at_once> a;

@@ -97,10 +97,10 @@ TrainOptions still(const TrainOptions& options, int iterations) {
 }  // namespace
 
 Tensor<float> mean_difference(const Tensor<float>& a, const Tensor<float>& b) {
-  constexpr int64_t reach = 2;  // pixels to each side
+  constexpr int64_t half_window = 2;  // pixels to each side
   Tensor<float> signed_difference(a.shape());
   for (int64_t i = 0; i < a.size(); ++i) signed_difference[i] = a[i] - b[i];
-  const Tensor<float> mean = box_mean(signed_difference, reach);
+  const Tensor<float> mean = box_mean(signed_difference, half_window);
   Tensor<float> off({a.dim(0), a.dim(1)});
   for (int64_t i = 0; i < off.size(); ++i)
     off[i] = std::max({std::abs(mean[3 * i]), std::abs(mean[3 * i + 1]), std::abs(mean[3 * i + 2])});

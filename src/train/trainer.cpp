@@ -268,8 +268,8 @@ void Trainer::learn(const View& view, const Frame& frame, const FrameRequest& re
     environment_density_.shorten_needles(scene_.environment, environment_radius_);
     environment_density_.accumulate(gradient_.environment_signal, gradient_.environment_visible);
   }
-  parallel_for(device_, "train: follow the reach", 1,
-               FollowReach{frame.reach.data(), scene_.main_reach.data()});
+  parallel_for(device_, "train: follow the displacement", 1,
+               FollowMaxDisplacement{frame.max_displacement.data(), scene_.main_max_displacement.data()});
   torn_ = false;
 }
 

@@ -8,7 +8,7 @@ namespace traceflow {
 
 namespace {
 
-constexpr int reach = 4;
+constexpr int steps_each_way = 4;
 constexpr double spacing = 0.1, finest = 0.01;  // radians
 constexpr double least_gain = 0.1;              // of the cost
 
@@ -55,9 +55,9 @@ std::optional<Vec3<double>> seek_turn(const Alignment& alignment, const Motion& 
   };
   const Turn here{Vec3<double>(0), cost_of(Vec3<double>(0))};
   Turn best = here;
-  for (int x = -reach; x <= reach; ++x) {
-    for (int y = -reach; y <= reach; ++y) {
-      for (int z = -reach; z <= reach; ++z) {
+  for (int x = -steps_each_way; x <= steps_each_way; ++x) {
+    for (int y = -steps_each_way; y <= steps_each_way; ++y) {
+      for (int z = -steps_each_way; z <= steps_each_way; ++z) {
         const Vec3<double> offset = spacing * Vec3<double>(x, y, z), turn = turns * offset;
         if (length(turn - offset) > 0.6 * spacing) continue;  // near others where only some turns are loose
         const double cost = cost_of(turn);

@@ -22,9 +22,9 @@ Surfels random_surfels(int64_t n, Random& random) {
 }
 
 // In a capture whose coordinates are not the scene's.
-show::Subject moving_subject() {
+viz::Subject moving_subject() {
   Random random(3);
-  show::Subject subject;
+  viz::Subject subject;
   subject.scene.main = random_surfels(80, random);
   NetworkOptions shape;
   shape.depth = 2;
@@ -40,10 +40,10 @@ show::Subject moving_subject() {
 }
 
 // The exported surfels that are opaque at time 0.
-std::vector<Vec3<double>> exported(const show::Subject& subject, float time) {
+std::vector<Vec3<double>> exported(const viz::Subject& subject, float time) {
   const TempFolder folder;
   const auto at = [&](float t) {
-    return read_ply(show::export_subject(subject, t, folder.path())[0]).surfels;
+    return read_ply(viz::export_subject(subject, t, folder.path())[0]).surfels;
   };
   const Surfels rest = at(0), now = at(time);
   std::vector<Vec3<double>> positions;
@@ -53,7 +53,7 @@ std::vector<Vec3<double>> exported(const show::Subject& subject, float time) {
   return positions;
 }
 
-void expect_as_exported(const show::Subject& subject) {
+void expect_as_exported(const viz::Subject& subject) {
   const Carriers carriers = carriers_of(subject);
   const std::vector<Vec3<double>> rest = exported(subject, 0), later = exported(subject, 0.75F);
   ASSERT_EQ(carriers.rest.dim(0), static_cast<int64_t>(rest.size()));
@@ -74,13 +74,13 @@ void expect_as_exported(const show::Subject& subject) {
 TEST(Carriers, StandWhereTheExportedSurfelsStand) { expect_as_exported(moving_subject()); }
 
 TEST(Carriers, OfARunThatDoesNotYetMoveStandStill) {
-  show::Subject subject = moving_subject();
+  viz::Subject subject = moving_subject();
   subject.request.deform_main = false;
   expect_as_exported(subject);
 }
 
 TEST(Carriers, AreFinite) {
-  show::Subject subject = moving_subject();
+  viz::Subject subject = moving_subject();
   const int64_t before = carriers_of(subject).rest.dim(0);
   int64_t row = 0;
   while (carriers_of(subject).rest.dim(0) == before)

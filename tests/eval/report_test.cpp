@@ -37,7 +37,7 @@ Scene scene_of(const Capture& capture) {
   return scene;
 }
 
-double psnr_of(const show::Subject& subject, const Capture& capture) {
+double psnr_of(const viz::Subject& subject, const Capture& capture) {
   Report report;
   evaluate(subject, capture, capture.train, nullptr, {}, report);
   return *mean_of(report).psnr;
@@ -139,7 +139,7 @@ TEST(Evaluate, DepthErrorsAreThoseOfTheCapturesFiles) {
   const TempFolder folder;
   write_small_capture(folder / "capture");
   const Capture capture = load_capture(folder / "capture", {});
-  const show::Subject subject{scene_of(capture), {}, {}, ""};
+  const viz::Subject subject{scene_of(capture), {}, {}, ""};
   Report report;
   std::map<std::string, double> expected;
   evaluate(
@@ -171,7 +171,7 @@ TEST(Evaluate, WithoutTrueMotionThereIsNone) {
   write_small_capture(folder / "capture");
   std::filesystem::remove_all(folder / "capture/truth/motion");
   const Capture capture = load_capture(folder / "capture", {});
-  const show::Subject subject{scene_of(capture), {}, {}, ""};
+  const viz::Subject subject{scene_of(capture), {}, {}, ""};
   Report report;
   evaluate(subject, capture, capture.test, nullptr, {}, report);
   EXPECT_FALSE(report.motion);
@@ -181,7 +181,7 @@ TEST(Evaluate, DepthErrorsAreTheSameInACaptureThatIsNormalisedAnew) {
   const TempFolder folder;
   write_small_capture(folder / "capture");
   const Capture capture = load_capture(folder / "capture", {});
-  const show::Subject subject{scene_of(capture), {}, {}, ""};
+  const viz::Subject subject{scene_of(capture), {}, {}, ""};
   Report before, after;
   evaluate(subject, capture, capture.test, nullptr, {}, before);
   nlohmann::json scene = nlohmann::json::parse(std::ifstream(folder / "capture/scene.json"));
@@ -199,7 +199,7 @@ TEST(Evaluate, MotionIsMeasuredInTheCapturesOwnUnits) {
   const TempFolder folder;
   write_small_capture(folder / "capture");
   const Capture without = load_capture(folder / "capture", {});
-  const show::Subject subject{scene_of(without), {}, {}, ""};
+  const viz::Subject subject{scene_of(without), {}, {}, ""};
   Tensor<float> points({3, 20, 3}), object({20});
   for (int64_t t = 0; t < 3; ++t) {
     for (int64_t i = 0; i < 20; ++i) {
@@ -235,7 +235,7 @@ TEST(Evaluate, TheSceneIsSeenFromWhereItStands) {
   synth.points = 200;
   write_synthetic_capture(synth, folder / "capture");
   const Capture capture = load_capture(folder / "capture", {});
-  const show::Subject subject{scene_of(capture), {}, {}, ""};
+  const viz::Subject subject{scene_of(capture), {}, {}, ""};
   const double psnr = psnr_of(subject, capture);
 
   Capture normalised_anew = capture;

@@ -3,15 +3,15 @@
 #include <set>
 
 #include "fuzz/scratch_file.h"
-#include "show/cameras/camera_file.h"
-#include "show/cameras/camera_path.h"
+#include "viz/cameras/camera_file.h"
+#include "viz/cameras/camera_path.h"
 
 using namespace traceflow;
 using fuzz::promise;
 
 namespace {
 
-void check(const show::Shot& shot, int longest_side) {
+void check(const viz::Shot& shot, int longest_side) {
   const Camera<float>& camera = shot.camera;
   promise(camera.width >= 1 && camera.width <= longest_side && camera.height >= 1 &&
               camera.height <= longest_side,
@@ -33,24 +33,24 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static const fuzz::ScratchFolder folder;
   const std::string_view text = fuzz::text_of(data, size);
   const auto path = folder.write("cameras.json", text);
-  std::vector<show::Shot> shots;
-  if (fuzz::accepts(path.string(), [&] { shots = show::read_cameras(path, {{1, 2, 3}, 0.5}); })) {
+  std::vector<viz::Shot> shots;
+  if (fuzz::accepts(path.string(), [&] { shots = viz::read_cameras(path, {{1, 2, 3}, 0.5}); })) {
     promise(!shots.empty(), "there is a camera");
     std::set<std::string> names;
-    for (const show::Shot& shot : shots) {
+    for (const viz::Shot& shot : shots) {
       check(shot, 32768);
       promise(names.insert(shot.name).second, "names differ");
     }
   }
-  show::CameraPath along;
+  viz::CameraPath along;
   if (!fuzz::accepts("camera path",
-                     [&] { along = show::parse_camera_path(std::string(text), "camera path"); }))
+                     [&] { along = viz::parse_camera_path(std::string(text), "camera path"); }))
     return 0;
-  const int64_t frames = show::frame_count(along);
-  promise(frames >= 1 && frames <= show::path_frames_cap, "a path has frames");
+  const int64_t frames = viz::frame_count(along);
+  promise(frames >= 1 && frames <= viz::path_frames_cap, "a path has frames");
   if (frames > 1000) return 0;
-  shots = show::shots_of(along, {{1, 2, 3}, 0.5});
+  shots = viz::shots_of(along, {{1, 2, 3}, 0.5});
   promise(static_cast<int64_t>(shots.size()) == frames, "each frame is a shot");
-  for (const show::Shot& shot : shots) check(shot, 16384);
+  for (const viz::Shot& shot : shots) check(shot, 16384);
   return 0;
 }

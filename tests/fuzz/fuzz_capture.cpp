@@ -6,7 +6,7 @@
 #include <map>
 
 #include "base/parallel.h"
-#include "capture/diagnosis/inspection.h"
+#include "capture/checks/inspection.h"
 #include "files/jpeg.h"
 #include "files/png.h"
 #include "fuzz/scratch_file.h"

@@ -30,7 +30,7 @@ TEST(Renderer, CullingChangesNoPixel) {
   const Frame& whole = renderer.forward(f.scene, f.request);
   const Tensor<float> colour = whole.colour;
   const Tensor<float> depth = whole.raster.depth;
-  f.scene.main_reach = whole.reach;
+  f.scene.main_max_displacement = whole.max_displacement;
   f.request.cull = true;
   const Frame& culled = renderer.forward(f.scene, f.request);
   ASSERT_LT(culled.main.count(), f.scene.main.count() * 9 / 10) << "the view leaves something out";
@@ -89,7 +89,7 @@ void expect_same_frame(const Frame& found, const Frame& expected) {
   expect_equal(found.main.position, expected.main.position, "main");
   expect_equal(found.specular_rays, expected.specular_rays, "specular");
   expect_equal(found.mirrored.distance, expected.mirrored.distance, "distance");
-  expect_equal(found.reach, expected.reach, "reach");
+  expect_equal(found.max_displacement, expected.max_displacement, "reach");
 }
 
 // What a viewer asks for, one after another: every frame is what a renderer without memory makes.
@@ -131,7 +131,7 @@ void expect_reuse_changes_nothing(const Fixture& f) {
 
 TEST(Renderer, ReusingAPoseChangesNothing) {
   Fixture f;
-  f.scene.main_reach[0] = 1;
+  f.scene.main_max_displacement[0] = 1;
   expect_reuse_changes_nothing(f);
   Random random(8);
   NetworkOptions network;
@@ -186,13 +186,13 @@ TEST(Renderer, APoseIsReusedOnlyWhereAskedFor) {
 }
 
 TEST(Renderer, TheReachGrowsAtOnceAndShrinksSlowly) {
-  float found = 2, reach = 1;
-  const FollowReach follow{&found, &reach};
+  float found = 2, max_displacement = 1;
+  const FollowMaxDisplacement follow{&found, &max_displacement};
   follow(0);
-  EXPECT_EQ(reach, 2);
+  EXPECT_EQ(max_displacement, 2);
   found = 0.5F;
   follow(0);
-  EXPECT_EQ(reach, 0.995F * 2);
+  EXPECT_EQ(max_displacement, 0.995F * 2);
 }
 
 TEST(Renderer, AGradientOfPosedPositionsReachesTheStoredOnes) {

@@ -48,7 +48,7 @@ Scene full_scene() {
   scene.normalisation = {{0.1, -2, 3}, 0.37};
   scene.extent = 1.75F;
   scene.focal = 310.5F;
-  scene.main_reach[0] = 0.125F;
+  scene.main_max_displacement[0] = 0.125F;
   scene.main.body = tensor_of(std::vector<int32_t>{-1, 0, 1, 1, -1, 0, 0});
   scene.main_motion = still_motion(noise({2, 3}, random), tensor_of(std::vector<float>{0, 0.25F, 1}));
   for (float& v : scene.main_motion->shift.values()) v = static_cast<float>(random.normal());
@@ -70,7 +70,7 @@ Scene full_scene() {
 }
 
 std::vector<float> all_numbers(const Scene& scene) {
-  std::vector<float> all{scene.extent, scene.focal, scene.main_reach[0],
+  std::vector<float> all{scene.extent, scene.focal, scene.main_max_displacement[0],
                          static_cast<float>(scene.normalisation.scale)};
   const auto take = [&](const auto&, const Tensor<float>& t) {
     all.insert(all.end(), t.values().begin(), t.values().end());

@@ -9,9 +9,9 @@
 
 #include "files/png.h"
 #include "serve/clients/fake_page.h"
-#include "show/layers.h"
 #include "support/temp_folder.h"
 #include "train/small_run.h"
+#include "viz/layers.h"
 
 namespace traceflow::serve {
 namespace {
@@ -151,7 +151,7 @@ TEST(FrameServer, EveryLayerIsAPictureOfItsOwn) {
   Screening s("layers");
   std::set<std::vector<uint8_t>> pictures;
   int64_t id = 0;
-  std::vector<std::string> names(show::layer_names.begin(), show::layer_names.end());
+  std::vector<std::string> names(viz::layer_names.begin(), viz::layer_names.end());
   names.emplace_back("difference");
   std::erase(names, "tracks");  // those of a scene that stands still are `rgb`
   for (const std::string& name : names) {

@@ -38,9 +38,9 @@ TEST(Trainer, CullingLearnsHowFarTheFieldMoves) {
   TrainOptions options = small_run(12);
   options.deform.kind = "network";  // from the first iterations on
   Trainer trainer = make_trainer(options, "reach");
-  EXPECT_EQ(trainer.scene().main_reach[0], 0);
+  EXPECT_EQ(trainer.scene().main_max_displacement[0], 0);
   for (int i = 0; i < 10; ++i) trainer.step();
-  EXPECT_GT(trainer.scene().main_reach[0], 0);
+  EXPECT_GT(trainer.scene().main_max_displacement[0], 0);
 }
 
 TEST(Trainer, PhasesAndDensityControlAreToldAndTheCapsHold) {

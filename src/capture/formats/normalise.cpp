@@ -51,8 +51,8 @@ Vec3<double> axis_of(const FoundView& view) {
 // That gives the box a diagonal of 1. One that is a place but for rounding keeps the capture's units.
 double scale_of(const Box& box) {
   constexpr double rounding = 1e-9, largest = 1e12;
-  const Vec3<double> reach = glm::max(glm::abs(box.low), glm::abs(box.high));
-  const double diagonal = box.diagonal(), farthest = std::max({reach.x, reach.y, reach.z});
+  const Vec3<double> corner = glm::max(glm::abs(box.low), glm::abs(box.high));
+  const double diagonal = box.diagonal(), farthest = std::max({corner.x, corner.y, corner.z});
   if (!(diagonal > rounding * (1 + farthest))) return 1;
   return std::clamp(1 / diagonal, 1 / largest, largest);
 }

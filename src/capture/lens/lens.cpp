@@ -13,14 +13,14 @@ constexpr double half_pi = 1.57079632679489661923;
 
 // How far from the centre an ideal projection places a direction that is at r = tan θ, over r, and the
 // derivative of that distance by r.
-struct Reach {
+struct ProjectionFactor {
   double factor = 1, slope = 1;
 };
 
 // atan(t)/t.
 double atan_over(double t) { return std::abs(t) < 1e-4 ? 1 - t * t / 3 : std::atan(t) / t; }
 
-Reach reach(const Lens& lens, double r) {
+ProjectionFactor projection_factor(const Lens& lens, double r) {
   switch (lens.projection) {
     case Projection::perspective:
       return {};
@@ -51,7 +51,7 @@ double direction_at(const Lens& lens, double distance) {
 }
 
 Vec2<double> project(const Lens& lens, const Vec2<double>& ideal) {
-  return reach(lens, length(ideal)).factor * ideal;
+  return projection_factor(lens, length(ideal)).factor * ideal;
 }
 
 Vec2<double> unproject(const Lens& lens, const Vec2<double>& at) {
@@ -62,7 +62,7 @@ Vec2<double> unproject(const Lens& lens, const Vec2<double>& at) {
 // Radial to both sides: the factor grows along the ray and stays across it.
 glm::dmat2 project_jacobian(const Lens& lens, const Vec2<double>& ideal) {
   const double r2 = dot(ideal, ideal);
-  const Reach at = reach(lens, std::sqrt(r2));
+  const ProjectionFactor at = projection_factor(lens, std::sqrt(r2));
   glm::dmat2 jacobian(at.factor);
   if (r2 > 0) jacobian += (at.slope - at.factor) / r2 * glm::outerProduct(ideal, ideal);
   return jacobian;

@@ -79,7 +79,7 @@ Mesh::Mesh(std::vector<Triangle> triangles, std::vector<Vector> rest, std::vecto
   require(rest_.size() == deformed_.size(), "a mesh has the same vertices at rest and deformed");
   for (size_t i = 0; i < rest_.size(); ++i) {
     require(is_finite(rest_[i]) && is_finite(deformed_[i]), "a mesh's vertices are finite");
-    reach_ = std::max(reach_, length(deformed_[i]));
+    bounding_radius_ = std::max(bounding_radius_, length(deformed_[i]));
   }
   std::vector<Vector> centres(triangles_.size(), Vector(0));
   for (size_t i = 0; i < triangles_.size(); ++i) {
@@ -114,8 +114,8 @@ void Mesh::build(int32_t first, int32_t last, const std::vector<Vector>& centres
     high = glm::max(high, centres[static_cast<size_t>(triangle)]);
   }
   // Rounding must not keep a ray out of a box whose triangle it meets at the border.
-  node.low -= overlap * reach_;
-  node.high += overlap * reach_;
+  node.low -= overlap * bounding_radius_;
+  node.high += overlap * bounding_radius_;
   const size_t index = nodes_.size();
   nodes_.push_back(node);
   if (node.count <= leaf_size) return;

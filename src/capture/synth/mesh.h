@@ -32,7 +32,7 @@ class Mesh {
   Vector at_rest(int triangle, const Vector& deformed_point) const;
   Vector deformed(int triangle, const Vector& rest_point) const;
   // Radius of the sphere around the origin that holds the deformed surface.
-  double reach() const { return reach_; }
+  double bounding_radius() const { return bounding_radius_; }
 
  private:
   // A box around the triangles order_[first … first + count); a box with count 0 holds the next node and
@@ -53,7 +53,7 @@ class Mesh {
   std::vector<Vector> deformed_;
   std::vector<int32_t> order_;
   std::vector<Node> nodes_;
-  double reach_ = 0;
+  double bounding_radius_ = 0;
 };
 
 }  // namespace traceflow::synth

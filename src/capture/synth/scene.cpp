@@ -42,9 +42,9 @@ double distance_to(const Box& box, const Ray& ray, double nearest) {
     }
     const double inverse = 1 / ray.direction[axis];
     const double middle = -ray.origin[axis] * inverse;
-    const double reach = half * std::abs(inverse);
-    enter = std::max(enter, middle - reach);
-    leave = std::min(leave, middle + reach);
+    const double half_span = half * std::abs(inverse);
+    enter = std::max(enter, middle - half_span);
+    leave = std::min(leave, middle + half_span);
   }
   if (enter > leave) return infinity;
   if (enter > nearest) return enter;
@@ -89,11 +89,11 @@ SurfacePoint surface_of(const std::shared_ptr<const Mesh>& mesh, const Vector& p
   return {mesh->normal(triangle), {rest.x, rest.y}, rest};
 }
 
-double reach_of(const Sphere& sphere) { return sphere.radius; }
-double reach_of(const Disk& disk) { return disk.radius; }
-double reach_of(const Box& box) { return length(box.half_size); }
-double reach_of(const Plane&) { return infinity; }
-double reach_of(const std::shared_ptr<const Mesh>& mesh) { return mesh->reach(); }
+double bounding_radius_of(const Sphere& sphere) { return sphere.radius; }
+double bounding_radius_of(const Disk& disk) { return disk.radius; }
+double bounding_radius_of(const Box& box) { return length(box.half_size); }
+double bounding_radius_of(const Plane&) { return infinity; }
+double bounding_radius_of(const std::shared_ptr<const Mesh>& mesh) { return mesh->bounding_radius(); }
 
 }  // namespace
 
@@ -125,7 +125,7 @@ Body::Body(const Shape& of_shape, const Material& of_material, const Pose& at_po
     : shape(of_shape),
       material(of_material),
       pose(at_pose),
-      reach(std::visit([](const auto& s) { return reach_of(s); }, of_shape)) {}
+      bounding_radius(std::visit([](const auto& s) { return bounding_radius_of(s); }, of_shape)) {}
 
 Vector point_in_world(const Body& body, const Vector& rest, int triangle) {
   const auto* mesh = std::get_if<std::shared_ptr<const Mesh>>(&body.shape);

@@ -72,7 +72,8 @@ struct Body {
   Shape shape;
   Material material;
   Pose pose;
-  double reach;  // radius of the sphere around the pose's position that holds the body; infinite for planes
+  double bounding_radius;  // radius of the sphere around the pose's position that holds the body; infinite
+                           // for planes
   int object = -1;         // which moving thing it is part of; -1: it never moves
   bool is_masked = false;  // whether the masks show it
 };

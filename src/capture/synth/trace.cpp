@@ -14,8 +14,8 @@ bool can_reach(const Body& body, const Ray& ray, double farthest) {
   const Vector to_body = body.pose.position - ray.origin;
   const double along = dot(to_body, ray.direction);
   const double off2 = dot(to_body, to_body) - along * along;
-  return off2 <= body.reach * body.reach * (1 + 1e-9) && along >= -body.reach &&
-         along - body.reach <= farthest;
+  return off2 <= body.bounding_radius * body.bounding_radius * (1 + 1e-9) && along >= -body.bounding_radius &&
+         along - body.bounding_radius <= farthest;
 }
 
 Ray in_body(const Pose& pose, const Ray& ray) {

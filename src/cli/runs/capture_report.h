@@ -2,7 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "capture/diagnosis/inspection.h"
+#include "capture/checks/inspection.h"
 #include "train/options.h"
 
 namespace traceflow::cli {

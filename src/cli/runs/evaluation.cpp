@@ -13,10 +13,10 @@
 #include "cli/terminal/count_progress.h"
 #include "scene/run_folder.h"
 #include "scene/viewpoint.h"
-#include "show/cameras/camera_file.h"
 #include "train/camera_alignment.h"
 #include "train/log_history.h"
 #include "train/targets.h"
+#include "viz/cameras/camera_file.h"
 
 namespace traceflow::cli {
 
@@ -89,7 +89,7 @@ Evaluation::Evaluation(const EvaluationArguments& a, const DeviceArguments& devi
       aligns_(a.align_cameras || (a.split == "test" && !run_.cameras.empty())),
       pictures_(views_->size()) {
   if (!run_.note.empty()) std::cerr << run_.note << std::endl;
-  for (const View& view : *views_) show::check_name(capture_.folder.string(), "view id", view.id);
+  for (const View& view : *views_) viz::check_name(capture_.folder.string(), "view id", view.id);
   network_ = read_lpips(a.lpips);
   device_ = devices.choose();
   run_.subject.scene.move_to(device_);
@@ -119,7 +119,7 @@ void Evaluation::measure(const eval::ViewListener& listener) {
 }
 
 std::vector<View> Evaluation::aligned_views() {
-  const show::Subject& subject = run_.subject;
+  const viz::Subject& subject = run_.subject;
   const SceneNormalisation &of_capture = capture_.normalisation, &of_scene = subject.scene.normalisation;
   Renderer renderer(subject.render);
   Targets targets(device_, 0);

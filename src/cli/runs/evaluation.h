@@ -32,7 +32,7 @@ class Evaluation {
   const eval::Report& report() const { return report_; }
   const std::vector<View>& views() const { return *views_; }
   double scale() const { return run_.subject.scene.normalisation.scale; }
-  const show::Subject& subject() const { return run_.subject; }
+  const viz::Subject& subject() const { return run_.subject; }
   const Capture& capture() const { return capture_; }
 
  private:

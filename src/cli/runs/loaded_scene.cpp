@@ -5,12 +5,11 @@
 namespace traceflow::cli {
 
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
-  if (std::filesystem::is_regular_file(path))
-    return {show::read_ply_subject(path, environment), std::nullopt};
+  if (std::filesystem::is_regular_file(path)) return {viz::read_ply_subject(path, environment), std::nullopt};
   // A run that was exported into its own folder is more than that one moment of it.
   const bool is_taken_for_run = environment.empty() && RunFolder{path}.holds_a_run();
   if (!is_taken_for_run && std::filesystem::is_regular_file(path / "main.ply")) {
-    return {show::read_ply_subject(path / "main.ply", environment), std::nullopt};
+    return {viz::read_ply_subject(path / "main.ply", environment), std::nullopt};
   }
   if (!std::filesystem::exists(path)) {
     throw InputError(path.string(), "", "no such file or folder", "a run's folder or a .ply");
@@ -19,7 +18,7 @@ LoadedScene load_scene(const std::filesystem::path& path, const std::string& env
     throw InputError("option", "environment", "a run, which has its own", "a .ply to go with");
   }
   TrainedRun run = read_run(path);
-  show::Subject subject = std::move(run.subject);
+  viz::Subject subject = std::move(run.subject);
   subject.warning = run.note;
   return {std::move(subject), std::move(run)};
 }

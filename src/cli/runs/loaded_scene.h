@@ -9,7 +9,7 @@ namespace traceflow::cli {
 
 // A scene and, when it comes from a run, what else is known of it.
 struct LoadedScene {
-  show::Subject subject;
+  viz::Subject subject;
   std::optional<TrainedRun> run;
 };
 

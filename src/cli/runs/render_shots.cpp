@@ -8,10 +8,10 @@
 #include <map>
 
 #include "scene/viewpoint.h"
-#include "show/cameras/camera_file.h"
-#include "show/cameras/camera_path.h"
-#include "show/cameras/orbit.h"
-#include "show/cameras/spiral.h"
+#include "viz/cameras/camera_file.h"
+#include "viz/cameras/camera_path.h"
+#include "viz/cameras/orbit.h"
+#include "viz/cameras/spiral.h"
 
 namespace traceflow::cli {
 
@@ -56,7 +56,7 @@ class Chooser {
     ChosenShots chosen;
     chosen.frames_per_second = a_.frames_per_second.value_or(30);
     if (!a_.cameras.empty()) {
-      chosen.shots = show::read_cameras(a_.cameras, scene_.subject.scene.normalisation);
+      chosen.shots = viz::read_cameras(a_.cameras, scene_.subject.scene.normalisation);
     } else if (!a_.camera_path.empty()) {
       along_path(chosen);
     } else if (!a_.freeze_camera.empty()) {
@@ -66,7 +66,7 @@ class Chooser {
     } else {
       captured(chosen);
     }
-    for (show::Shot& shot : chosen.shots) shot.time = a_.time ? *a_.time : shot.time.value_or(0.0F);
+    for (viz::Shot& shot : chosen.shots) shot.time = a_.time ? *a_.time : shot.time.value_or(0.0F);
     if (capture_) chosen.times = times_of(*capture_);
     if (chosen.photographs.empty()) return chosen;
     chosen.capture = std::move(capture_);
@@ -91,17 +91,17 @@ class Chooser {
 
   void captured(ChosenShots& chosen) {
     for (const View& view : views_of(capture(), a_.split.empty() ? "test" : a_.split)) {
-      show::check_name(capture().folder.string(), "view id", view.id);
+      viz::check_name(capture().folder.string(), "view id", view.id);
       chosen.shots.push_back({view.id, view.time, placed(view.camera)});
       if (a_.compare) chosen.photographs.push_back(view);
     }
   }
 
   void along_path(ChosenShots& chosen) {
-    show::CameraPath path = show::read_camera_path(a_.camera_path);
+    viz::CameraPath path = viz::read_camera_path(a_.camera_path);
     if (a_.size) std::tie(path.width, path.height) = *a_.size;
     if (a_.frames_per_second) path.fps = *a_.frames_per_second;
-    chosen.shots = show::shots_of(path, scene_.subject.scene.normalisation);
+    chosen.shots = viz::shots_of(path, scene_.subject.scene.normalisation);
     chosen.frames_per_second = path.fps;
   }
 
@@ -110,14 +110,14 @@ class Chooser {
     const int frames = a_.frames.value_or(usual_frames);
     if (a_.orbit && !scene_.run && a_.capture.empty()) {
       const auto [width, height] = a_.size.value_or(usual_size);
-      chosen.shots = show::orbit_around_points(scene_.subject.scene.main.position, width, height, frames);
+      chosen.shots = viz::orbit_around_points(scene_.subject.scene.main.position, width, height, frames);
       return;
     }
     std::vector<Camera<float>> cameras;
     for (const View& view : views_of(capture(), "train")) cameras.push_back(placed(view.camera));
     if (a_.size) cameras.front() = resized(cameras.front(), *a_.size);
     chosen.shots =
-        a_.orbit ? show::orbit_around_cameras(cameras, frames) : show::spiral_around_cameras(cameras, frames);
+        a_.orbit ? viz::orbit_around_cameras(cameras, frames) : viz::spiral_around_cameras(cameras, frames);
     for (size_t i = 0; i < chosen.shots.size(); ++i) chosen.shots[i].time = evenly(i, chosen.shots.size());
   }
 

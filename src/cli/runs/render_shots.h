@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cli/runs/loaded_scene.h"
-#include "show/cameras/shot.h"
+#include "viz/cameras/shot.h"
 
 namespace CLI {
 class App;
@@ -31,7 +31,7 @@ struct ShotArguments {
 void add_shot_arguments(CLI::App& verb, ShotArguments& arguments);
 
 struct ChosenShots {
-  std::vector<show::Shot> shots;  // each with its time
+  std::vector<viz::Shot> shots;  // each with its time
   // To compare with: one view for each shot, and where their pictures are. Else empty.
   std::vector<View> photographs;
   std::optional<Capture> capture;

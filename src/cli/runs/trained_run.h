@@ -3,15 +3,15 @@
 #include <filesystem>
 #include <string>
 
-#include "show/subject.h"
 #include "train/camera_refinement.h"
 #include "train/options.h"
+#include "viz/subject.h"
 
 namespace traceflow::cli {
 
 // A run's folder as eval, render and export see it.
 struct TrainedRun {
-  show::Subject subject;  // takes part as far as the run has come (method §7.1–§7.3)
+  viz::Subject subject;  // takes part as far as the run has come (method §7.1–§7.3)
   TrainOptions options;
   std::string capture;                   // its name
   std::filesystem::path capture_folder;  // where it was when the run was trained

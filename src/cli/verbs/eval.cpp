@@ -8,8 +8,8 @@
 #include "base/atomic_file.h"
 #include "cli/runs/evaluation.h"
 #include "cli/verbs/verbs.h"
-#include "show/contact_sheet.h"
-#include "show/layer_files.h"
+#include "viz/contact_sheet.h"
+#include "viz/layer_files.h"
 
 namespace traceflow::cli {
 
@@ -23,21 +23,21 @@ struct EvalArguments {
 };
 
 void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
-  const std::vector<show::Layer> layers =
-      a.layers == "none" ? std::vector<show::Layer>{} : show::parse_layers(a.layers);
+  const std::vector<viz::Layer> layers =
+      a.layers == "none" ? std::vector<viz::Layer>{} : viz::parse_layers(a.layers);
   Evaluation evaluation(a.evaluation, devices);
   const std::vector<View>& views = evaluation.views();
 
   const std::filesystem::path folder = std::filesystem::path(a.evaluation.run) / "eval" / a.evaluation.split;
   std::filesystem::create_directories(folder);
-  show::LayerFiles files(folder, layers, show::ImageFormat::png, evaluation.scale());
-  std::optional<show::TrackFollower> follower;
-  const show::Subject& subject = evaluation.subject();
-  if (std::find(layers.begin(), layers.end(), show::Layer::tracks) != layers.end())
+  viz::LayerFiles files(folder, layers, viz::ImageFormat::png, evaluation.scale());
+  std::optional<viz::TrackFollower> follower;
+  const viz::Subject& subject = evaluation.subject();
+  if (std::find(layers.begin(), layers.end(), viz::Layer::tracks) != layers.end())
     follower.emplace(subject.scene, subject.request, subject.render, times_of(evaluation.capture()));
-  show::ContactSheet sheet(a.sheet_width);
+  viz::ContactSheet sheet(a.sheet_width);
   evaluation.measure([&](const View& view, const ViewImages& images, const Frame& frame) {
-    files.write(view.id, frame, follower ? follower->at(subject.scene, view.time) : show::Tracks());
+    files.write(view.id, frame, follower ? follower->at(subject.scene, view.time) : viz::Tracks());
     const auto i = static_cast<size_t>(&view - views.data());
     if (!a.sheet.empty() && eval::among_spread(i, views.size(), static_cast<size_t>(a.sheet_views))) {
       sheet.add(images.colour, frame, images.known);

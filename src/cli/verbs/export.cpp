@@ -29,8 +29,7 @@ void run_export(const ExportArguments& a) {
     std::cerr << "the cube map behind this run's environment is left out: a .ply cannot hold one\n";
   }
   const std::optional<float> time = a.undeformed ? std::nullopt : std::optional(a.time);
-  for (const auto& path : show::export_subject(run.subject, time, a.output))
-    fmt::print("{}\n", path.string());
+  for (const auto& path : viz::export_subject(run.subject, time, a.output)) fmt::print("{}\n", path.string());
 }
 
 }  // namespace

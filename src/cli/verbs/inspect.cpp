@@ -8,7 +8,7 @@
 #include "cli/runs/capture_report.h"
 #include "cli/verbs/verbs.h"
 #include "files/png.h"
-#include "show/capture_picture/capture_picture.h"
+#include "viz/capture_picture/capture_picture.h"
 
 namespace traceflow::cli {
 
@@ -29,8 +29,7 @@ void inspect_capture(const InspectArguments& arguments, const OptionArguments& g
   const Capture capture = load_capture(arguments.data, options.capture);
   Inspection found = inspect(capture, arguments.quick);
   const MemoryNeeds memory = memory_needs(capture, options, found);
-  if (!arguments.picture.empty())
-    write_png(arguments.picture, show::capture_picture(capture, found.findings));
+  if (!arguments.picture.empty()) write_png(arguments.picture, viz::capture_picture(capture, found.findings));
   if (arguments.as_json) {
     const nlohmann::json report = report_json(capture, found, memory);
     // In ASCII: beyond it too stands what commands a terminal, and names come from outside.

@@ -15,9 +15,9 @@
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
 #include "files/png.h"
-#include "show/layer_files.h"
-#include "show/side_by_side.h"
-#include "show/video.h"
+#include "viz/layer_files.h"
+#include "viz/side_by_side.h"
+#include "viz/video.h"
 
 namespace traceflow::cli {
 
@@ -31,7 +31,7 @@ struct RenderArguments {
     if (output.empty() && video.empty())
       throw InputError("option", "output", "nothing", "-o DIR, --video FILE.mp4 or both");
     shots.check();
-    if (!video.empty()) show::Video::prepare(video);
+    if (!video.empty()) viz::Video::prepare(video);
   }
 };
 
@@ -41,20 +41,20 @@ class Output {
   Output(const RenderArguments& a, const ChosenShots& chosen, double scale)
       : a_(a),
         chosen_(chosen),
-        layers_(show::parse_layers(a.layers)),
+        layers_(viz::parse_layers(a.layers)),
         scale_(scale),
-        files_(a.output, layers_, a.format == "npy" ? show::ImageFormat::npy : show::ImageFormat::png, scale),
+        files_(a.output, layers_, a.format == "npy" ? viz::ImageFormat::npy : viz::ImageFormat::png, scale),
         video_(a.video, chosen.frames_per_second) {}
 
-  void add(size_t i, const Frame& frame, const show::Tracks& tracks) {
+  void add(size_t i, const Frame& frame, const viz::Tracks& tracks) {
     const std::string& name = chosen_.shots[i].name;
     if (!a_.output.empty()) files_.write(name, frame, tracks);
     if (a_.video.empty() && !a_.shots.compare) return;
     Tensor<uint8_t> picture =
-        show::in_colour(painter_.paint(layers_[0], show::layer_values(frame, layers_[0], scale_, tracks)));
+        viz::in_colour(painter_.paint(layers_[0], viz::layer_values(frame, layers_[0], scale_, tracks)));
     if (a_.shots.compare) {
       const std::shared_ptr<const ViewImages> images = load_images(*chosen_.capture, chosen_.photographs[i]);
-      picture = show::side_by_side(to_8bit(images->colour), picture);
+      picture = viz::side_by_side(to_8bit(images->colour), picture);
       if (!a_.output.empty()) write_compared(name, picture);
     }
     if (!a_.video.empty()) video_.add(picture);
@@ -70,11 +70,11 @@ class Output {
 
   const RenderArguments& a_;
   const ChosenShots& chosen_;
-  std::vector<show::Layer> layers_;
+  std::vector<viz::Layer> layers_;
   double scale_;
-  show::LayerFiles files_;
-  show::Video video_;
-  show::Painter painter_;
+  viz::LayerFiles files_;
+  viz::Video video_;
+  viz::Painter painter_;
 };
 
 // The capture's times, where it is there.
@@ -87,8 +87,8 @@ std::vector<float> times_for_tracks(const RenderArguments& a, const LoadedScene&
 }
 
 // Renders until the end or Ctrl-C; how many shots it came to.
-size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject,
-            const show::TrackFollower* follower, Output& output) {
+size_t take(const std::vector<viz::Shot>& shots, const viz::Subject& subject,
+            const viz::TrackFollower* follower, Output& output) {
   const std::atomic<bool>& stop = stop_on_signals();
   const auto start = std::chrono::steady_clock::now();
   CountProgress progress = CountProgress::for_stderr();
@@ -99,7 +99,7 @@ size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject,
     request.camera = shots[done].camera;
     request.time = *shots[done].time;
     output.add(done, renderer.forward(subject.scene, request),
-               follower != nullptr ? follower->at(subject.scene, request.time) : show::Tracks());
+               follower != nullptr ? follower->at(subject.scene, request.time) : viz::Tracks());
     ++done;
     progress.show({"", "frames", static_cast<int64_t>(done), static_cast<int64_t>(shots.size())},
                   std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -111,19 +111,19 @@ size_t take(const std::vector<show::Shot>& shots, const show::Subject& subject,
 
 void run_render(const RenderArguments& a, const OptionArguments& options, const DeviceArguments& devices) {
   a.check();
-  const std::vector<show::Layer> layers = show::parse_layers(a.layers);
+  const std::vector<viz::Layer> layers = viz::parse_layers(a.layers);
   LoadedScene scene = load_scene(a.scene, a.environment);
-  show::Subject& subject = scene.subject;
+  viz::Subject& subject = scene.subject;
   options.apply(option_fields(subject.render));
   subject.render.validate();
   const ChosenShots chosen = choose_shots(a.shots, scene);
   if (!(subject.scene.extent > 0))
-    subject.scene.extent = show::extent_seen_from(subject.scene.main, chosen.shots);
+    subject.scene.extent = viz::extent_seen_from(subject.scene.main, chosen.shots);
   if (!subject.warning.empty()) std::cerr << subject.warning << std::endl;
   subject.scene.move_to(devices.choose());
 
-  std::optional<show::TrackFollower> follower;
-  if (std::find(layers.begin(), layers.end(), show::Layer::tracks) != layers.end())
+  std::optional<viz::TrackFollower> follower;
+  if (std::find(layers.begin(), layers.end(), viz::Layer::tracks) != layers.end())
     follower.emplace(subject.scene, subject.request, subject.render, times_for_tracks(a, scene, chosen));
   Output output(a, chosen, subject.scene.normalisation.scale);
   const size_t done = take(chosen.shots, subject, follower ? &*follower : nullptr, output);

@@ -10,7 +10,7 @@
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
 #include "serve/run_view.h"
-#include "show/cameras/orbit.h"
+#include "viz/cameras/orbit.h"
 
 namespace traceflow::cli {
 
@@ -23,10 +23,10 @@ struct ViewArguments {
 
 // What a .ply that does not tell its scene's size is taken for.
 float extent_of(const Surfels& surfels, const serve::SceneInfo& info) {
-  std::vector<show::Shot> shots;
+  std::vector<viz::Shot> shots;
   for (const serve::CapturedCamera& view : info.train) shots.push_back({view.id, view.time, view.camera});
-  if (shots.empty()) shots = show::orbit_around_points(surfels.position, 16, 9, 8);
-  return show::extent_seen_from(surfels, shots);
+  if (shots.empty()) shots = viz::orbit_around_points(surfels.position, 16, 9, 8);
+  return viz::extent_seen_from(surfels, shots);
 }
 
 serve::RunView::Shown shown_of(TrainedRun run) {

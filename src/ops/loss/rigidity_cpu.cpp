@@ -22,13 +22,13 @@ Mean rigidity_on_host(const Tensor<float>& rest, const Tensor<float>& posed, con
   parallel_for("loss: rigidity edges", count, [&](int64_t i) {
     const int64_t near = stored(i);
     const Vec3<float> p = load3<float>(rest.row(near)), x = load3<float>(posed.row(i));
-    const float reach = std::sqrt(edges.distance2(near, k - 1));
+    const float radius = std::sqrt(edges.distance2(near, k - 1));
     for (int64_t n = 0; n < k; ++n) {
       const int32_t far = edges.index(near, n);
       const int32_t j = far < 0 ? -1 : posed_at[static_cast<size_t>(far)];
       if (j < 0) continue;
       const Ends ends{load3<float>(rest.row(far)) - p, load3<float>(posed.row(j)) - x};
-      pulls[static_cast<size_t>(i * k + n)] = measure(ends, reach, strain2);
+      pulls[static_cast<size_t>(i * k + n)] = measure(ends, radius, strain2);
     }
   });
 

@@ -19,14 +19,14 @@ struct Ends {
   Vec3<float> rest, posed;  // far end less near end
 };
 
-TRACEFLOW_HD inline Edge measure(const Ends& ends, float reach, float strain2) {
+TRACEFLOW_HD inline Edge measure(const Ends& ends, float radius, float strain2) {
   const float rest_length = glm::length(ends.rest);
   const float posed_length = glm::length(ends.posed);
-  const float inverse_reach = 1 / reach;
-  const float e = (posed_length - rest_length) * inverse_reach;
+  const float inverse_radius = 1 / radius;
+  const float e = (posed_length - rest_length) * inverse_radius;
   if (!(rest_length > 0) || !(posed_length > 0) || !std::isfinite(e)) return {};
   const float sum = e * e + strain2;
-  const float slope = 2 * e * strain2 / (sum * sum) * inverse_reach;
+  const float slope = 2 * e * strain2 / (sum * sum) * inverse_radius;
   return {true, e * e / sum, slope / rest_length * ends.rest, -slope / posed_length * ends.posed};
 }
 

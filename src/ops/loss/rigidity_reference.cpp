@@ -23,24 +23,24 @@ double rigidity_reference(const Tensor<double>& rest, const Tensor<double>& pose
           if (far != stored(j)) continue;
           const Vec3<double> p = load3<double>(rest.row(far)) - load3<double>(rest.row(stored(i)));
           const Vec3<double> x = load3<double>(posed.row(j)) - load3<double>(posed.row(i));
-          const double reach = std::sqrt(edges.distance2(stored(i), edges.index.dim(1) - 1));
-          if (!finite(p) || !finite(x) || !(reach > 0) || length(p) == 0 || length(x) == 0) continue;
-          f(i, j, p, x, reach);
+          const double radius = std::sqrt(edges.distance2(stored(i), edges.index.dim(1) - 1));
+          if (!finite(p) || !finite(x) || !(radius > 0) || length(p) == 0 || length(x) == 0) continue;
+          f(i, j, p, x, radius);
         }
       }
     }
   };
   double sum = 0, counted = 0;
-  for_each_edge([&](int64_t, int64_t, const Vec3<double>& p, const Vec3<double>& x, double reach) {
-    const double e = (length(x) - length(p)) / reach;
+  for_each_edge([&](int64_t, int64_t, const Vec3<double>& p, const Vec3<double>& x, double radius) {
+    const double e = (length(x) - length(p)) / radius;
     sum += e * e / (e * e + strain * strain);
     counted += 1;
   });
   if (counted == 0) return 0;
-  for_each_edge([&](int64_t i, int64_t j, const Vec3<double>& p, const Vec3<double>& x, double reach) {
-    const double e = (length(x) - length(p)) / reach;
+  for_each_edge([&](int64_t i, int64_t j, const Vec3<double>& p, const Vec3<double>& x, double radius) {
+    const double e = (length(x) - length(p)) / radius;
     const double slope =
-        weight / counted * 2 * e * strain * strain / std::pow(e * e + strain * strain, 2) / reach;
+        weight / counted * 2 * e * strain * strain / std::pow(e * e + strain * strain, 2) / radius;
     add3(grad_posed.row(j), slope * x / length(x));
     add3(grad_posed.row(i), -slope * x / length(x));
     add3(grad_rest.row(stored(j)), -slope * p / length(p));

@@ -151,8 +151,9 @@ struct SpreadOverKeys {
 
   TRACEFLOW_HD void operator()(int64_t i) const {
     const int64_t key = i % keys, first = i - key;
-    const auto reach = static_cast<int64_t>(3 * width);
-    const int64_t begin = key > reach ? key - reach : 0, end = key + reach < keys ? key + reach + 1 : keys;
+    const auto half_window = static_cast<int64_t>(3 * width);
+    const int64_t begin = key > half_window ? key - half_window : 0,
+                  end = key + half_window < keys ? key + half_window + 1 : keys;
     float* const sum = to + numbers * i;
     for (int64_t k = 0; k < numbers; ++k) sum[k] = 0;
     for (int64_t other = begin; other < end; ++other) {

@@ -171,9 +171,9 @@ class ProjectSurfel {
     Rectangle box = is_ellipse ? ellipse_box(disk, camera_, p.pixel, ellipse_centre)
                                : clipped_box(disk, camera_, near_plane_);
     if (p.has_low_pass) {
-      const double reach = p.radius * low_pass_ / std::sqrt(2.0);
-      box.include(p.pixel.x - reach, p.pixel.y - reach);
-      box.include(p.pixel.x + reach, p.pixel.y + reach);
+      const double filter_radius = p.radius * low_pass_ / std::sqrt(2.0);
+      box.include(p.pixel.x - filter_radius, p.pixel.y - filter_radius);
+      box.include(p.pixel.x + filter_radius, p.pixel.y + filter_radius);
     }
     tile_range(box.x0, box.x1, camera_.width, bounds.tile_x0, bounds.tile_x1);
     tile_range(box.y0, box.y1, camera_.height, bounds.tile_y0, bounds.tile_y1);

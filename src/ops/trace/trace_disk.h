@@ -25,13 +25,13 @@ struct DiskBox {
 TRACEFLOW_HD inline DiskBox disk_box(const SurfelFrame<float>& surfel, float radius) {
   const Vec3<float> a = radius * surfel.scale.x * surfel.rotation[0];
   const Vec3<float> b = radius * surfel.scale.y * surfel.rotation[1];
-  const float reach = std::fmax(glm::length(a), glm::length(b));
+  const float extent = std::fmax(glm::length(a), glm::length(b));
   constexpr float vanishing = 1e-18F;  // lengths under this have squares of 0
   DiskBox box;
   for (int axis = 0; axis < 3; ++axis) {
     const float centre = surfel.position[axis];
     const float half = std::sqrt(a[axis] * a[axis] + b[axis] * b[axis]);
-    const float margin = 2e-6F * (std::abs(centre) + reach) + vanishing;
+    const float margin = 2e-6F * (std::abs(centre) + extent) + vanishing;
     box.lower[axis] = centre - half - margin;
     box.upper[axis] = centre + half + margin;
   }

@@ -106,14 +106,14 @@ void group_ways(Way* begin, Way* end) {
   group_ways(middle, end);
 }
 
-void group_section(const RayView& rays, float reach, uint32_t* begin, uint32_t* end) {
+void group_section(const RayView& rays, float sample_distance, uint32_t* begin, uint32_t* end) {
   constexpr float origin_weight = 0.3F;  // the beam is thick at one end only
   std::array<Way, section_rays> ways;
   Way* last = ways.data();
   for (const uint32_t* ray = begin; ray != end; ++ray) {
     UnitRay unit;
     make_unit_ray(rays, *ray, unit);
-    store3(last->at, unit.origin + reach * unit.direction);
+    store3(last->at, unit.origin + sample_distance * unit.direction);
     store3(last->at + 3, origin_weight * unit.origin);
     (last++)->ray = *ray;
   }
@@ -129,17 +129,19 @@ void order_rays(const Bvh& bvh, const Rays& rays, RayOrder& order) {
   if (count == 0) return;
   const RayView view(rays);
   const Vec3<float> centre = typical_origin(rays);
-  order.reach = typical_distance(bvh, centre);
+  order.sample_distance = typical_distance(bvh, centre);
   std::vector<Keyed> items(static_cast<size_t>(count));
   parallel_for("trace order", count, [&](int64_t r) {
-    items[static_cast<size_t>(r)] = {ray_key(view, r, centre, order.reach), static_cast<uint32_t>(r)};
+    items[static_cast<size_t>(r)] = {ray_key(view, r, centre, order.sample_distance),
+                                     static_cast<uint32_t>(r)};
   });
   radix_sort(items);
   std::transform(items.begin(), items.end(), order.ray.begin(), [](const Keyed& item) { return item.ray; });
   const auto traceable = std::partition_point(items.begin(), items.end(),
                                               [](const Keyed& item) { return item.key != untraceable_key; });
   parallel_blocks("trace group", traceable - items.begin(), section_rays, [&](int64_t begin, int64_t end) {
-    group_section(view, order.reach, &order.ray[static_cast<size_t>(begin)], order.ray.data() + end);
+    group_section(view, order.sample_distance, &order.ray[static_cast<size_t>(begin)],
+                  order.ray.data() + end);
   });
 }
 

@@ -10,7 +10,7 @@ namespace traceflow::trace {
 // Rays in an order in which neighbours go the same way, whatever order they came in.
 struct RayOrder {
   std::vector<uint32_t> ray;  // those that cannot be traced last
-  float reach = 0;            // how far from the rays the surfels typically are; scene units
+  float sample_distance = 0;  // how far from the rays the surfels typically are; scene units
 };
 
 // Sorts along a space-filling curve by the points at that distance. Equal ones stay in the caller's order.

@@ -22,12 +22,13 @@ TRACEFLOW_HD inline uint32_t morton_key(const Vec3<float>& unit_cube) {
          spread_bits(static_cast<uint32_t>(cell.z)) << 2;
 }
 
-// Along a space-filling curve by the point at the distance `reach`, seen from `centre`.
-TRACEFLOW_HD inline uint32_t ray_key(const RayView& rays, int64_t i, const Vec3<float>& centre, float reach) {
+// Along a space-filling curve by the point at the distance `sample_distance`, seen from `centre`.
+TRACEFLOW_HD inline uint32_t ray_key(const RayView& rays, int64_t i, const Vec3<float>& centre,
+                                     float sample_distance) {
   UnitRay ray;
   if (!make_unit_ray(rays, i, ray)) return untraceable_key;
-  const float scale = 0.25F / reach;
-  return morton_key(scale * (ray.origin + reach * ray.direction - centre) + Vec3<float>(0.5F));
+  const float scale = 0.25F / sample_distance;
+  return morton_key(scale * (ray.origin + sample_distance * ray.direction - centre) + Vec3<float>(0.5F));
 }
 
 }  // namespace traceflow::trace

@@ -13,8 +13,8 @@ namespace traceflow::prepare {
 
 namespace {
 
-constexpr int spacing = 8;  // pixels between tracks, and a side of the cells that votes are counted in
-constexpr int reach = 3;    // cells over which a track speaks
+constexpr int spacing = 8;      // pixels between tracks, and a side of the cells that votes are counted in
+constexpr int half_window = 3;  // cells over which a track speaks
 constexpr double least_voice = 0.3;  // weight of tracks without which nothing is known of a cell
 constexpr int64_t smallest_share = 300, margin_share = 120;
 constexpr std::array<int64_t, 4> neighbours{-2, -1, 1, 2};  // in steps
@@ -29,9 +29,10 @@ Tensor<float> votes_of(const Motion& motion, int64_t rows, int64_t columns) {
     const bool moves = motion.still.distance(t) > limit;
     const auto row = static_cast<int64_t>(t.from.y / spacing),
                column = static_cast<int64_t>(t.from.x / spacing);
-    for (int64_t y = std::max<int64_t>(0, row - reach); y <= std::min(rows - 1, row + reach); ++y) {
-      for (int64_t x = std::max<int64_t>(0, column - reach); x <= std::min(columns - 1, column + reach);
-           ++x) {
+    for (int64_t y = std::max<int64_t>(0, row - half_window); y <= std::min(rows - 1, row + half_window);
+         ++y) {
+      for (int64_t x = std::max<int64_t>(0, column - half_window);
+           x <= std::min(columns - 1, column + half_window); ++x) {
         const auto apart = static_cast<double>((y - row) * (y - row) + (x - column) * (x - column));
         const auto weight = static_cast<float>(std::exp(-apart / 2));
         heard(y, x) += weight;

@@ -147,18 +147,18 @@ Pyramid make_pyramid(Tensor<float> grey) {
 }
 
 std::vector<Vec2<double>> find_corners(const Pyramid& picture, int spacing) {
-  constexpr int step = 2, reach = 3;
+  constexpr int step = 2, half_window = 3;
   const Tensor<float>& image = picture.levels.front();
   std::vector<Vec2<double>> corners;
   for (int64_t top = 0; top + spacing <= image.dim(0); top += spacing) {
     for (int64_t left = 0; left + spacing <= image.dim(1); left += spacing) {
-      double best = least_contrast * (2 * reach + 1) * (2 * reach + 1);
+      double best = least_contrast * (2 * half_window + 1) * (2 * half_window + 1);
       std::optional<Vec2<double>> corner;
       for (int64_t y = top; y < top + spacing; y += step) {
         for (int64_t x = left; x < left + spacing; x += step) {
           Structure around;
-          for (int64_t dy = -reach; dy <= reach; ++dy) {
-            for (int64_t dx = -reach; dx <= reach; ++dx) {
+          for (int64_t dy = -half_window; dy <= half_window; ++dy) {
+            for (int64_t dx = -half_window; dx <= half_window; ++dx) {
               around.add(gradient(image, static_cast<double>(x + dx), static_cast<double>(y + dy)));
             }
           }

@@ -152,7 +152,7 @@ TEST(SynthMesh, ReachHoldsEveryVertex) {
   const Ball ball = dented_ball();
   double farthest = 0;
   for (const Vector& vertex : ball.deformed) farthest = std::max(farthest, length(vertex));
-  EXPECT_EQ(ball.mesh().reach(), farthest);
+  EXPECT_EQ(ball.mesh().bounding_radius(), farthest);
 }
 
 TEST(SynthMesh, RaysThatAreNotNumbersHitNothing) {

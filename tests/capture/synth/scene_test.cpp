@@ -19,8 +19,10 @@ Vector random_direction(Random& random) {
   return normalize(Vector(random.normal(), random.normal(), random.normal()));
 }
 
-Vector random_place(Random& random, double reach) {
-  return {random.uniform(-reach, reach), random.uniform(-reach, reach), random.uniform(-reach, reach)};
+Vector random_place(Random& random, double bounding_radius) {
+  return {random.uniform(-bounding_radius, bounding_radius),
+          random.uniform(-bounding_radius, bounding_radius),
+          random.uniform(-bounding_radius, bounding_radius)};
 }
 
 // Positive outside, negative inside; zero on the surface.
@@ -196,9 +198,10 @@ TEST_P(NamedScenes, MoveSmoothlyAndRigidly) {
       const Pose& b = next.bodies[i].pose;
       EXPECT_NEAR(glm::determinant(a.world_from_body), 1, 1e-12);
       EXPECT_LT(length(b.position - a.position), 0.01) << "body " << i << " jumps at step " << step;
-      const bool deforms = now.bodies[i].reach != next.bodies[i].reach;
+      const bool deforms = now.bodies[i].bounding_radius != next.bodies[i].bounding_radius;
       if (deforms) {
-        EXPECT_LT(std::abs(next.bodies[i].reach - now.bodies[i].reach), 0.01) << "body " << i;
+        EXPECT_LT(std::abs(next.bodies[i].bounding_radius - now.bodies[i].bounding_radius), 0.01)
+            << "body " << i;
       }
       moves = moves || deforms || a.position != b.position;
     }

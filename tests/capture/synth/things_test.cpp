@@ -77,7 +77,8 @@ TEST_P(SynthThings, KeepOutOfEverythingElseAndInTheRoom) {
         ASSERT_GT(point.z, -1e-9);
         for (const synth::Body& other : stage.bodies) {
           if (!is_closed(other) || &other == &body || (body.object < 0 && other.object < 0)) continue;
-          if (body.object == other.object || length(point - other.pose.position) > other.reach) continue;
+          if (body.object == other.object || length(point - other.pose.position) > other.bounding_radius)
+            continue;
           ASSERT_FALSE(is_inside_body(other, point))
               << "step " << step << ": bodies " << &body - stage.bodies.data() << " and "
               << &other - stage.bodies.data();

@@ -41,7 +41,8 @@ void expect_same_frames(const Frame& found, const Frame& expected) {
     // A cross product of differences of depths loses digits.
     EXPECT_LE(share_beyond(found.pseudo_normal, expected.pseudo_normal, 1e-2), few) << "pseudo-normal";
   }
-  EXPECT_NEAR(found.reach.on(Device::cpu)[0], expected.reach[0], 1e-5F * expected.reach[0]);
+  EXPECT_NEAR(found.max_displacement.on(Device::cpu)[0], expected.max_displacement[0],
+              1e-5F * expected.max_displacement[0]);
   EXPECT_EQ(list_of(found.subset.on(Device::cpu)), list_of(expected.subset));
 }
 

@@ -134,7 +134,7 @@ void convolve(const Layer& layer, const Size& size, const Tensor<float>& x, Tens
 // where none is known.
 void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>& grad_y,
                        const Tensor<uint8_t>* gates, Tensor<float>& grad_x, Memory& memory) {
-  const int64_t pixels = size.pixels(), reach = size.width + 1;
+  const int64_t pixels = size.pixels(), border = size.width + 1;
   grad_x.place(Device::cuda).reset({pixels, layer.inputs});
   const Blocks blocks = blocks_of(pixels, layer.inputs);
   float* const grad_patches = sized(memory.patches, {blocks.rows, 9 * layer.inputs});
@@ -150,7 +150,7 @@ void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>
               .operands = DType::fp32,
               .result = DType::fp32},
              {.a = grad_y.row(begin), .b = layer.matrix, .c = grad_patches});
-    const int64_t first = std::max<int64_t>(begin - reach, 0), last = std::min(end + reach, pixels);
+    const int64_t first = std::max<int64_t>(begin - border, 0), last = std::min(end + border, pixels);
     parallel_for(Device::cuda, "lpips: scatter", (last - first) * layer.inputs / 4,
                  AddPatches{fours(grad_patches), begin, end, first, size.extent(layer.inputs),
                             gates == nullptr ? nullptr : reinterpret_cast<const FourBytes*>(gates->data()),

@@ -146,7 +146,7 @@ void trace_packet(const BlockTask& task, const DiskRules& rules, const Packet& p
 HWY_INLINE bool is_coherent(const BlockTask& task, const Packet& packet) {
   constexpr float widest = 2.0F;  // in leaves, where the surfels are
   return packet.count > 1 &&
-         Beam(packet.rays, packet.count).radius(task.order.reach) < widest * task.bvh.leaf_size;
+         Beam(packet.rays, packet.count).radius(task.order.sample_distance) < widest * task.bvh.leaf_size;
 }
 
 template <int degree>

@@ -44,9 +44,9 @@ HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
     const Vec length2 = dot(qx, qy, qz, qx, qy, qz);
     const Vec aside2 = hn::NegMulAdd(hn::Mul(along, along), inverse_length2, length2);
     const Vec within = hn::Add(hn::Load(d, leaf.radius + i), start);
-    const Vec reach = hn::MulAdd(spread, hn::Add(hn::Sqrt(length2), within), within);
+    const Vec beam_radius = hn::MulAdd(spread, hn::Add(hn::Sqrt(length2), within), within);
     // The difference of squares has lost up to a few units of the longer one's last place.
-    const Vec limit = hn::MulAdd(reach, reach, hn::Mul(length2, hn::Set(d, 2e-6F)));
+    const Vec limit = hn::MulAdd(beam_radius, beam_radius, hn::Mul(length2, hn::Set(d, 2e-6F)));
     // Not "within" but "not beyond": where a square overflows the disk itself decides.
     bits |= (~mask_bits(hn::Gt(aside2, limit)) & ((1U << hn::Lanes(d)) - 1)) << i;
   }

@@ -51,9 +51,10 @@ struct Beam {
     }
     origin = 0.5F * low_origin + 0.5F * high_origin;
     direction = 0.5F * (low_direction + high_direction);
-    const Vec3<float> reach = glm::max(glm::abs(low_origin), glm::abs(high_origin));
+    const Vec3<float> farthest = glm::max(glm::abs(low_origin), glm::abs(high_origin));
     // Wider by more than rounding can move a hit.
-    origin_radius = (high_origin - origin) + Vec3<float>(2e-6F * std::max({reach.x, reach.y, reach.z}));
+    origin_radius =
+        (high_origin - origin) + Vec3<float>(2e-6F * std::max({farthest.x, farthest.y, farthest.z}));
     direction_radius = count > 1 ? high_direction - direction + Vec3<float>(1e-6F) : Vec3<float>(0);
   }
   float radius(float distance) const {

@@ -137,10 +137,10 @@ __global__ void __launch_bounds__(build_threads) make_nodes(Keys keys, TreeView 
   const int i = static_cast<int>(index);
   const int step = keys.shared_bits(i, i + 1) > keys.shared_bits(i, i - 1) ? 1 : -1;
   const int least = keys.shared_bits(i, i - step);
-  int64_t reach = 2;
-  while (keys.shared_bits(i, i + reach * step) > least) reach *= 2;
+  int64_t bound = 2;
+  while (keys.shared_bits(i, i + bound * step) > least) bound *= 2;
   int64_t length = 0;
-  for (int64_t more = reach / 2; more > 0; more /= 2) {
+  for (int64_t more = bound / 2; more > 0; more /= 2) {
     if (keys.shared_bits(i, i + (length + more) * step) > least) length += more;
   }
   const int other_end = static_cast<int>(i + length * step);

@@ -46,10 +46,11 @@ __global__ void __launch_bounds__(samples) find_frame(RayInput input, int64_t su
   }
   const DiskPlane disk = load_quads(input.disks[surfels * threadIdx.x / samples].plane);
   const float distance = glm::length(disk.position - centre);
-  const float reach = find_median(shared, distance, disk.log_opacity > -INFINITY && std::isfinite(distance));
+  const float median_distance =
+      find_median(shared, distance, disk.log_opacity > -INFINITY && std::isfinite(distance));
   if (threadIdx.x != 0) return;
   store3(frame, centre);
-  frame[3] = reach > 0 ? reach : 1;
+  frame[3] = median_distance > 0 ? median_distance : 1;
 }
 
 __global__ void __launch_bounds__(order_threads)

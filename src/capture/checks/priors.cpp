@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/robust.h"
+#include "capture/checks/checks.h"
+
+namespace traceflow {
+
+namespace {
+
+constexpr double empty_share = 0.1;  // of a view's pixels
+constexpr double wide_angle = 60;    // degrees, over all views: directions at random have 90
+// A view against the median of all: degrees, and deviations.
+constexpr double odd_angle = 15;
+constexpr double odd_deviations = 6;
+
+void check_empty(const std::vector<ViewFacts>& facts, Findings& findings) {
+  std::vector<std::string> empty;
+  size_t count = 0;
+  double worst = 1;
+  for (const ViewFacts& view : facts) {
+    if (!view.with_prior) continue;
+    ++count;
+    if (*view.with_prior >= empty_share) continue;
+    empty.push_back(view.view->id);
+    worst = std::min(worst, *view.with_prior);
+  }
+  if (empty.empty()) return;
+  Finding& finding = findings.emplace_back(
+      fmt::format("{} of {} normal priors are almost empty ({})", empty.size(), count, ids_text(empty)),
+      "prior-empty");
+  finding.views = empty;
+  finding.value = worst;
+  finding.threshold = empty_share;
+}
+
+void check_angles(const std::vector<ViewFacts>& facts, Findings& findings) {
+  std::vector<double> angles;
+  for (const ViewFacts& view : facts) {
+    if (view.prior_angle) angles.push_back(*view.prior_angle);
+  }
+  const double usual = median(angles);
+  if (usual > wide_angle) {
+    Finding& finding = findings.emplace_back(
+        fmt::format(
+            "the normal priors are {:.0f}° from planes through the points, in half of the views or more",
+            usual),
+        "prior-disagrees");
+    finding.value = usual;
+    finding.threshold = wide_angle;
+    return;
+  }
+  if (angles.size() < fewest_views) return;
+  const double limit = usual + std::max(odd_angle, odd_deviations * robust_deviation(angles));
+  std::vector<std::string> odd;
+  double worst = 0;
+  for (const ViewFacts& view : facts) {
+    if (!view.prior_angle || *view.prior_angle <= limit) continue;
+    odd.push_back(view.view->id);
+    worst = std::max(worst, *view.prior_angle);
+  }
+  if (odd.empty()) return;
+  Finding& finding = findings.emplace_back(
+      fmt::format(
+          "{} normal {} with the geometry ({}): up to {:.0f}° from planes through the points, where {:.0f}° "
+          "is usual",
+          odd.size(), odd.size() == 1 ? "prior disagrees" : "priors disagree", ids_text(odd), worst, usual),
+      "prior-disagrees");
+  finding.views = std::move(odd);
+  finding.value = worst;
+  finding.threshold = limit;
+}
+
+}  // namespace
+
+void check_priors(const std::vector<ViewFacts>& facts, Findings& findings) {
+  check_empty(facts, findings);
+  check_angles(facts, findings);
+}
+
+}  // namespace traceflow

@@ -1,0 +1,126 @@
+#include "capture/checks/view_facts.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "capture/decode.h"
+#include "capture/image_cache.h"
+#include "capture/lens/resample.h"
+#include "capture/noise.h"
+#include "capture/sharpness.h"
+#include "files/png.h"
+
+namespace traceflow {
+
+namespace {
+
+double variance(const Tensor<uint8_t>& grey) {
+  int64_t sum = 0, squares = 0;
+  for (const uint8_t v : grey.values()) {
+    sum += v;
+    squares += int64_t{v} * v;
+  }
+  const auto count = static_cast<double>(grey.size());
+  const double mean = static_cast<double>(sum) / count;
+  return static_cast<double>(squares) / count - mean * mean;
+}
+
+Tensor<uint8_t> thumbnail_of(const Tensor<uint8_t>& grey) {
+  constexpr int64_t widest = 64;
+  const int64_t width = std::min(widest, grey.dim(1));
+  const double step = static_cast<double>(grey.dim(1)) / static_cast<double>(width);
+  const auto height = std::max<int64_t>(1, static_cast<int64_t>(static_cast<double>(grey.dim(0)) / step));
+  Tensor<float> values({grey.dim(0), grey.dim(1), 1});
+  std::transform(grey.data(), grey.data() + grey.size(), values.data(),
+                 [](uint8_t v) { return from_8bit(v); });
+  const Tensor<float> small = resample(values, {width, height, step, step});
+  Tensor<uint8_t> result({height, width});
+  std::transform(small.data(), small.data() + small.size(), result.data(),
+                 [](float v) { return to_8bit(v); });
+  return result;
+}
+
+void measure_colour(const Tensor<uint8_t>& colour, ViewFacts& facts) {
+  constexpr double least_contrast = 1;  // squares of 8-bit levels
+  int64_t sum = 0;
+  for (const uint8_t v : colour.values()) sum += v;
+  facts.mean_colour = static_cast<double>(sum) / 255 / static_cast<double>(colour.size());
+  facts.is_uniform = std::equal(colour.data() + 3, colour.data() + colour.size(), colour.data());
+  const Tensor<uint8_t> grey = grey_of(colour);
+  facts.exposure = exposure_of(grey);
+  const double contrast = variance(grey);
+  if (contrast > least_contrast) facts.sharpness = sharpness(grey) / contrast;
+  facts.thumbnail = thumbnail_of(grey);
+}
+
+void measure_prior(const Capture& capture, const Tensor<uint8_t>& mask, const SurfacePoints& surface,
+                   ViewFacts& facts) {
+  constexpr int64_t enough = 30;
+  const ViewSource& source = capture.images->source(facts.view->id);
+  const CaptureSource& shared = capture.images->capture();
+  const Tensor<float> prior = decode_prior(source, shared);
+  int64_t known = 0;
+  for (int64_t i = 0; i < prior.size(); i += 3) known += load3<float>(&prior[i]) != Vec3<float>(0) ? 1 : 0;
+  facts.with_prior = 3 * static_cast<double>(known) / static_cast<double>(prior.size());
+
+  double sum = 0;
+  int64_t samples = 0;
+  surface.for_each_visible(facts.view->camera, [&](const Vec2<float>& at, const Vec3<double>& normal) {
+    const auto y = static_cast<int64_t>(at.y), x = static_cast<int64_t>(at.x);
+    if (!mask.empty() && mask(y, x) != 0) return;
+    const Vec3<double> direction = shared.prior_signs * load3<double>(&prior(y, x, 0));
+    if (direction == Vec3<double>(0)) return;
+    sum += std::acos(std::clamp(dot(direction, normal), -1.0, 1.0));
+    ++samples;
+  });
+  if (samples >= enough) facts.prior_angle = glm::degrees(sum / static_cast<double>(samples));
+}
+
+void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& facts) {
+  const ViewSource& source = capture.images->source(facts.view->id);
+  const Tensor<uint8_t> colour = decode_colour(source).colour;
+  measure_colour(colour, facts);
+  facts.noise = noise_deviation(colour, {});
+  Tensor<uint8_t> mask;
+  if (source.mask) {
+    mask = decode_mask(source).mask;
+    facts.masked_noise = noise_deviation(colour, mask);
+    const auto on = std::count(mask.data(), mask.data() + mask.size(), uint8_t{1});
+    facts.masked = static_cast<double>(on) / static_cast<double>(mask.size());
+  }
+  if (source.has_prior()) measure_prior(capture, mask, surface, facts);
+  load_truth(capture, *facts.view);
+}
+
+}  // namespace
+
+std::optional<double> exposure_of(const Tensor<uint8_t>& grey) {
+  constexpr uint8_t darkest = 8;       // below it is the black of a background, or noise
+  constexpr int64_t least_share = 50;  // one pixel of so many must be brighter
+  constexpr double display_gamma = 2.2;
+  double sum = 0;
+  int64_t count = 0;
+  for (const uint8_t v : grey.values()) {
+    if (v < darkest) continue;
+    sum += std::log2(v / 255.0);
+    ++count;
+  }
+  if (count * least_share < grey.size() || count == 0) return std::nullopt;
+  return display_gamma * sum / static_cast<double>(count);
+}
+
+ViewFacts measure_view(const Capture& capture, const View& view, const SurfacePoints& surface) {
+  ViewFacts facts;
+  facts.view = &view;
+  try {
+    measure(capture, surface, facts);
+  } catch (const InputError& error) {
+    facts = {};
+    facts.view = &view;
+    facts.broken = error.what();
+  }
+  return facts;
+}
+
+}  // namespace traceflow

@@ -1,0 +1,188 @@
+#include "viz/cameras/path_curve.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/error.h"
+#include "math/rotation.h"
+
+namespace traceflow::viz {
+
+namespace {
+
+using V = Vec3<double>;
+using Q = Vec4<double>;
+
+Q product(const Q& a, const Q& b) {
+  const V u(a[1], a[2], a[3]), v(b[1], b[2], b[3]);
+  const V w = a[0] * v + b[0] * u + cross(u, v);
+  return {a[0] * b[0] - dot(u, v), w.x, w.y, w.z};
+}
+Q inverse(const Q& q) { return {q[0], -q[1], -q[2], -q[3]}; }
+
+// Half the turn from a to b, seen from a: the shorter of the two ways.
+V half_turn(const Q& a, const Q& b) {
+  Q d = product(inverse(a), b);
+  if (d[0] < 0) d = -d;
+  const V axis(d[1], d[2], d[3]);
+  const double sine = length(axis);
+  return sine < 1e-12 ? axis : axis * (std::atan2(sine, d[0]) / sine);
+}
+Q from_half_turn(const V& v) {
+  const double angle = length(v);
+  const V axis = v * (angle < 1e-12 ? 1 : std::sin(angle) / angle);
+  return {std::cos(angle), axis.x, axis.y, axis.z};
+}
+
+// Of a rotation matrix, by its largest component.
+Q quaternion_of(const Mat3<double>& r) {
+  const auto at = [&](int row, int column) { return r[column][row]; };
+  std::array<double, 4> squares{};  // four times each component's square
+  for (size_t i = 0; i < 4; ++i) {
+    const auto sign = [&](size_t axis) { return i == 0 || i == axis ? 1.0 : -1.0; };
+    squares[i] = 1 + sign(1) * at(0, 0) + sign(2) * at(1, 1) + sign(3) * at(2, 2);
+  }
+  Q q;
+  switch (std::max_element(squares.begin(), squares.end()) - squares.begin()) {
+    case 0:
+      q = {squares[0], at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1)};
+      break;
+    case 1:
+      q = {at(2, 1) - at(1, 2), squares[1], at(1, 0) + at(0, 1), at(0, 2) + at(2, 0)};
+      break;
+    case 2:
+      q = {at(0, 2) - at(2, 0), at(1, 0) + at(0, 1), squares[2], at(2, 1) + at(1, 2)};
+      break;
+    default:
+      q = {at(1, 0) - at(0, 1), at(0, 2) + at(2, 0), at(2, 1) + at(1, 2), squares[3]};
+  }
+  return q / length(q);
+}
+
+Q between(const Q& a, const Q& b, double u) { return product(a, from_half_turn(u * half_turn(a, b))); }
+
+// The quaternions' Bézier curve by de Casteljau.
+Q bezier(std::array<Q, 4> q, double u) {
+  for (size_t level = 3; level > 0; --level) {
+    for (size_t i = 0; i < level; ++i) q.at(i) = between(q.at(i), q.at(i + 1), u);
+  }
+  return q[0] / length(q[0]);
+}
+
+// The cubic from a to b with these slopes at its ends, h apart.
+template <class T>
+T hermite(const T& a, const T& slope_a, const T& b, const T& slope_b, double h, double u) {
+  const double v = 1 - u;
+  return a * (v * v * (1 + 2 * u)) + b * (u * u * (1 + 2 * v)) + slope_a * (h * u * v * v) -
+         slope_b * (h * u * u * v);
+}
+
+// Of values at keys `steps` apart, slopes between which the cubics stay monotone (Fritsch, Butland): the
+// secants' harmonic mean, or 0 at a turning point. Where the path goes round, the first and the last key are
+// one.
+std::vector<double> monotone_slopes(const std::vector<double>& values, const std::vector<double>& steps,
+                                    bool round) {
+  const size_t segments = steps.size();
+  std::vector<double> secants(segments), slopes(segments + 1, 0);
+  for (size_t i = 0; i < segments; ++i) secants[i] = (values[i + 1] - values[i]) / steps[i];
+  const auto slope = [&](size_t before, size_t after) {
+    const double a = secants[before], b = secants[after];
+    if (a * b <= 0) return 0.0;
+    const double h = steps[before], k = steps[after];
+    return 3 * (h + k) / ((2 * k + h) / a + (k + 2 * h) / b);
+  };
+  if (segments == 0) return slopes;
+  for (size_t i = 1; i < segments; ++i) slopes[i] = slope(i - 1, i);
+  slopes.front() = round ? slope(segments - 1, 0) : secants.front();
+  slopes.back() = round ? slopes.front() : secants.back();
+  return slopes;
+}
+
+// The non-uniform mean of two slopes at a key, that of the shorter side counting more; at rest where either
+// side is.
+V joined(const V& before, double h, const V& after, double k) {
+  const double a = length(before), b = length(after);
+  if (!(a > 0 && b > 0)) return V(0);
+  return (before * k + after * h) / (h + k);
+}
+
+}  // namespace
+
+PathCurve::PathCurve(const CameraPath& path) : closed_(path.closed), keys_(path.keyframes) {
+  require(!keys_.empty(), "a path has a keyframe");
+  if (closed_) keys_.push_back(keys_.front());
+  const size_t segments = keys_.size() - 1;
+  std::vector<double> durations(segments), steps(segments), fovs, times;
+  starts_ = knots_ = {0};
+  for (size_t i = 0; i < segments; ++i) {
+    durations[i] = keys_[i].seconds;
+    steps[i] = std::sqrt(length(keys_[i + 1].position - keys_[i].position));
+    starts_.push_back(starts_.back() + durations[i]);
+    knots_.push_back(knots_.back() + steps[i]);
+  }
+  for (const Keyframe& key : keys_) {
+    fovs.push_back(key.fov_y);
+    times.push_back(key.time);
+    rotations_.push_back(quaternion_of(key.world_from_camera));
+  }
+  knot_slopes_ = monotone_slopes(knots_, durations, closed_);
+  fov_slopes_ = monotone_slopes(fovs, durations, closed_);
+  time_slopes_ = monotone_slopes(times, durations, closed_);
+
+  tangents_.assign(keys_.size(), V(0));
+  const auto secant = [&](size_t i) {
+    return steps[i] > 0 ? (keys_[i + 1].position - keys_[i].position) / steps[i] : V(0);
+  };
+  for (size_t i = 1; i < segments; ++i)
+    tangents_[i] = joined(secant(i - 1), steps[i - 1], secant(i), steps[i]);
+  if (segments > 0) {
+    tangents_.front() = closed_ ? joined(secant(segments - 1), steps.back(), secant(0), steps[0]) : secant(0);
+    tangents_.back() = closed_ ? tangents_.front() : secant(segments - 1);
+  }
+  turn(durations);
+}
+
+void PathCurve::turn(const std::vector<double>& durations) {
+  const size_t segments = durations.size();
+  turns_.assign(keys_.size(), V(0));
+  // In the axes of the key that is turned away from, and towards: a turn's axis is the same in both.
+  const auto rate = [&](size_t i) { return half_turn(rotations_[i], rotations_[i + 1]) / durations[i]; };
+  // As for monotone values: no faster than thrice the slower side.
+  const auto joint = [&](size_t before, size_t after) {
+    const V a = rate(before), b = rate(after);
+    const V mean = joined(a, durations[before], b, durations[after]);
+    const double most = 3 * std::min(length(a), length(b)), now = length(mean);
+    return now > most ? mean * (most / now) : mean;
+  };
+  for (size_t i = 1; i < segments; ++i) turns_[i] = joint(i - 1, i);
+  if (segments == 0) return;
+  turns_.front() = closed_ ? joint(segments - 1, 0) : rate(0);
+  turns_.back() = closed_ ? turns_.front() : rate(segments - 1);
+}
+
+Pose PathCurve::at(double seconds) const {
+  if (keys_.size() == 1) return keys_.front();
+  const double t = std::clamp(seconds, 0.0, duration());
+  const auto after = std::upper_bound(starts_.begin(), starts_.end() - 1, t);
+  const auto i = static_cast<size_t>(std::max<std::ptrdiff_t>(1, after - starts_.begin())) - 1;
+  const double h = starts_[i + 1] - starts_[i], u = std::clamp((t - starts_[i]) / h, 0.0, 1.0);
+
+  Pose pose = keys_[i];
+  pose.fov_y = hermite(keys_[i].fov_y, fov_slopes_[i], keys_[i + 1].fov_y, fov_slopes_[i + 1], h, u);
+  pose.time = hermite(keys_[i].time, time_slopes_[i], keys_[i + 1].time, time_slopes_[i + 1], h, u);
+  if (const double step = knots_[i + 1] - knots_[i]; step > 0) {
+    const double knot = hermite(knots_[i], knot_slopes_[i], knots_[i + 1], knot_slopes_[i + 1], h, u);
+    pose.position = hermite(keys_[i].position, tangents_[i], keys_[i + 1].position, tangents_[i + 1], step,
+                            std::clamp((knot - knots_[i]) / step, 0.0, 1.0));
+  }
+  const Q &a = rotations_[i], &b = rotations_[i + 1];
+  const Q q = bezier({a, product(a, from_half_turn(turns_[i] * (h / 3))),
+                      product(b, from_half_turn(turns_[i + 1] * (-h / 3))), b},
+                     u);
+  pose.world_from_camera = rotation_from_quaternion(q);
+  pose.time = std::clamp(pose.time, 0.0, 1.0);
+  return pose;
+}
+
+}  // namespace traceflow::viz

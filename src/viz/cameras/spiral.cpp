@@ -1,0 +1,56 @@
+#include "viz/cameras/spiral.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "base/error.h"
+#include "viz/cameras/look_at.h"
+
+namespace traceflow::viz {
+
+namespace {
+
+using V = Vec3<double>;
+
+constexpr double turns = 2;
+constexpr double depth_turns = 1;
+constexpr double least_share = 1.0 / 50;
+
+// How far nine of ten cameras stand from the mean along an axis, at most.
+double reach_along(const std::vector<Camera<float>>& cameras, const V& middle, const V& axis) {
+  std::vector<double> distances;
+  distances.reserve(cameras.size());
+  for (const Camera<float>& c : cameras) distances.push_back(std::abs(dot(V(c.position) - middle, axis)));
+  const auto most = distances.begin() + static_cast<std::ptrdiff_t>((distances.size() - 1) * 9 / 10);
+  std::nth_element(distances.begin(), most, distances.end());
+  return *most;
+}
+
+}  // namespace
+
+std::vector<Shot> spiral_around_cameras(const std::vector<Camera<float>>& cameras, int frames) {
+  require(!cameras.empty(), "a spiral has cameras to go by");
+  const Aim aim = aim_of(cameras);
+  const V middle = aim.middle, z = aim.forward, up = aim.up;
+  const V x = unit(cross(z, up), perpendicular(z)), y = cross(z, x);
+  const double distance = length(aim.target - middle);
+  const double wide = std::max(reach_along(cameras, middle, x), least_share * distance);
+  const double high = std::max(reach_along(cameras, middle, y), least_share * distance);
+  // Never through what is looked at.
+  const double deep = std::min(reach_along(cameras, middle, z), distance / 2);
+
+  std::vector<Shot> shots;
+  for (int i = 0; i < frames; ++i) {
+    const double angle = 2 * std::numbers::pi * i / frames;
+    const V from = middle + wide * std::cos(turns * angle) * x - high * std::sin(turns * angle) * y -
+                   deep * std::sin(depth_turns * angle) * z;
+    shots.push_back({fmt::format("{:05}", i), std::nullopt,
+                     looking(cameras.front(), from, unit(aim.target - from, z), up)});
+  }
+  return shots;
+}
+
+}  // namespace traceflow::viz

@@ -1,0 +1,160 @@
+#include "viz/subject.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include "files/options_json.h"
+#include "ops/deform/deform.h"
+#include "ops/lighting/lighting.h"
+#include "ops/motion/motion.h"
+#include "ops/motion/nodes.h"
+#include "scene/ply.h"
+#include "scene/rows.h"
+
+namespace traceflow::viz {
+
+namespace {
+
+// Names of the notes in a .ply's comments.
+constexpr const char* extent_note = "extent";
+constexpr const char* focal_note = "focal";
+constexpr const char* render_note = "render";
+constexpr const char* environment_note = "environment";
+constexpr const char* main_file = "main.ply";
+constexpr const char* environment_file = "environment.ply";
+
+std::string note(const PlyScene& file, const char* key) {
+  const auto found = file.notes.find(key);
+  return found == file.notes.end() ? "" : found->second;
+}
+
+// The number in a note; 0 where the note is not there.
+float number_in(const PlyScene& file, const char* key, const std::filesystem::path& path) {
+  const std::string text = note(file, key);
+  if (text.empty()) return 0;
+  float number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || !(number > 0) || !std::isfinite(number)) {
+    throw InputError(path.string(), fmt::format("comment traceflow {}", key), text, "a positive number");
+  }
+  return number;
+}
+
+// The environment's file as the note names it: a name in the same folder, and nothing else.
+std::filesystem::path beside(const std::filesystem::path& path, const std::string& name) {
+  const std::filesystem::path file(name);
+  if (file.filename() != file || name == "." || name == "..") {
+    throw InputError(path.string(), "comment traceflow environment", name, "the name of a file beside it");
+  }
+  return path.parent_path() / file;
+}
+
+bool finite_row(const Tensor<float>& tensor, int64_t row) {
+  const float* values = tensor.row(row);
+  return std::all_of(values, values + tensor.row_size(), [](float v) { return std::isfinite(v); });
+}
+
+// Stored values with the field's residuals added, still before activation. Surfels that are not finite are
+// left out, as pictures leave them out.
+Surfels posed(const Surfels& stored, const Field* field, const Nodes* nodes, const Motion* motion,
+              const Lighting* lighting, std::optional<float> time, field::Precision precision) {
+  Surfels result =
+      field != nullptr && time ? deform::displaced(stored, *field, *time, precision) : Surfels(stored);
+  if (nodes != nullptr && time) nodes::bend(*nodes, stored.body, *time, result);
+  if (motion != nullptr && time) motion::move(*motion, stored.body, *time, result);
+  if (lighting != nullptr && time) lighting::light(*lighting, stored.body, *time, result);
+  RowEdit finite;
+  for (int64_t i = 0; i < result.count(); ++i) {
+    bool all = true;
+    result.for_each([&](const char*, const Tensor<float>& tensor) { all = all && finite_row(tensor, i); });
+    if (all) finite.keep(i);
+  }
+  if (finite.count() < result.count()) edit_rows(result, finite);
+  return result;
+}
+
+}  // namespace
+
+Subject read_ply_subject(const std::filesystem::path& path, const std::filesystem::path& environment) {
+  PlyScene file = read_ply(path);
+  Subject subject;
+  subject.scene.specular = Specular::none;
+  subject.scene.extent = number_in(file, extent_note, path);
+  subject.scene.focal = number_in(file, focal_note, path);
+  if (const std::string text = note(file, render_note); !text.empty()) {
+    options_from_json(text, option_fields(subject.render), path.string() + ": comment traceflow render");
+    subject.render.validate();
+  }
+  subject.scene.main = std::move(file.surfels);
+
+  std::filesystem::path reflected = environment;
+  if (reflected.empty() && !note(file, environment_note).empty()) {
+    reflected = beside(path, note(file, environment_note));
+    if (!std::filesystem::exists(reflected)) {
+      subject.warning = reflected.string() + " is not there: pictures are without reflections";
+      reflected.clear();
+    }
+  }
+  if (!reflected.empty()) {
+    subject.scene.environment = read_ply(reflected).surfels;
+    subject.scene.environment.tint_logit = subject.scene.environment.roughness_logit = Tensor<float>();
+    subject.scene.specular = Specular::environment_gaussians;
+    if (!subject.scene.main.has_tint()) {
+      subject.warning = path.string() + " has no tint: pictures are without reflections";
+    }
+  }
+  return subject;
+}
+
+float extent_seen_from(const Surfels& surfels, const std::vector<Shot>& shots) {
+  Vec3<double> middle(0);
+  for (const Shot& shot : shots)
+    middle += Vec3<double>(shot.camera.position) / static_cast<double>(shots.size());
+  std::vector<float> distances;
+  for (int64_t i = 0; i < surfels.count(); ++i) {
+    const auto d = static_cast<float>(length(load3<double>(surfels.position.row(i)) - middle));
+    if (std::isfinite(d)) distances.push_back(d);
+  }
+  if (distances.empty()) return 1;
+  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), median, distances.end());
+  return *median > 0 ? *median : 1;
+}
+
+std::vector<std::filesystem::path> export_subject(const Subject& subject, std::optional<float> time,
+                                                  const std::filesystem::path& folder) {
+  const Scene& scene = subject.scene;
+  const FrameRequest& request = subject.request;
+  const auto make = [&](const Surfels& stored, const std::optional<Field>& field, const Nodes* nodes,
+                        const Motion* motion, const Lighting* lighting, bool deform) {
+    PlyScene file;
+    file.surfels = posed(stored, deform && field ? &*field : nullptr, nodes, motion, lighting, time,
+                         subject.render.precision);
+    undo_normalisation(scene.normalisation, file.surfels);
+    file.notes[extent_note] = fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale));
+    if (scene.focal > 0) file.notes[focal_note] = fmt::format("{}", scene.focal);
+    return file;
+  };
+  const bool reflects =
+      request.specular && scene.specular == Specular::environment_gaussians && scene.environment.count() > 0;
+
+  std::filesystem::create_directories(folder);
+  std::vector<std::filesystem::path> written = {folder / main_file};
+  PlyScene main = make(scene.main, scene.main_field, scene.main_nodes ? &*scene.main_nodes : nullptr,
+                       scene.main_motion ? &*scene.main_motion : nullptr,
+                       scene.lighting ? &*scene.lighting : nullptr, request.deform_main);
+  main.notes[render_note] = options_to_json(subject.render);
+  if (reflects) {
+    written.push_back(folder / environment_file);
+    main.notes[environment_note] = environment_file;
+    write_ply(written[1], make(scene.environment, scene.environment_field, nullptr, nullptr, nullptr,
+                               request.deform_environment));
+  }
+  write_ply(written[0], main);
+  return written;
+}
+
+}  // namespace traceflow::viz
