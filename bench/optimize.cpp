@@ -41,7 +41,7 @@ void adam_surfels_on_device(benchmark::State& state) {
   if (bench::no_device(state)) return;
   OnDevice d;
   bench::surfels_on_device(state.range(0), state.range(0) == bench::main_surfels, 1)
-      .for_each([&](const char*, const Tensor<float>& group) { d.add(group); });
+      .for_each([&](const std::string&, const Tensor<float>& group) { d.add(group); });
   bench::time_on_device(state, d.floor(), [&] { d.step(); });
 }
 BENCHMARK(adam_surfels_on_device)->Apply(bench::both_sets);

@@ -41,4 +41,11 @@ void check_option(bool condition, const std::string& name, const T& found, const
   }
 }
 
+inline void check_share(float value, const char* name) {
+  check_option(value >= 0 && value <= 1, name, value, "0 to 1");
+}
+inline void check_not_negative(double value, const char* name) {
+  check_option(value >= 0, name, value, "0 or more");
+}
+
 }  // namespace traceflow

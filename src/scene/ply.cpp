@@ -6,6 +6,8 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "base/atomic_file.h"
@@ -65,9 +67,10 @@ class ColumnPlan {
  public:
   ColumnPlan(std::string path, const PlyHeader& header) : path_(std::move(path)), header_(header) {}
 
-  // Maps properties prefix_0, prefix_1, … (or the given names) to consecutive numbers of a tensor's row.
-  void add(const std::vector<std::string>& names, Tensor<float>& tensor) {
-    for (size_t i = 0; i < names.size(); ++i) add_one(names[i], tensor, static_cast<int64_t>(i));
+  // Maps properties to consecutive numbers of a tensor's row; empty names are left out.
+  void add(std::span<const std::string_view> names, Tensor<float>& tensor) {
+    for (size_t i = 0; i < names.size() && !names[i].empty(); ++i)
+      add_one(std::string(names[i]), tensor, static_cast<int64_t>(i));
   }
   void add_one(const std::string& name, Tensor<float>& tensor, int64_t number) {
     const PlyProperty* p = header_.find(name);
@@ -84,10 +87,12 @@ class ColumnPlan {
 
 // Before memory is taken: a header that lacks an attribute could promise any number of rows.
 void require_attributes(const std::string& path, const PlyHeader& header) {
-  for (const char* name : {"x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity", "scale_0", "scale_1",
-                           "rot_0", "rot_1", "rot_2", "rot_3"}) {
-    if (header.find(name) == nullptr) missing_attribute(path, name);
-  }
+  for_each_field([&](const SurfelField& field) {
+    for (const std::string_view name : field.ply) {
+      if (!field.is_optional && !name.empty() && header.find(std::string(name)) == nullptr)
+        missing_attribute(path, std::string(name));
+    }
+  });
 }
 
 int rest_count(const std::string& path, const PlyHeader& header) {
@@ -159,29 +164,21 @@ PlyScene read_ply(const std::filesystem::path& path) {
   PlyScene scene;
   scene.notes = header.notes;
   Surfels& s = scene.surfels;
-  s.position = Tensor<float>(Shape{n, 3});
-  s.log_scale = Tensor<float>(Shape{n, 2});
-  s.rotation = Tensor<float>(Shape{n, 4});
-  s.opacity_logit = Tensor<float>(Shape{n});
-  s.sh = Tensor<float>(Shape{n, k, 3});
   ColumnPlan plan(path.string(), header);
-  plan.add({"x", "y", "z"}, s.position);
-  plan.add({"scale_0", "scale_1"}, s.log_scale);
-  plan.add({"rot_0", "rot_1", "rot_2", "rot_3"}, s.rotation);
-  plan.add({"opacity"}, s.opacity_logit);
-  plan.add({"f_dc_0", "f_dc_1", "f_dc_2"}, s.sh);
+  for_each_field(
+      [&](const SurfelField& field, Tensor<float>& tensor) {
+        if (field.is_optional && header.find(std::string(field.ply[0])) == nullptr) return;
+        tensor = Tensor<float>(field.width == 0   ? Shape{n, k, 3}
+                               : field.width == 1 ? Shape{n}
+                                                  : Shape{n, field.width});
+        plan.add(field.ply, tensor);
+      },
+      s);
   for (int64_t channel = 0; channel < 3; ++channel) {
     for (int64_t c = 1; c < k; ++c) {
       plan.add_one("f_rest_" + std::to_string(channel * (k - 1) + c - 1), s.sh, 3 * c + channel);
     }
   }
-  const auto add_where_there_is = [&](const char* name, Tensor<float>& logit) {
-    if (header.find(name) == nullptr) return;
-    logit = Tensor<float>(Shape{n});
-    plan.add({name}, logit);
-  };
-  add_where_there_is("tint", s.tint_logit);
-  add_where_there_is("roughness", s.roughness_logit);
   read_rows(file, header, plan.columns());
   return scene;
 }

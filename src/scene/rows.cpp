@@ -44,11 +44,12 @@ Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, b
 }
 
 Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit) {
-  Surfels result{edited_rows(surfels.position, edit, false), edited_rows(surfels.log_scale, edit, false),
-                 edited_rows(surfels.rotation, edit, false), edited_rows(surfels.opacity_logit, edit, false),
-                 edited_rows(surfels.sh, edit, false),       {}};
-  if (surfels.has_tint()) result.tint_logit = edited_rows(surfels.tint_logit, edit, false);
-  if (surfels.has_roughness()) result.roughness_logit = edited_rows(surfels.roughness_logit, edit, false);
+  Surfels result;
+  for_each_field(
+      [&](const SurfelField& field, const Tensor<float>& from, Tensor<float>& to) {
+        if (!field.is_optional || !from.empty()) to = edited_rows(from, edit, false);
+      },
+      surfels, result);
   if (!surfels.body.empty()) result.body = take_rows(surfels.body, edit, false);
   return result;
 }
@@ -62,18 +63,17 @@ void append_rows(Surfels& surfels, const Surfels& more) {
     std::ranges::copy(more.body.values(), body.data() + surfels.count());
     surfels.body = std::move(body);
   }
-  std::vector<const Tensor<float>*> added;
-  more.for_each([&](const char*, const Tensor<float>& tensor) { added.push_back(&tensor); });
-  size_t group = 0;
-  surfels.for_each([&](const char* name, Tensor<float>& tensor) {
-    require(group < added.size() && added[group]->row_size() == tensor.row_size(),
-            "both sets have the same groups", name);
-    const Tensor<float>& tail = *added[group++];
-    Tensor<float> joined(with_rows(tensor.shape(), tensor.dim(0) + tail.dim(0)));
-    std::copy(tensor.data(), tensor.data() + tensor.size(), joined.data());
-    std::copy(tail.data(), tail.data() + tail.size(), joined.data() + tensor.size());
-    tensor = std::move(joined);
-  });
+  for_each_field(
+      [](const SurfelField& field, Tensor<float>& tensor, const Tensor<float>& tail) {
+        require(tail.empty() == tensor.empty() && (tail.empty() || tail.row_size() == tensor.row_size()),
+                "both sets have the same fields", std::string(field.name));
+        if (tensor.empty()) return;
+        Tensor<float> joined(with_rows(tensor.shape(), tensor.dim(0) + tail.dim(0)));
+        std::copy(tensor.data(), tensor.data() + tensor.size(), joined.data());
+        std::copy(tail.data(), tail.data() + tail.size(), joined.data() + tensor.size());
+        tensor = std::move(joined);
+      },
+      surfels, more);
 }
 
 }  // namespace traceflow

@@ -83,12 +83,14 @@ Surfels get_surfels(const std::string& prefix, const Safetensors& file) {
         "shapes " + surfels.position.shape().to_string() + " and " + surfels.sh.shape().to_string(),
         "N×3 positions and N×K×3 harmonics, K of 1, 4, 9 or 16");
   }
-  surfels.log_scale = take(file, prefix + "log_scale", {n, 2});
-  surfels.rotation = take(file, prefix + "rotation", {n, 4});
-  surfels.opacity_logit = take(file, prefix + "opacity_logit", {n});
-  if (file.has(prefix + "tint_logit")) surfels.tint_logit = take(file, prefix + "tint_logit", {n});
-  if (file.has(prefix + "roughness_logit"))
-    surfels.roughness_logit = take(file, prefix + "roughness_logit", {n});
+  for_each_field(
+      [&](const SurfelField& field, Tensor<float>& tensor) {
+        const std::string name = prefix + std::string(field.name);
+        if (field.name == "position" || field.name == "sh") return;  // above
+        if (field.is_optional && !file.has(name)) return;
+        tensor = take(file, name, field.width == 1 ? Shape{n} : Shape{n, field.width});
+      },
+      surfels);
   return surfels;
 }
 

@@ -13,7 +13,8 @@ Scene get_scene(const Safetensors& file);
 // One parameter set of the scene, for whoever stores something of the same shape (gradients, moments).
 template <class T>
 void put_surfels(const BasicSurfels<T>& surfels, const std::string& prefix, Safetensors& file) {
-  surfels.for_each([&](const char* name, const Tensor<T>& tensor) { file.add(prefix + name, tensor); });
+  surfels.for_each(
+      [&](const std::string& name, const Tensor<T>& tensor) { file.add(prefix + name, tensor); });
 }
 
 }  // namespace traceflow

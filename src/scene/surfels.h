@@ -1,6 +1,9 @@
 #pragma once
 
+#include <string>
+
 #include "base/tensor.h"
+#include "scene/surfel_fields.h"
 
 namespace traceflow {
 
@@ -29,23 +32,21 @@ struct BasicSurfels {
   Device device() const { return position.device(); }
   // The same set on a device.
   BasicSurfels on(Device device) const {
-    return {position.on(device), log_scale.on(device),  rotation.on(device), opacity_logit.on(device),
-            sh.on(device),       tint_logit.on(device), body.on(device),     roughness_logit.on(device)};
+    BasicSurfels result;
+    for_each_field([&](const SurfelField&, const Tensor<T>& from, Tensor<T>& to) { to = from.on(device); },
+                   *this, result);
+    result.body = body.on(device);
+    return result;
   }
 
   // The shapes of another set, on its device, in the memory that is there.
   void resize_like(const BasicSurfels& other) {
-    const Device device = other.device();
-    position.place(device).resize(other.position.shape());
-    log_scale.place(device).resize(other.log_scale.shape());
-    rotation.place(device).resize(other.rotation.shape());
-    opacity_logit.place(device).resize(other.opacity_logit.shape());
-    sh.place(device).resize(other.sh.shape());
-    tint_logit.place(device).resize(other.tint_logit.shape());
-    roughness_logit.place(device).resize(other.roughness_logit.shape());
+    for_each_field([&](const SurfelField&, const Tensor<T>& like,
+                       Tensor<T>& field) { field.place(other.device()).resize(like.shape()); },
+                   other, *this);
   }
 
-  // f(name, tensor) for every group, in the order above. An environment has neither tint nor roughness.
+  // f(name, tensor) for each field that the set has, in the order of for_each_field.
   template <class F>
   void for_each(F&& f) {
     visit(*this, f);
@@ -58,13 +59,11 @@ struct BasicSurfels {
  private:
   template <class Self, class F>
   static void visit(Self& self, F&& f) {
-    f("position", self.position);
-    f("log_scale", self.log_scale);
-    f("rotation", self.rotation);
-    f("opacity_logit", self.opacity_logit);
-    f("sh", self.sh);
-    if (!self.tint_logit.empty()) f("tint_logit", self.tint_logit);
-    if (!self.roughness_logit.empty()) f("roughness_logit", self.roughness_logit);
+    for_each_field(
+        [&](const SurfelField& field, auto& tensor) {
+          if (!field.is_optional || !tensor.empty()) f(std::string(field.name), tensor);
+        },
+        self);
   }
 };
 using Surfels = BasicSurfels<float>;
@@ -114,26 +113,20 @@ using PosedSurfels = BasicPosedSurfels<float>;
 // Zeros in the shapes of another set, on its device.
 template <class To, class From>
 BasicSurfels<To> zeros_like(const BasicSurfels<From>& s) {
-  const auto zeros = [&](const Tensor<From>& like) { return Tensor<To>(like.shape(), s.device()); };
-  return {zeros(s.position),
-          zeros(s.log_scale),
-          zeros(s.rotation),
-          zeros(s.opacity_logit),
-          zeros(s.sh),
-          zeros(s.tint_logit),
-          {},
-          zeros(s.roughness_logit)};
+  BasicSurfels<To> result;
+  for_each_field([&](const SurfelField&, const Tensor<From>& like,
+                     Tensor<To>& to) { to = Tensor<To>(like.shape(), s.device()); },
+                 s, result);
+  return result;
 }
 template <class To, class From>
 BasicSurfels<To> convert(const BasicSurfels<From>& s) {
-  return {convert<To>(s.position),
-          convert<To>(s.log_scale),
-          convert<To>(s.rotation),
-          convert<To>(s.opacity_logit),
-          convert<To>(s.sh),
-          convert<To>(s.tint_logit),
-          s.body,
-          convert<To>(s.roughness_logit)};
+  BasicSurfels<To> result;
+  for_each_field(
+      [&](const SurfelField&, const Tensor<From>& from, Tensor<To>& to) { to = convert<To>(from); }, s,
+      result);
+  result.body = s.body;
+  return result;
 }
 template <class To, class From>
 BasicPosedSurfels<To> convert(const BasicPosedSurfels<From>& s) {

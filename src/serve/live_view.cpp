@@ -1,6 +1,6 @@
 #include "serve/live_view.h"
 
-#include "train/event_log.h"
+#include "record/event_log.h"
 
 namespace traceflow::serve {
 

@@ -4,11 +4,11 @@
 #include <functional>
 
 #include "base/options.h"
+#include "record/events.h"
+#include "record/log_history.h"
 #include "serve/clients/clients.h"
 #include "serve/frame_server.h"
 #include "serve/time_share.h"
-#include "train/events.h"
-#include "train/log_history.h"
 
 namespace traceflow::serve {
 

@@ -4,10 +4,10 @@
 #include <functional>
 #include <optional>
 
+#include "record/log_tail.h"
 #include "serve/clients/clients.h"
 #include "serve/frame_server.h"
 #include "serve/run_watch.h"
-#include "train/log_tail.h"
 #include "viz/subject.h"
 
 namespace traceflow::serve {

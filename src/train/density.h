@@ -4,8 +4,8 @@
 
 #include "base/random.h"
 #include "files/safetensors.h"
+#include "record/events.h"
 #include "scene/rows.h"
-#include "train/events.h"
 #include "train/optimiser.h"
 #include "train/options.h"
 

@@ -8,9 +8,9 @@
 #include "base/parallel.h"
 #include "capture/image_cache.h"
 #include "files/png.h"
+#include "track/mask_parts.h"
 #include "train/box_mean.h"
 #include "train/initialise.h"
-#include "train/mask_parts.h"
 #include "train/random_walk.h"
 
 namespace traceflow {

@@ -12,10 +12,10 @@
 #include "math/symmetric_eigen.h"
 #include "scene/neighbours.h"
 #include "scene/rows.h"
-#include "train/bodies.h"
-#include "train/common_view.h"
+#include "track/bodies.h"
+#include "track/common_view.h"
+#include "track/true_poses.h"
 #include "train/initial_observations.h"
-#include "train/true_poses.h"
 
 namespace traceflow {
 

@@ -91,13 +91,9 @@ NonFiniteGradients StepNotes::report() const {
 }
 
 void SurfelMoments::reset_like(const Surfels& surfels) {
-  position = zero_state(surfels.position);
-  log_scale = zero_state(surfels.log_scale);
-  rotation = zero_state(surfels.rotation);
-  opacity_logit = zero_state(surfels.opacity_logit);
-  sh = zero_state(surfels.sh);
-  tint_logit = zero_state(surfels.tint_logit);
-  roughness_logit = zero_state(surfels.roughness_logit);
+  for_each_field([](const SurfelField&, optimize::AdamState& state,
+                    const Tensor<float>& field) { state = zero_state(field); },
+                 *this, surfels);
 }
 
 SurfelMoments SurfelMoments::edited(const PlacedEdit& edit) const {
@@ -105,8 +101,11 @@ SurfelMoments SurfelMoments::edited(const PlacedEdit& edit) const {
     if (from.first.empty()) return {};
     return {edited_rows(from.first, edit, true), edited_rows(from.second, edit, true), from.step};
   };
-  return {state(position), state(log_scale),  state(rotation),       state(opacity_logit),
-          state(sh),       state(tint_logit), state(roughness_logit)};
+  SurfelMoments result;
+  for_each_field(
+      [&](const SurfelField&, const optimize::AdamState& from, optimize::AdamState& to) { to = state(from); },
+      *this, result);
+  return result;
 }
 
 Optimiser::Optimiser(const Scene& scene) {
@@ -188,7 +187,7 @@ void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainabl
 template <class Self, class F>
 void Optimiser::for_each(Self& self, F&& f) {
   const auto surfels = [&](const std::string& set, auto& moments) {
-    moments.for_each([&](const char* name, auto& state) { f("adam/" + set + "/" + name, state); });
+    moments.for_each([&](const std::string& name, auto& state) { f("adam/" + set + "/" + name, state); });
   };
   const auto fields = [&](const std::string& name, auto& states) {
     for (size_t k = 0; k < states.size(); ++k) f("adam/" + name + "/" + std::to_string(k), states[k]);

@@ -11,20 +11,14 @@
 
 namespace traceflow {
 
-// Adam's state for every group of one set of surfels.
+// Adam's state for each field of one set of surfels.
 struct SurfelMoments {
   optimize::AdamState position, log_scale, rotation, opacity_logit, sh, tint_logit, roughness_logit;
 
-  // f(name, state) in the order of Surfels::for_each.
+  // f(name, state) for each field of surfels, in the order of for_each_field.
   template <class F>
   void for_each(F&& f) {
-    f("position", position);
-    f("log_scale", log_scale);
-    f("rotation", rotation);
-    f("opacity_logit", opacity_logit);
-    f("sh", sh);
-    f("tint_logit", tint_logit);
-    f("roughness_logit", roughness_logit);
+    for_each_field([&](const SurfelField& field, auto& state) { f(std::string(field.name), state); }, *this);
   }
   void reset_like(const Surfels& surfels);
   // Fresh rows get zero moments (method §7.7).

@@ -6,13 +6,6 @@ namespace traceflow {
 
 namespace {
 
-void check_share(float value, const char* name) {
-  check_option(value >= 0 && value <= 1, name, value, "0 to 1");
-}
-void check_not_negative(double value, const char* name) {
-  check_option(value >= 0, name, value, "0 or more");
-}
-
 // The numbers as published. Hidden layers in bf16 with fp32 sums, which is what tensor cores are fast at; the
 // encodings' layers keep more digits.
 TrainOptions paper_preset() {
@@ -178,22 +171,6 @@ void DensityOptions::validate(const std::string& group) const {
                "a positive number");
 }
 
-void TrackOptions::validate() const {
-  check_not_negative(warm_up, "deform.track.warm_up");
-  check_option(map_each > 0, "deform.track.map_each", map_each, "a positive number");
-  check_option(steps > 0, "deform.track.steps", steps, "a positive number");
-  check_not_negative(again, "deform.track.again");
-  check_option(window > 0, "deform.track.window", window, "a positive number");
-  check_not_negative(rounds, "deform.track.rounds");
-  check_not_negative(adjust, "deform.track.adjust");
-  check_not_negative(still, "deform.track.still");
-  check_not_negative(blur, "deform.track.blur");
-  check_not_negative(silhouette, "deform.track.silhouette");
-  check_not_negative(normal, "deform.track.normal");
-  check_not_negative(colour, "deform.track.colour");
-  check_not_negative(tracks, "deform.track.tracks");
-}
-
 void LightingOptions::validate() const {
   check_not_negative(cells, "deform.lighting.cells");
   check_option(cells == 0 || (cells >= 2 && cells <= 64), "deform.lighting.cells", cells, "0, or 2 to 64");
@@ -202,17 +179,6 @@ void LightingOptions::validate() const {
   check_not_negative(haste, "deform.lighting.haste");
   check_not_negative(roughness, "deform.lighting.roughness");
 }
-void BendOptions::validate() const {
-  check_not_negative(nodes, "deform.bend.nodes");
-  check_option(nodes <= 64, "deform.bend.nodes", nodes, "64 or fewer");
-  check_option(every > 0, "deform.bend.every", every, "a positive number");
-  check_not_negative(misfit, "deform.bend.misfit");
-  check_not_negative(better, "deform.bend.better");
-  check_not_negative(strain, "deform.bend.strain");
-  check_not_negative(haste, "deform.bend.haste");
-  check_not_negative(travel, "deform.bend.travel");
-}
-
 void DeformOptions::validate() const {
   check_not_negative(find, "deform.find");
   check_option(kind == "network" || kind == "nodes", "deform.kind", kind, "network or nodes");

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "base/device.h"
-#include "train/events.h"
+#include "record/events.h"
 
 namespace traceflow {
 

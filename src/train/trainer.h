@@ -9,13 +9,14 @@
 
 #include "base/random.h"
 #include "capture/capture.h"
+#include "record/events.h"
 #include "render/renderer.h"
 #include "scene/neighbours.h"
 #include "scene/run_folder.h"
+#include "track/tracker.h"
 #include "train/camera_refinement.h"
 #include "train/density.h"
 #include "train/divergence_monitor.h"
-#include "train/events.h"
 #include "train/initialise.h"
 #include "train/memory.h"
 #include "train/objective.h"
@@ -23,7 +24,6 @@
 #include "train/schedule.h"
 #include "train/step_meter.h"
 #include "train/targets.h"
-#include "train/tracker.h"
 
 namespace traceflow {
 

@@ -58,12 +58,12 @@ Mat3<double> rotation_in(const Tensor<double>& rows) {
   return matrix;
 }
 
-// each: bonds of a surfel.
-void check_neighbour_edges(const Neighbours& bonds, int64_t surfels, int64_t each) {
-  bool fits = bonds.index.shape() == Shape{surfels, each} && bonds.distance2.shape() == bonds.index.shape();
-  for (const int32_t j : bonds.index.values()) fits = fits && j >= -1 && j < surfels;
+// each: neighbours of a surfel.
+void check_neighbour_edges(const Neighbours& edges, int64_t surfels, int64_t each) {
+  bool fits = edges.index.shape() == Shape{surfels, each} && edges.distance2.shape() == edges.index.shape();
+  for (const int32_t j : edges.index.values()) fits = fits && j >= -1 && j < surfels;
   if (!fits) {
-    throw InputError("checkpoint", "bonds", bonds.index.shape().to_string(),
+    throw InputError("checkpoint", "bonds", edges.index.shape().to_string(),
                      Shape{surfels, each}.to_string());
   }
 }

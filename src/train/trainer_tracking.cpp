@@ -8,10 +8,10 @@
 #include "math/activation.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
-#include "train/bodies.h"
+#include "track/bodies.h"
+#include "track/prior_bias.h"
+#include "track/rescale.h"
 #include "train/initialise.h"
-#include "train/prior_bias.h"
-#include "train/rescale.h"
 #include "train/trainer.h"
 
 // The part of the loop that follows bodies from time to time before everything trains.

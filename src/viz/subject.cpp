@@ -69,7 +69,8 @@ Surfels posed(const Surfels& stored, const Field* field, const Nodes* nodes, con
   RowEdit finite;
   for (int64_t i = 0; i < result.count(); ++i) {
     bool all = true;
-    result.for_each([&](const char*, const Tensor<float>& tensor) { all = all && finite_row(tensor, i); });
+    result.for_each(
+        [&](const std::string&, const Tensor<float>& tensor) { all = all && finite_row(tensor, i); });
     if (all) finite.keep(i);
   }
   if (finite.count() < result.count()) edit_rows(result, finite);

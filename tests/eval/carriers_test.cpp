@@ -15,7 +15,7 @@ namespace {
 Surfels random_surfels(int64_t n, Random& random) {
   Surfels s{Tensor<float>(Shape{n, 3}), Tensor<float>(Shape{n, 2}),    Tensor<float>(Shape{n, 4}),
             Tensor<float>(Shape{n}),    Tensor<float>(Shape{n, 1, 3}), Tensor<float>(Shape{n})};
-  s.for_each([&](const char*, Tensor<float>& t) {
+  s.for_each([&](const std::string&, Tensor<float>& t) {
     for (float& v : t.values()) v = static_cast<float>(random.normal());
   });
   return s;

@@ -7,7 +7,7 @@
 
 #include "files/json_document.h"
 #include "fuzz/scratch_file.h"
-#include "train/log_history.h"
+#include "record/log_history.h"
 
 using namespace traceflow;
 using fuzz::can_read;

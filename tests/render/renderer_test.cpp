@@ -453,7 +453,7 @@ TEST(Renderer, AnEmptyViewIsBackground) {
   SceneGradient gradient;
   gradient.reset(f.scene);
   renderer.backward(f.scene, f.request, Trainable{}, grad, gradient);
-  gradient.main.for_each([](const char* name, const Tensor<float>& t) {
+  gradient.main.for_each([](const std::string& name, const Tensor<float>& t) {
     for (const float v : t.values()) ASSERT_EQ(v, 0) << name;
   });
 }

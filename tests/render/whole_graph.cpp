@@ -68,13 +68,13 @@ std::vector<float> flat(const SceneGradient& g, const Scene& scene) {
     const Tensor<float> t = placed.on(Device::cpu);
     all.insert(all.end(), t.values().begin(), t.values().end());
   };
-  g.main.for_each([&](const char*, const Tensor<float>& t) { take(t); });
+  g.main.for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
   g.main_field.for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
   if (scene.environment_map) take(g.environment_map.logit);
   if (scene.specular == Specular::environment_map) {
     g.environment_map.field->for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
   } else {
-    g.environment.for_each([&](const char*, const Tensor<float>& t) { take(t); });
+    g.environment.for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
     g.environment_field.for_each([&](const std::string&, const Tensor<float>& t) { take(t); });
   }
   for (int i = 0; i < 9; ++i) all.push_back(g.camera.camera_from_world[i / 3][i % 3]);

@@ -27,9 +27,9 @@ template <class F>
 void for_each_group(reference::Parameters& p, reference::Gradient& g, const F& f) {
   const auto surfels = [&](const std::string& set, BasicSurfels<double>& a, BasicSurfels<double>& b) {
     std::vector<Tensor<double>*> gradients;
-    b.for_each([&](const char*, Tensor<double>& t) { gradients.push_back(&t); });
+    b.for_each([&](const std::string&, Tensor<double>& t) { gradients.push_back(&t); });
     size_t k = 0;
-    a.for_each([&](const char* name, Tensor<double>& t) {
+    a.for_each([&](const std::string& name, Tensor<double>& t) {
       f(set + "." + name, t.values(), gradients[k++]->values());
     });
   };

@@ -50,7 +50,7 @@ Surfels random_surfels(int64_t n, int64_t coefficients, bool tint) {
   s.sh = Tensor<float>(Shape{n, coefficients, 3});
   if (tint) s.tint_logit = Tensor<float>(Shape{n});
   if (tint && coefficients > 1) s.roughness_logit = Tensor<float>(Shape{n});
-  s.for_each([&](const char*, Tensor<float>& t) {
+  s.for_each([&](const std::string&, Tensor<float>& t) {
     for (float& v : t.values()) v = static_cast<float>(random.normal());
   });
   return s;

@@ -5,8 +5,8 @@
 
 #include <thread>
 
+#include "record/event_log.h"
 #include "serve/clients/fake_page.h"
-#include "train/event_log.h"
 #include "train/small_run.h"
 
 namespace traceflow::serve {

@@ -6,9 +6,9 @@
 #include <fstream>
 #include <new>
 
+#include "record/event_log.h"
 #include "serve/clients/fake_page.h"
 #include "support/temp_folder.h"
-#include "train/event_log.h"
 #include "train/small_run.h"
 
 namespace traceflow::serve {

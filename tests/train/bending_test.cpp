@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "ops/motion/nodes.h"
-#include "train/bodies.h"
-#include "train/events.h"
+#include "record/events.h"
+#include "track/bodies.h"
 #include "train/small_run.h"
 #include "train/tumbling.h"
 

@@ -1,5 +1,5 @@
-#include "train/bodies.h"
-#include "train/ball_body.h"
+#include "track/bodies.h"
+#include "track/ball_body.h"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +13,10 @@
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "support/refusal.h"
+#include "track/mask_parts.h"
+#include "track/tracker.h"
 #include "train/initialise.h"
-#include "train/mask_parts.h"
 #include "train/small_run.h"
-#include "train/tracker.h"
 #include "train/tumbling.h"
 
 namespace traceflow {

@@ -1,4 +1,4 @@
-#include "train/body_parts.h"
+#include "track/body_parts.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include "base/random.h"
 #include "math/rotation.h"
 #include "math/rotation_group.h"
+#include "track/tracker.h"
 #include "train/schedule.h"
-#include "train/tracker.h"
 #include "train/tumbling.h"
 
 namespace traceflow {

@@ -31,7 +31,7 @@ struct Set {
       surfels.tint_logit[i] = static_cast<float>(i);
     }
     moments.reset_like(surfels);
-    moments.for_each([](const char*, optimize::AdamState& state) {
+    moments.for_each([](const std::string&, optimize::AdamState& state) {
       state.first.fill(1);
       state.second.fill(2);
     });
@@ -169,7 +169,7 @@ TEST(Density, NewSurfelsHaveZeroMomentsAndOldOnesKeepTheirs) {
   signal(control, 4, {0});
   Random random(1);
   control.update(set.surfels, set.moments, {size, 1000}, random);
-  set.moments.for_each([](const char* name, optimize::AdamState& state) {
+  set.moments.for_each([](const std::string& name, optimize::AdamState& state) {
     const int64_t row = state.first.row_size();
     for (int64_t k = 0; k < row; ++k) {
       EXPECT_EQ(state.first[3 * row + k], 1) << name;

@@ -83,7 +83,7 @@ TEST(Initialise, CoincidentAndSinglePointsStayFinite) {
   Random random(1);
   for (const int64_t count : {1, 2, 40}) {
     const Surfels s = surfels_at_points(Tensor<float>({count, 3}), InitialOptions{}, random);
-    s.for_each([](const char* name, const Tensor<float>& t) {
+    s.for_each([](const std::string& name, const Tensor<float>& t) {
       for (const float v : t.values()) ASSERT_TRUE(std::isfinite(v)) << name;
     });
   }

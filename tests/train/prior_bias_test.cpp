@@ -1,4 +1,4 @@
-#include "train/prior_bias.h"
+#include "track/prior_bias.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,9 @@
 #include "math/rotation.h"
 #include "math/rotation_group.h"
 #include "support/refusal.h"
-#include "train/ball_body.h"
+#include "track/ball_body.h"
+#include "track/tracker.h"
 #include "train/small_run.h"
-#include "train/tracker.h"
 #include "train/trainer.h"
 #include "train/tumbling.h"
 

@@ -1,4 +1,4 @@
-#include "train/rescale.h"
+#include "track/rescale.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 #include "ops/deform/deform.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
-#include "train/ball_body.h"
+#include "track/ball_body.h"
 #include "train/tumbling.h"
 
 namespace traceflow {

@@ -6,7 +6,7 @@
 
 #include <functional>
 #include <vector>
-#include "train/tracker.h"
+#include "track/tracker.h"
 
 namespace traceflow {
 namespace {

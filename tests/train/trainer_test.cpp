@@ -349,10 +349,10 @@ TEST(Trainer, ARefusedResumeLeavesADamagedCheckpointWhereItIs) {
   EXPECT_EQ(bytes_of(run.damaged_checkpoint()), "damaged");
 }
 
-TEST(Trainer, BondsThatDoNotFitTheSurfelsAreRefused) {
+TEST(Trainer, NeighbourEdgesThatDoNotFitTheSurfelsAreRefused) {
   TrainOptions options = small_run(6);
-  options.deform.kind = "network";  // which bonds hold from the first iterations on
-  Trainer trainer = make_trainer(options, "bonds");
+  options.deform.kind = "network";  // whose neighbours are known from the first iterations on
+  Trainer trainer = make_trainer(options, "neighbour_edges");
   trainer.run(never);
   const RunFolder run{fs::path(::testing::TempDir()) / ("neighbour_edges_" + std::to_string(::getpid()))};
   const Safetensors sound = Safetensors::read(run.checkpoint());

@@ -9,7 +9,7 @@
 
 #include "capture/motion_truth.h"
 #include "math/similarity_fit.h"
-#include "train/bodies.h"
+#include "track/bodies.h"
 #include "train/initialise.h"
 #include "train/small_run.h"
 

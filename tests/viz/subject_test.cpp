@@ -18,7 +18,7 @@ Surfels random_surfels(int64_t n, double size, bool tint, Random& random) {
   Surfels s{Tensor<float>(Shape{n, 3}), Tensor<float>(Shape{n, 2}),    Tensor<float>(Shape{n, 4}),
             Tensor<float>(Shape{n}),    Tensor<float>(Shape{n, 4, 3}), Tensor<float>()};
   if (tint) s.tint_logit = Tensor<float>(Shape{n});
-  s.for_each([&](const char*, Tensor<float>& t) {
+  s.for_each([&](const std::string&, Tensor<float>& t) {
     for (float& v : t.values()) v = static_cast<float>(0.5 * random.normal());
   });
   for (float& v : s.position.values()) v *= static_cast<float>(size);

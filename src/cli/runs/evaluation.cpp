@@ -11,10 +11,10 @@
 #include "base/option_fields.h"
 #include "base/version.h"
 #include "cli/terminal/count_progress.h"
+#include "record/log_history.h"
 #include "scene/run_folder.h"
 #include "scene/viewpoint.h"
 #include "train/camera_alignment.h"
-#include "train/log_history.h"
 #include "train/targets.h"
 #include "viz/cameras/camera_file.h"
 

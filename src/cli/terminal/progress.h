@@ -4,7 +4,7 @@
 #include <iosfwd>
 #include <string>
 
-#include "train/events.h"
+#include "record/events.h"
 
 namespace traceflow::cli {
 

@@ -17,11 +17,11 @@
 #include "cli/terminal/progress.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
+#include "record/event_log.h"
+#include "record/log_history.h"
 #include "serve/live_view.h"
 #include "train/continuation.h"
-#include "train/event_log.h"
 #include "train/found_masks.h"
-#include "train/log_history.h"
 #include "train/odd_masks.h"
 #include "train/trainer.h"
 

@@ -43,7 +43,7 @@ class Clients : public MessageHandler {
   // The first message to every page (messages.ts, Hello). Connected pages get it again.
   void set_hello(std::string hello);
   void set_state(const State& state);
-  // Sends lines of a training log (train/event_log.h) to the pages. reset: they replace the earlier lines.
+  // Sends lines of a training log (record/event_log.h) to the pages. reset: they replace the earlier lines.
   void add_log_lines(const std::vector<std::string>& events, bool reset = false);
   // Shows a warning on every page until its text is set to an empty one. about: its key, as there may be
   // several.

@@ -49,7 +49,7 @@ Edited edited(Device device) {
   Edited e;
   e.surfels = s.on(device);
   e.moments.reset_like(e.surfels);
-  e.moments.for_each([&](const char*, optimize::AdamState& state) {
+  e.moments.for_each([&](const std::string&, optimize::AdamState& state) {
     state.first = random_tensor<float>(state.first.shape(), random, -1, 1).on(device);
     state.second = random_tensor<float>(state.second.shape(), random, 0, 1).on(device);
     state.step = 5;
@@ -82,9 +82,10 @@ TEST_F(DensityOnDevice, EditsTheSetAsTheCpuDoes) {
   EXPECT_EQ(list_of(found.surfels.sh.on(Device::cpu)), list_of(expected.surfels.sh));
   EXPECT_EQ(list_of(found.surfels.opacity_logit.on(Device::cpu)), list_of(expected.surfels.opacity_logit));
   std::vector<const optimize::AdamState*> states;
-  expected.moments.for_each([&](const char*, optimize::AdamState& state) { states.push_back(&state); });
+  expected.moments.for_each(
+      [&](const std::string&, optimize::AdamState& state) { states.push_back(&state); });
   size_t k = 0;
-  found.moments.for_each([&](const char* name, optimize::AdamState& state) {
+  found.moments.for_each([&](const std::string& name, optimize::AdamState& state) {
     EXPECT_EQ(list_of(state.first.on(Device::cpu)), list_of(states[k]->first)) << name;
     EXPECT_EQ(list_of(state.second.on(Device::cpu)), list_of(states[k++]->second)) << name;
     EXPECT_EQ(state.step, 5);

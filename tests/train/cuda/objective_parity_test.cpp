@@ -104,7 +104,7 @@ TEST_F(TrainOnDevice, TheOptimiserAgreesWithTheCpuAndNamesTheFirstBadGradient) {
   EXPECT_EQ(found.left_alone.count, 3);
   EXPECT_EQ(found.left_alone.first, expected.left_alone.first);
   std::vector<const Tensor<float>*> tensors;
-  expected.scene.main.for_each([&](const char*, const Tensor<float>& t) { tensors.push_back(&t); });
+  expected.scene.main.for_each([&](const std::string&, const Tensor<float>& t) { tensors.push_back(&t); });
   size_t k = 0;
   found.scene.main.for_each(
       [&](const char* name, const Tensor<float>& t) { expect_close_on_host(t, *tensors[k++], 1e-6, name); });

@@ -4,7 +4,7 @@ const most_steps = 4000;
 
 // The events of a training that count, in order. Of the steps every n-th is kept, n doubling as the run gets long, by
 // the rule of src/serve/clients/history.cpp; a resumed run goes back to its checkpoint, by that of
-// src/train/log_history.cpp.
+// src/record/log_history.cpp.
 export class History {
   private kept: TrainingEvent[] = [];
   private steps = 0; // of those kept

@@ -1,0 +1,105 @@
+#include "track/inflation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "base/parallel.h"
+
+namespace traceflow {
+
+namespace {
+
+Vec2<float> middle_of(int64_t pixel, int64_t width) {
+  const int64_t row = pixel / width, column = pixel % width;
+  return {static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F};
+}
+
+// The part's pixels that have a neighbour outside of it. The picture's border is none.
+std::vector<Vec2<float>> outline_of(const std::vector<int64_t>& part, const Camera<float>& camera) {
+  const int64_t height = camera.height, width = camera.width;
+  Tensor<uint8_t> mask({height, width});
+  for (const int64_t pixel : part) mask[pixel] = 1;
+  std::vector<Vec2<float>> outline;
+  for (const int64_t pixel : part) {
+    const int64_t row = pixel / width, column = pixel % width;
+    const bool is_inside = (row == 0 || mask[pixel - width] != 0) && (column == 0 || mask[pixel - 1] != 0) &&
+                           (row + 1 == height || mask[pixel + width] != 0) &&
+                           (column + 1 == width || mask[pixel + 1] != 0);
+    if (!is_inside) outline.push_back(middle_of(pixel, width));
+  }
+  return outline;
+}
+
+float distance_to(const std::vector<Vec2<float>>& outline, const Vec2<float>& at) {
+  float nearest2 = std::numeric_limits<float>::infinity();
+  for (const Vec2<float>& p : outline) nearest2 = std::min(nearest2, dot(p - at, p - at));
+  return std::sqrt(nearest2);
+}
+
+}  // namespace
+
+std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor<uint8_t>& mask,
+                                  const Camera<float>& camera, const Tensor<float>& points) {
+  constexpr float max_distance = 0.5F;  // of the part's size
+  constexpr size_t beside = 8, as_near = 2, share = 10;
+  const std::vector<Vec2<float>> outline = outline_of(part, camera);
+  struct Seen {
+    Vec2<float> at;
+    float depth;
+  };
+  std::vector<Seen> seen;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const Vec3<float> point = load3<float>(points.row(i));
+    if (!camera.sees(point)) continue;
+    const Vec3<float> in_camera = camera.point_in_camera(point);
+    const Vec2<float> at = camera.project(in_camera);
+    if (mask(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x)) == 0) seen.push_back({at, in_camera.z});
+  }
+  const float farthest2 = max_distance * max_distance * static_cast<float>(part.size());
+  std::vector<float> depths;
+  for (const Vec2<float>& pixel : outline) {
+    if (seen.size() < beside) break;
+    const auto distance2 = [&](const Seen& point) { return dot(point.at - pixel, point.at - pixel); };
+    const auto last = seen.begin() + beside - 1;
+    std::nth_element(seen.begin(), last, seen.end(),
+                     [&](const Seen& a, const Seen& b) { return distance2(a) < distance2(b); });
+    if (distance2(*last) > farthest2) continue;
+    std::array<float, beside> near{};
+    std::transform(seen.begin(), seen.begin() + beside, near.begin(), [](const Seen& p) { return p.depth; });
+    std::nth_element(near.begin(), near.begin() + as_near - 1, near.end());
+    depths.push_back(near[as_near - 1]);
+  }
+  if (depths.empty()) return std::nullopt;
+  const auto near = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / share);
+  std::nth_element(depths.begin(), near, depths.end());
+  return *near;
+}
+
+Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& camera, float depth,
+                       int64_t most) {
+  const std::vector<Vec2<float>> outline = outline_of(part, camera);
+  const auto count = static_cast<int64_t>(part.size());
+  std::vector<float> inwards(part.size());
+  parallel_for("inflation", count, [&](int64_t k) {
+    const auto at = static_cast<size_t>(k);
+    inwards[at] = outline.empty() ? 0 : distance_to(outline, middle_of(part[at], camera.width));
+  });
+  const float radius = *std::max_element(inwards.begin(), inwards.end());
+  // Every `step`th pixel of every `step`th row.
+  const auto step =
+      static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(count) / static_cast<double>(most))));
+  std::vector<Vec3<float>> made;
+  for (size_t k = 0; k < part.size(); ++k) {
+    if (part[k] / camera.width % step != 0 || part[k] % camera.width % step != 0) continue;
+    const Vec2<float> at = middle_of(part[k], camera.width);
+    const float height = std::sqrt(inwards[k] * (2 * radius - inwards[k])) / camera.focal_x;
+    made.push_back(camera.position + depth * (1 - height) * camera.ray_in_world(at.x, at.y));
+  }
+  Tensor<float> points({static_cast<int64_t>(made.size()), 3});
+  for (size_t k = 0; k < made.size(); ++k) store3(points.row(static_cast<int64_t>(k)), made[k]);
+  return points;
+}
+
+}  // namespace traceflow
