@@ -92,6 +92,7 @@ void iteration_on_device(benchmark::State& state) {
   SceneGradient gradient;
   FrameGradient grad_frame;
   LossMeans means;
+  Tensor<float> grad_rest;
   const Trainable trainable{.camera = false};
   size_t k = 0;
   const auto step = [&] {
@@ -99,7 +100,8 @@ void iteration_on_device(benchmark::State& state) {
     request.pseudo_normals = request.probes = request.cull = true;
     request.probe_seed = k;
     const Frame& frame = renderer.forward(s.scene, request, true);
-    evaluate_objective(frame, s.target, s.options.loss, NormalLosses::more_on_mirrors, grad_frame, means);
+    evaluate_objective({frame, s.target, s.options.loss, NormalLosses::more_on_mirrors},
+                       {grad_frame, grad_rest}, means);
     benchmark::DoNotOptimize(means.read());
     gradient.reset(s.scene);
     renderer.backward(s.scene, request, trainable, grad_frame, gradient);

@@ -53,6 +53,7 @@ void static_iteration(benchmark::State& state) {
   SceneGradient gradient;
   FrameGradient grad_frame;
   LossMeans means;
+  Tensor<float> grad_rest;
   Trainable trainable{.main = true,
                       .tint = false,
                       .main_field = false,
@@ -61,7 +62,7 @@ void static_iteration(benchmark::State& state) {
                       .camera = false};
   for (auto _ : state) {
     const Frame& frame = renderer.forward(s.scene, s.request, true);
-    evaluate_objective(frame, s.target, s.options.loss, NormalLosses::none, grad_frame, means);
+    evaluate_objective({frame, s.target, s.options.loss, NormalLosses::none}, {grad_frame, grad_rest}, means);
     benchmark::DoNotOptimize(means.read());
     gradient.reset(s.scene);
     renderer.backward(s.scene, s.request, trainable, grad_frame, gradient);

@@ -28,6 +28,7 @@ Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const Frame
   photometric.lpips = photometric.rigidity = photometric.environment_residual = 0;
   FrameRequest moving = request;
   FrameGradient by_frame;
+  Tensor<float> by_rest;
   SceneGradient gradient;
   LossMeans means;
   CameraSteps steps;
@@ -37,7 +38,7 @@ Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const Frame
   for (int i = 0; i <= options.iterations; ++i) {
     const Frame& frame = renderer.forward(scene, moving, true);
     take_unknown(frame.colour, photograph);
-    evaluate_objective(frame, photograph, photometric, NormalLosses::none, by_frame, means, nullptr);
+    evaluate_objective({frame, photograph, photometric}, {by_frame, by_rest}, means);
     leave_unknown(photograph, by_frame.colour);
     const double now = means.read().total;
     if (now < least) {

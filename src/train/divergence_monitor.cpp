@@ -14,7 +14,7 @@ constexpr int64_t settling_steps = 300;
 
 }  // namespace
 
-std::string DivergenceMonitor::check(const LossTerms& terms, const NonFiniteGradients& gradients) {
+std::string DivergenceMonitor::check(const LossValues& terms, const NonFiniteGradients& gradients) {
   if (!std::isfinite(terms.total)) return "the loss is not a number";
   if (gradients.count > 0) {
     dropped_ += gradients.count;

@@ -14,7 +14,7 @@ class DivergenceMonitor {
       : policy_(policy), collapse_decibels_(collapse_decibels) {}
 
   // After each iteration. Returns why the run must stop, or nothing.
-  std::string check(const LossTerms& terms, const NonFiniteGradients& gradients);
+  std::string check(const LossValues& terms, const NonFiniteGradients& gradients);
   // An opacity reset makes the PSNR fall on purpose: the best seen so far is forgotten.
   void expect_fall();
 

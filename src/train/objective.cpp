@@ -15,78 +15,129 @@ std::optional<double> psnr(const loss::Mean& squared_error) {
   return -10.0 * std::log10(std::max(squared_error.value, 1e-10));
 }
 
+double normal_weight(const LossInputs& in) {
+  return in.normals == NormalLosses::none ? 0 : double{in.options.normal};
+}
+
+double normal_prior_weight(const LossInputs& in) {
+  const bool counts = in.normals != NormalLosses::none && !in.target.normal_prior.empty();
+  return counts ? double{in.options.normal_prior} : 0;
+}
+
 }  // namespace
 
-void LossMeans::begin(Device device) {
-  means_.place(device).reset({term_count});
-  weight_ = {};
-}
-
-loss::MeanSlot LossMeans::add(Term term, double weight) {
-  weight_[term] = weight;
-  return {means_, term};
-}
-
-LossTerms LossMeans::read() const {
-  LossTerms terms;
-  const Tensor<loss::Mean> means = means_.on(Device::cpu);
-  const std::array<double*, squared_error> values{
-      &terms.l1,    &terms.ssim,     &terms.normal,     &terms.normal_prior,        &terms.distortion,
-      &terms.lpips, &terms.rigidity, &terms.silhouette, &terms.environment_residual};
-  for (size_t term = 0; term < values.size(); ++term) {
-    if (!weight_[term]) continue;
-    *values[term] = means[static_cast<int64_t>(term)].value;
-    terms.total += *weight_[term] * *values[term];
-  }
-  if (weight_[squared_error]) terms.psnr = psnr(means[squared_error]);
+std::span<const LossTerm> loss_terms() {
+  static const LossTerm terms[] = {
+      {"l1", [](const LossInputs& in) { return double{1 - in.options.ssim}; },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         loss::l1(in.frame.colour, in.target.colour, weight, g.frame.colour, slot);
+       }},
+      {"ssim", [](const LossInputs& in) { return double{in.options.ssim}; },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         loss::ssim_loss(in.frame.colour, in.target.colour, weight, g.frame.colour, slot);
+       }},
+      {"normal", normal_weight,
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         g.frame.pseudo_normal.reset(in.frame.raster.normal.shape());
+         loss::normal_consistency(in.frame.raster.normal, in.frame.pseudo_normal, weight, g.frame.normal,
+                                  g.frame.pseudo_normal, slot);
+       }},
+      {"normal_prior", normal_prior_weight,
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         const Tensor<float> nowhere;
+         const bool by_tint = in.normals == NormalLosses::more_on_mirrors;
+         loss::normal_prior(in.frame.raster.normal, in.target.normal_prior,
+                            by_tint ? in.frame.raster.tint : nowhere, in.options.normal_prior_on_mirrors,
+                            weight, g.frame.normal, slot);
+       }},
+      {"distortion", [](const LossInputs& in) { return double{in.options.distortion}; },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         g.frame.distortion.reset(in.frame.raster.distortion.shape());
+         loss::distortion(in.frame.raster.distortion, weight, g.frame.distortion, slot);
+       }},
+      {"lpips", [](const LossInputs& in) { return in.perceptual == nullptr ? 0 : double{in.options.lpips}; },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         lpips::distance(*in.perceptual, in.frame.colour, in.target.colour, lpips::Input::defined, weight,
+                         g.frame.colour, slot);
+       }},
+      {"rigidity",
+       [](const LossInputs& in) { return in.neighbours == nullptr ? 0 : double{in.options.rigidity}; },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         g.frame.main_position.reset(in.frame.main.position.shape());
+         g.rest.reset(in.rest->shape());
+         loss::rigidity(*in.rest, in.frame.main.position, in.frame.subset, *in.neighbours,
+                        in.options.rigidity_strain, weight, g.rest, g.frame.main_position, slot);
+       }},
+      {"silhouette",
+       [](const LossInputs& in) {
+         return in.frame.raster.silhouette.empty() ? 0 : double{in.options.silhouette};
+       },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         loss::silhouette(in.frame.raster.silhouette, in.target.coverage, weight, g.frame.silhouette, slot);
+       }},
+      {"environment_residual",
+       [](const LossInputs& in) {
+         const bool counts = in.environment_residuals != nullptr && !in.environment_residuals->empty();
+         return counts ? double{in.options.environment_residual} : 0;
+       },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         g.frame.environment_residuals.reset(in.environment_residuals->shape());
+         loss::row_norm(*in.environment_residuals, weight, g.frame.environment_residuals, slot);
+       }},
+  };
   return terms;
 }
 
-void evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
-                        NormalLosses normals, FrameGradient& gradient, LossMeans& means,
-                        const lpips::Network* perceptual) {
-  const Device device = frame.colour.device();
-  const bool consistency = normals != NormalLosses::none && options.normal > 0;
-  const bool prior =
-      normals != NormalLosses::none && options.normal_prior > 0 && !target.normal_prior.empty();
-  const Shape none{0}, colours = frame.colour.shape(), shape = frame.raster.normal.shape();
-  means.begin(device);
-  gradient.colour.place(device).reset(colours);
-  gradient.normal.place(device).reset(consistency || prior ? shape : none);
-  gradient.pseudo_normal.place(device).reset(consistency ? shape : none);
-  gradient.distortion.place(device).reset(options.distortion > 0 ? frame.raster.distortion.shape() : none);
+double LossValues::operator[](std::string_view name) const {
+  for (const LossValue& term : terms) {
+    if (term.name == name) return term.value;
+  }
+  return 0;
+}
 
-  const auto slot = [&](LossMeans::Term term, double weight) { return means.add(term, weight); };
-  loss::squared_error(frame.colour, target.colour, target.known, slot(LossMeans::squared_error, 0));
-  loss::l1(frame.colour, target.colour, 1 - options.ssim, gradient.colour,
-           slot(LossMeans::l1, 1 - options.ssim));
-  if (options.ssim > 0) {
-    loss::ssim_loss(frame.colour, target.colour, options.ssim, gradient.colour,
-                    slot(LossMeans::ssim, options.ssim));
+void LossMeans::begin(Device device) {
+  const auto count = static_cast<int64_t>(loss_terms().size()) + 1;
+  means_.place(device).reset({count});
+  weight_.assign(static_cast<size_t>(count), std::nullopt);
+}
+
+loss::MeanSlot LossMeans::add(size_t term, double weight) {
+  weight_[term] = weight;
+  return {means_, static_cast<int64_t>(term)};
+}
+
+LossValues LossMeans::read() const {
+  LossValues values;
+  const Tensor<loss::Mean> means = means_.on(Device::cpu);
+  const std::span<const LossTerm> terms = loss_terms();
+  for (size_t k = 0; k < terms.size(); ++k) {
+    if (!weight_[k]) continue;
+    values.terms.push_back({terms[k].name, *weight_[k], means[static_cast<int64_t>(k)].value});
+    values.total += values.terms.back().weight * values.terms.back().value;
   }
-  if (consistency) {
-    loss::normal_consistency(frame.raster.normal, frame.pseudo_normal, options.normal, gradient.normal,
-                             gradient.pseudo_normal, slot(LossMeans::normal, options.normal));
-  }
-  if (prior) {
-    const Tensor<float> nowhere;
-    const Tensor<float>& tint = normals == NormalLosses::more_on_mirrors ? frame.raster.tint : nowhere;
-    loss::normal_prior(frame.raster.normal, target.normal_prior, tint, options.normal_prior_on_mirrors,
-                       options.normal_prior, gradient.normal,
-                       slot(LossMeans::normal_prior, options.normal_prior));
-  }
-  if (options.distortion > 0) {
-    loss::distortion(frame.raster.distortion, options.distortion, gradient.distortion,
-                     slot(LossMeans::distortion, options.distortion));
-  }
-  gradient.silhouette.place(device).reset(frame.raster.silhouette.shape());
-  if (!frame.raster.silhouette.empty()) {
-    loss::silhouette(frame.raster.silhouette, target.coverage, options.silhouette, gradient.silhouette,
-                     slot(LossMeans::silhouette, options.silhouette));
-  }
-  if (perceptual != nullptr) {
-    lpips::distance(*perceptual, frame.colour, target.colour, lpips::Input::defined, options.lpips,
-                    gradient.colour, slot(LossMeans::lpips, options.lpips));
+  if (weight_[terms.size()]) values.psnr = psnr(means[static_cast<int64_t>(terms.size())]);
+  return values;
+}
+
+void evaluate_objective(const LossInputs& inputs, const LossGradient& gradient, LossMeans& means) {
+  const Frame& frame = inputs.frame;
+  const Device device = frame.colour.device();
+  const std::span<const LossTerm> terms = loss_terms();
+  means.begin(device);
+  const Shape none{0};
+  gradient.frame.colour.place(device).reset(frame.colour.shape());
+  gradient.frame.silhouette.place(device).reset(frame.raster.silhouette.shape());
+  for (Tensor<float>* unused : {&gradient.frame.pseudo_normal, &gradient.frame.distortion,
+                                &gradient.frame.main_position, &gradient.frame.environment_residuals})
+    unused->place(device).reset(none);
+  gradient.rest.place(device).reset(none);
+  const bool has_normals = normal_weight(inputs) > 0 || normal_prior_weight(inputs) > 0;
+  gradient.frame.normal.place(device).reset(has_normals ? frame.raster.normal.shape() : none);
+
+  loss::squared_error(frame.colour, inputs.target.colour, inputs.target.known, means.add(terms.size(), 0));
+  for (size_t k = 0; k < terms.size(); ++k) {
+    const double weight = terms[k].weight(inputs);
+    if (weight > 0) terms[k].add(inputs, weight, gradient, means.add(k, weight));
   }
 }
 

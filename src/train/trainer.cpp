@@ -8,7 +8,6 @@
 #include "base/parallel.h"
 #include "base/version.h"
 #include "ops/lighting/lighting.h"
-#include "ops/loss/loss.h"
 #include "ops/loss/rigidity.h"
 #include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
@@ -194,7 +193,7 @@ void Trainer::fade(std::span<const int64_t> rows) {
   scene_.main.opacity_logit = opacity.on(device_);
 }
 
-LossTerms Trainer::step() {
+LossValues Trainer::step() {
   density_changes_.clear();
   renderer_.options().samples = schedule_.samples(iteration_);
   const Surfels new_surface = follow_bodies(tracking(iteration_));
@@ -221,16 +220,17 @@ LossTerms Trainer::step() {
 
   const Frame& frame = renderer_.forward(scene_, request, true);
   take_unknown(frame.colour, target);
-  grad_frame_.main_position.place(device_).resize({0});
-  grad_frame_.environment_residuals.place(device_).resize({0});
-  grad_rest_.place(device_).resize({0});
-  evaluate_objective(frame, target, options_.loss, normal_losses(trainable, now), grad_frame_, means_,
-                     schedule_.uses_lpips(iteration_) ? &*perceptual_ : nullptr);
+  LossInputs inputs{frame, target, options_.loss, normal_losses(trainable, now)};
+  if (schedule_.uses_lpips(iteration_)) inputs.perceptual = &*perceptual_;
+  if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0 && frame.main.count() > 0) {
+    inputs.rest = &scene_.main.position;
+    inputs.neighbours = &neighbour_edges();
+  }
+  if (trainable.environment_field) inputs.environment_residuals = &renderer_.environment_residuals();
+  evaluate_objective(inputs, {grad_frame_, grad_rest_}, means_);
   leave_unknown(target, grad_frame_.colour);
   if (review_) review_(frame, target, grad_frame_);
-  if (trainable.main_field && scene_.main_field && options_.loss.rigidity > 0) add_rigidity(frame);
-  if (trainable.environment_field && options_.loss.environment_residual > 0) add_environment_residual();
-  const LossTerms terms = means_.read();
+  const LossValues terms = means_.read();
   const bool learns = std::isfinite(terms.total);
   if (learns) learn(view, frame, request, trainable);
   ++iteration_;
@@ -284,27 +284,13 @@ void Trainer::set_refined_cameras() {
     capture_.train[i].camera = cameras_.camera(static_cast<int64_t>(i));
 }
 
-void Trainer::add_rigidity(const Frame& frame) {
-  if (frame.main.count() == 0) return;
+const Neighbours& Trainer::neighbour_edges() {
   if (neighbour_edges_.index.empty()) {
     Neighbours edges = spread_neighbours(scene_.main.position.on(Device::cpu), neighbours_each, bond_stride);
     if (scene_.main_motion) leave_others(scene_.main.body.on(Device::cpu), edges.index);
     neighbour_edges_ = edges.on(device_);
   }
-  grad_frame_.main_position.reset(frame.main.position.shape());
-  grad_rest_.reset(scene_.main.position.shape());
-  loss::rigidity(scene_.main.position, frame.main.position, frame.subset, neighbour_edges_,
-                 options_.loss.rigidity_strain, options_.loss.rigidity, grad_rest_, grad_frame_.main_position,
-                 means_.add(LossMeans::rigidity, options_.loss.rigidity));
-}
-
-void Trainer::add_environment_residual() {
-  const Tensor<float>& residuals = renderer_.environment_residuals();
-  if (residuals.empty()) return;
-  const double weight = options_.loss.environment_residual;
-  grad_frame_.environment_residuals.reset(residuals.shape());
-  loss::row_norm(residuals, weight, grad_frame_.environment_residuals,
-                 means_.add(LossMeans::environment_residual, weight));
+  return neighbour_edges_;
 }
 
 void Trainer::control_density(int done, const Surfels& new_surface) {
@@ -347,7 +333,7 @@ void Trainer::control_density(int done, const Surfels& new_surface) {
   }
 }
 
-events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
+events::Step Trainer::step_event(const LossValues& terms, double step_seconds) {
   const double now = 1.0 / std::max(1e-9, step_seconds);
   rate_ = rate_ > 0 ? 0.95 * rate_ + 0.05 * now : now;
   events::Step event;
@@ -355,15 +341,7 @@ events::Step Trainer::step_event(const LossTerms& terms, double step_seconds) {
   event.iterations = options_.iterations;
   event.phase = to_string(schedule_.phase(iteration_ - 1));
   event.loss = terms.total;
-  event.terms = {{"l1", terms.l1},
-                 {"ssim", terms.ssim},
-                 {"normal", terms.normal},
-                 {"normal_prior", terms.normal_prior},
-                 {"distortion", terms.distortion},
-                 {"rigidity", terms.rigidity},
-                 {"silhouette", terms.silhouette},
-                 {"environment_residual", terms.environment_residual}};
-  if (schedule_.uses_lpips(iteration_ - 1)) event.terms.push_back({"lpips", terms.lpips});
+  for (const LossValue& term : terms.terms) event.terms.push_back({std::string(term.name), term.value});
   event.psnr = divergence_.smoothed_psnr();
   event.seconds = seconds_;
   event.rate = rate_;
@@ -419,7 +397,7 @@ std::string Trainer::tell_iteration() {
     before_step_.texture_trust = texture_trust_;
   }
   const Clock::time_point start = Clock::now();
-  LossTerms terms;
+  LossValues terms;
   {
     const StepMeter::Iteration measured(meter_, iteration_);
     terms = step();

@@ -63,7 +63,7 @@ class Trainer {
   events::Finished run(const std::atomic<bool>& stop);
 
   // One iteration of the loop, without saving; returns the loss.
-  LossTerms step();
+  LossValues step();
 
   // Is called with each picture, its photograph and the gradient by the picture: what it sets to zero teaches
   // nothing.
@@ -154,8 +154,8 @@ class Trainer {
   NormalLosses normal_losses(const Trainable& trainable, const Tracking& now) const;
   // Add the terms on the main surfels' rigidity (loss.rigidity) and on what the environment's field adds
   // (loss.environment_residual), with their gradients.
-  void add_rigidity(const Frame& frame);
-  void add_environment_residual();
+  // The edges between neighbouring main surfels, found when they are first needed.
+  const Neighbours& neighbour_edges();
   // Refines the camera of a training view by the gradient of its picture.
   void refine_camera(const View& view);
   void set_refined_cameras();
@@ -201,7 +201,7 @@ class Trainer {
   void rollback_draws();
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
-  events::Step step_event(const LossTerms& terms, double step_seconds);
+  events::Step step_event(const LossValues& terms, double step_seconds);
   events::Finished finish(events::Ending ending, const std::string& reason);
 
   TrainOptions options_;

@@ -7,8 +7,8 @@
 namespace traceflow {
 namespace {
 
-LossTerms at_psnr(double psnr) {
-  LossTerms terms;
+LossValues at_psnr(double psnr) {
+  LossValues terms;
   terms.total = 0.1;
   terms.psnr = psnr;
   return terms;
@@ -23,7 +23,7 @@ TEST(DivergenceMonitor, ASteadyRunIsSound) {
 
 TEST(DivergenceMonitor, APhotographOfWhichNothingIsKnownSaysNothing) {
   DivergenceMonitor monitor(NonFinite::stop, 5);
-  LossTerms unknown = at_psnr(0);
+  LossValues unknown = at_psnr(0);
   unknown.psnr.reset();
   for (int i = 0; i < 2000; ++i) EXPECT_EQ(monitor.check(i % 2 == 0 ? at_psnr(20) : unknown, {}), "");
   EXPECT_DOUBLE_EQ(monitor.smoothed_psnr(), 20);
@@ -51,7 +51,7 @@ TEST(DivergenceMonitor, AnExpectedFallIsForgiven) {
 
 TEST(DivergenceMonitor, ALossThatIsNotANumberEndsTheRun) {
   DivergenceMonitor monitor(NonFinite::drop, 5);
-  LossTerms terms = at_psnr(20);
+  LossValues terms = at_psnr(20);
   terms.total = std::numeric_limits<double>::quiet_NaN();
   EXPECT_NE(monitor.check(terms, {}), "");
 }

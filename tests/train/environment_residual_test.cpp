@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include "ops/loss/loss.h"
 #include "small_run.h"
 
 namespace traceflow {
@@ -11,9 +10,9 @@ double term_after(float weight) {
   TrainOptions options = small_run(40);
   options.loss.environment_residual = weight;
   Trainer trainer = make_trainer(options, "environment_residual");
-  LossTerms terms;
+  LossValues terms;
   while (trainer.iteration() < 40) terms = trainer.step();
-  return terms.environment_residual;
+  return terms["environment_residual"];
 }
 
 TEST(EnvironmentResidual, IsSmallWhereItCosts) {
@@ -24,14 +23,24 @@ TEST(EnvironmentResidual, IsSmallWhereItCosts) {
 }
 
 TEST(EnvironmentResidual, CountsWithItsWeight) {
-  LossMeans means;
-  means.begin(Device::cpu);
-  Tensor<float> rows({2, 2}), gradient({2, 2});
+  Frame frame;
+  frame.colour = Tensor<float>({4, 4, 3});
+  ViewImages target;
+  target.colour = frame.colour;
+  LossOptions options;
+  options.environment_residual = 0.5F;
+  Tensor<float> rows({2, 2}), rest;
   rows(0, 0) = 4;
-  loss::row_norm(rows, 0.5, gradient, means.add(LossMeans::environment_residual, 0.5));
-  const LossTerms terms = means.read();
-  EXPECT_NEAR(terms.environment_residual, 2, 1e-3);
-  EXPECT_DOUBLE_EQ(terms.total, 0.5 * terms.environment_residual);
+  LossInputs inputs{frame, target, options};
+  inputs.environment_residuals = &rows;
+  FrameGradient gradient;
+  LossMeans means;
+  evaluate_objective(inputs, {gradient, rest}, means);
+  const LossValues terms = means.read();
+  EXPECT_EQ(terms["l1"], 0);
+  EXPECT_NEAR(terms["environment_residual"], 2, 1e-3);
+  EXPECT_NEAR(terms.total, 0.5 * terms["environment_residual"], 1e-6);
+  EXPECT_NEAR(gradient.environment_residuals(0, 0), 0.25, 1e-3);
 }
 
 }  // namespace

@@ -38,23 +38,24 @@ struct Fixture {
   lpips::Network network = lpips::network_of(narrow_lpips_weights(2));
 };
 
-LossTerms evaluate(const Fixture& f, FrameGradient& gradient, const lpips::Network* network = nullptr,
-                   NormalLosses normals = NormalLosses::more_on_mirrors) {
+LossValues evaluate(const Fixture& f, FrameGradient& gradient, const lpips::Network* network = nullptr,
+                    NormalLosses normals = NormalLosses::more_on_mirrors) {
   LossMeans means;
-  evaluate_objective(f.frame, f.target, f.options, normals, gradient, means, network);
+  Tensor<float> rest;
+  evaluate_objective({f.frame, f.target, f.options, normals, network}, {gradient, rest}, means);
   return means.read();
 }
 
 TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
   const Fixture f;
   FrameGradient gradient;
-  const LossTerms t = evaluate(f, gradient, &f.network);
-  for (const double term : {t.l1, t.ssim, t.normal, t.normal_prior, t.distortion, t.lpips})
+  const LossValues t = evaluate(f, gradient, &f.network);
+  for (const double term : {t["l1"], t["ssim"], t["normal"], t["normal_prior"], t["distortion"], t["lpips"]})
     EXPECT_NE(term, 0);
   const LossOptions& o = f.options;
   EXPECT_NEAR(t.total,
-              (1 - o.ssim) * t.l1 + o.ssim * t.ssim + o.normal * t.normal + o.normal_prior * t.normal_prior +
-                  o.distortion * t.distortion + o.lpips * t.lpips,
+              (1 - o.ssim) * t["l1"] + o.ssim * t["ssim"] + o.normal * t["normal"] +
+                  o.normal_prior * t["normal_prior"] + o.distortion * t["distortion"] + o.lpips * t["lpips"],
               1e-12);
 }
 
@@ -95,10 +96,10 @@ TEST(Objective, PsnrIsOfWhatIsKnown) {
 TEST(Objective, WithoutItsNetworkTheImageHasNoPerceptualTerm) {
   const Fixture f;
   FrameGradient with, without;
-  const LossTerms a = evaluate(f, with, &f.network);
-  const LossTerms b = evaluate(f, without);
-  EXPECT_EQ(b.lpips, 0);
-  EXPECT_NEAR(a.total - b.total, f.options.lpips * a.lpips, 1e-12);
+  const LossValues a = evaluate(f, with, &f.network);
+  const LossValues b = evaluate(f, without);
+  EXPECT_EQ(b["lpips"], 0);
+  EXPECT_NEAR(a.total - b.total, f.options.lpips * a["lpips"], 1e-12);
   // What the network adds to the gradient is the weighted gradient of its distance.
   Tensor<float> expected = without.colour;
   testing::lpips_distance(f.network, f.frame.colour, f.target.colour, lpips::Input::defined, f.options.lpips,

@@ -126,14 +126,14 @@ TEST(PriorBias, PriorsOnMirrorsCountMoreOnceBodiesAreFollowedOrStand) {
     Trainer even(options, at.capture, fs::path(::testing::TempDir()) / "even");
     options.loss.normal_prior_on_mirrors = 7;
     Trainer more(options, at.capture, fs::path(::testing::TempDir()) / "more");
-    LossTerms a, b;
-    while (a.normal_prior == b.normal_prior && even.iteration() < options.iterations / 2) {
+    LossValues a, b;
+    while (a["normal_prior"] == b["normal_prior"] && even.iteration() < options.iterations / 2) {
       a = even.step();
       b = more.step();
     }
-    EXPECT_EQ(a.l1, b.l1);
-    EXPECT_GE(b.normal_prior, a.normal_prior);
-    return a.normal_prior == b.normal_prior ? std::nullopt : std::optional(even.iteration() - 1);
+    EXPECT_EQ(a["l1"], b["l1"]);
+    EXPECT_GE(b["normal_prior"], a["normal_prior"]);
+    return a["normal_prior"] == b["normal_prior"] ? std::nullopt : std::optional(even.iteration() - 1);
   };
   EXPECT_EQ(parting(false, Specular::environment_gaussians), warm_up + times - 1);
   EXPECT_EQ(parting(true, Specular::environment_gaussians), warm_up);

@@ -24,9 +24,9 @@ struct Curve {
 Curve train(Trainer& trainer, int iterations) {
   Curve curve;
   for (int i = 0; i < iterations; ++i) {
-    const LossTerms terms = trainer.step();
+    const LossValues terms = trainer.step();
     curve.loss.push_back(terms.total);
-    curve.l1.push_back(terms.l1);
+    curve.l1.push_back(terms["l1"]);
   }
   return curve;
 }
