@@ -5,6 +5,7 @@
 #include <string>
 
 #include "ops/loss/loss.h"
+#include "ops/loss/rigidity.h"
 
 namespace traceflow {
 

@@ -8,7 +8,6 @@
 #include "base/parallel.h"
 #include "base/version.h"
 #include "ops/lighting/lighting.h"
-#include "ops/loss/rigidity.h"
 #include "ops/motion/motion.h"
 #include "render/frame_kernels.h"
 #include "train/continuation.h"

@@ -64,14 +64,14 @@ TEST(Objective, NormalPriorsCountMoreOnMirrors) {
   FrameGradient on_mirrors, even, none;
   f.options.normal = 0;
   f.options.normal_prior_on_mirrors = 7;
-  EXPECT_GT(evaluate(f, on_mirrors).normal_prior,
-            evaluate(f, even, nullptr, NormalLosses::even).normal_prior);
+  EXPECT_GT(evaluate(f, on_mirrors)["normal_prior"],
+            evaluate(f, even, nullptr, NormalLosses::even)["normal_prior"]);
   for (int64_t i = 0; i < f.frame.raster.tint.size(); ++i) {
     const double more = 1 + 6 * f.frame.raster.tint[i];
     for (int64_t c = 3 * i; c < 3 * i + 3; ++c)
       EXPECT_NEAR(on_mirrors.normal[c], more * even.normal[c], 1e-6);
   }
-  EXPECT_EQ(evaluate(f, none, nullptr, NormalLosses::none).normal_prior, 0);
+  EXPECT_EQ(evaluate(f, none, nullptr, NormalLosses::none)["normal_prior"], 0);
   EXPECT_TRUE(none.normal.empty());
 }
 
