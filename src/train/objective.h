@@ -11,7 +11,7 @@
 
 namespace traceflow {
 
-// The training loss of one frame (method §7.4), term by term, unweighted.
+// The training loss of one frame (method §7.4), by unweighted terms.
 struct LossTerms {
   double total = 0;  // the weighted sum
   double l1 = 0;
@@ -23,15 +23,14 @@ struct LossTerms {
   double silhouette = 0;
   double environment_residual = 0;
   double lpips = 0;
-  // dB, of the image as it is, not rounded; absent where nothing of the photograph is known.
+  // dB, of the image without rounding; empty if no pixel of the photograph is known.
   std::optional<double> psnr;
 };
 
-// The terms of one frame's loss as they were computed, on the frame's device: nobody waits for them until
-// they are read.
+// The terms of a frame's loss as computed, on the frame's device. Only reading them waits for the device.
 class LossMeans {
  public:
-  // In the order in which they are added up; the last is no term of the sum.
+  // In the order of summation. squared_error is not part of the sum.
   enum Term {
     l1,
     ssim,
@@ -46,9 +45,9 @@ class LossMeans {
     term_count
   };
 
-  // Forgets the last frame's.
+  // Discards the values of the last frame.
   void begin(Device device);
-  // Where a term that counts with this weight leaves its value.
+  // The slot for the value of a term with this weight.
   loss::MeanSlot add(Term term, double weight);
   // Waits for the device. Terms that were not added are 0.
   LossTerms read() const;
@@ -58,18 +57,17 @@ class LossMeans {
   std::array<std::optional<double>, term_count> weight_;
 };
 
-// How the terms on normals count in an iteration (method §7.4): not at all; with priors that count the same
-// everywhere; or with priors that count more by the tint, loss.normal_prior_on_mirrors times where it is 1.
+// How the normal losses count in an iteration (method §7.4): not at all; with equal weights of priors; or
+// with weights that grow with the tint, up to loss.normal_prior_on_mirrors where it is 1.
 enum class NormalLosses { none, even, more_on_mirrors };
 
-// Compares a frame with its photograph and sets dL/dframe. perceptual: the network of LPIPS where that
-// counts.
+// Compares a frame with its photograph and sets dL/dframe. perceptual: the LPIPS network, if LPIPS counts.
 void evaluate_objective(const Frame& frame, const ViewImages& target, const LossOptions& options,
                         NormalLosses normals, FrameGradient& gradient, LossMeans& means,
                         const lpips::Network* perceptual = nullptr);
 
-// The network of LPIPS where the options give it a weight. Throws InputError where its file cannot be used or
-// the capture's images are too small for it.
+// The LPIPS network, if the options give LPIPS a weight. Throws InputError when its file cannot be used or
+// when the capture's images are too small for it.
 std::optional<lpips::Network> perceptual_network(const LossOptions& options, const Capture& capture);
 
 }  // namespace traceflow
