@@ -15,7 +15,7 @@ namespace traceflow {
 
 namespace {
 
-// Keeps the fields in the order in which they are written here.
+// Keeps the fields in the order of the code below.
 using Json = nlohmann::ordered_json;
 
 Json to_json(const events::SurfelCounts& counts) {
@@ -157,12 +157,12 @@ Json to_json(const events::Finished& e) {
           {"reason", e.reason}};
 }
 
-// Where that fails half a line stays, which readers leave out.
+// If this fails an incomplete line remains; readers skip it.
 void cut_to(int descriptor, int64_t size) {
   [[maybe_unused]] const int refused = ::ftruncate(descriptor, size);
 }
 
-// Where the last whole line ends.
+// The position after the last complete line.
 int64_t end_of_lines(int descriptor, int64_t size) {
   std::array<char, 4096> block{};
   for (int64_t end = size; end > 0;) {
@@ -185,7 +185,7 @@ std::string to_json_line(const events::Event& event) {
 }
 
 EventLog::EventLog(const std::filesystem::path& path, int64_t step_interval)
-    // A link may lead to anybody's file: a run may be a stranger's that goes on here.
+    // O_NOFOLLOW: the run folder may come from someone else, and a link may lead to any file.
     : descriptor_(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0644)),
       step_interval_(step_interval) {
   if (descriptor_ < 0) {

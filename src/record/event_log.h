@@ -8,15 +8,15 @@
 
 namespace traceflow {
 
-// A listener that writes each event as one line of JSON: {"event": "step", "iteration": …}. Appends, so that
-// a resumed run goes on in the same file; half a line, which a killed run may have left at the end, is cut
-// off. Every line is written at once: `tail -f` follows a run, and a killed one loses nothing. Numbers that
-// are not finite become null. Lines that the disk refuses do not end a training; how many are missing is
-// logged when it takes lines again.
+// A listener that writes each event as one line of JSON: {"event": "step", "iteration": …}. It appends, so
+// that a resumed run continues in the same file. An incomplete last line, which a killed run may have left,
+// is cut off. Each line is written at once, so `tail -f` follows a run and a killed run loses nothing.
+// Numbers that are not finite become null. Training continues if the disk refuses lines; the number of
+// missing lines is logged when the disk accepts lines again.
 class EventLog {
  public:
-  // Throws InputError when the file cannot be opened. Of the Step events, only those of every
-  // `step_interval`-th iteration and the last are written.
+  // Throws InputError when the file cannot be opened. Only Step events of every `step_interval`-th iteration
+  // and of the last one are written.
   explicit EventLog(const std::filesystem::path& path, int64_t step_interval = 1);
   ~EventLog();
   EventLog(const EventLog&) = delete;
@@ -25,7 +25,7 @@ class EventLog {
   void operator()(const events::Event& event);
 
  private:
-  // Whether the whole line stands; nothing of it does where not.
+  // Returns whether the whole line was written. If not, no part of it remains in the file.
   bool write(const std::string& line);
 
   int descriptor_;
@@ -33,7 +33,7 @@ class EventLog {
   int64_t missing_ = 0;  // lines
 };
 
-// The line, without its end.
+// The line without its newline.
 std::string to_json_line(const events::Event& event);
 
 }  // namespace traceflow

@@ -12,9 +12,8 @@
 #include "base/machine.h"
 #include "base/profile.h"
 
-// What happens during training, told as it happens. The progress bar, the JSON-lines log and the web viewer
-// listen; training itself prints nothing and knows none of them. Events come from the training thread, in
-// order.
+// The events of training. The progress bar, the JSON-lines log and the web viewer listen to them; training
+// itself prints nothing and does not know the listeners. The training thread emits events in order.
 namespace traceflow::events {
 
 struct SurfelCounts {
@@ -28,76 +27,76 @@ struct Term {
   double value = 0;
 };
 
-// First of all events, and again after --resume.
+// The first event, also after --resume.
 struct Started {
   std::string capture;
   std::filesystem::path run;
-  int64_t iteration = 0;   // already done: 0, or where a resumed run goes on
-  int64_t iterations = 0;  // in all
+  int64_t iteration = 0;   // already done: 0, or where a resumed run continues
+  int64_t iterations = 0;  // in total
   std::string device = "cpu";
   int threads = 1;
   uint64_t seed = 0;
   SurfelCounts surfels;
-  int64_t forecast_bytes = 0;  // memory that the run takes at most, by its shapes
+  int64_t forecast_bytes = 0;  // upper bound on the memory of the run, computed from the sizes of its data
   std::string version;         // of the program
   Machine machine;
-  // The capture's finite points, and those that some training view sees: main surfels started at these, or
-  // at random where there are none.
+  // The capture's finite points, and those that at least one training view sees. Main surfels start at the
+  // latter, or at random positions if there are none.
   int64_t points = 0, points_in_view = 0;
 };
 
 // One iteration is done.
 struct Step {
-  int64_t iteration = 0;  // done so far, this one included
+  int64_t iteration = 0;  // done so far, including this one
   int64_t iterations = 0;
   std::string phase;
   double loss = 0;          // weighted sum of the terms
   std::vector<Term> terms;  // unweighted
-  double psnr = 0;          // dB, of this iteration's view, smoothed over the last ones
-  double seconds = 0;       // of steps and saves so far, earlier sessions of a resumed run included
-  double rate = 0;          // steps a second, over the last ones
+  double psnr = 0;          // dB, of this iteration's view, smoothed over the last iterations
+  double seconds = 0;       // of steps and saves so far, including earlier sessions of a resumed run
+  double rate = 0;          // steps per second, over the last iterations
   SurfelCounts surfels;
-  int64_t memory_bytes = 0;  // in use: resident, or on the device where training is on CUDA
+  int64_t memory_bytes = 0;  // in use: resident, or on the device if training runs on CUDA
 };
 
-// Density control has run on one set. Counts are split by cause.
+// Density control has changed one set. Counts are split by cause.
 struct DensityChanged {
   int64_t iteration = 0;
   std::string set;  // "main" or "environment"
   int64_t cloned = 0;
   int64_t split = 0;
-  int64_t added = 0;  // for surface that came into view
+  int64_t added = 0;  // for newly visible surface
   int64_t pruned_transparent = 0;
   int64_t pruned_large = 0;
   bool opacity_reset = false;
-  bool at_cap = false;  // would have grown further but for the cap
-  int64_t count = 0;    // surfels of the set from now on
+  bool at_cap = false;  // the cap prevented further growth
+  int64_t count = 0;    // surfels of the set afterwards
 };
 
-// Whether bodies are followed has been decided (TrackOptions::still).
+// Training has decided whether bodies are tracked (TrackOptions::still).
 struct FollowingDecided {
   int64_t iteration = 0;
   bool follows = false;
-  double silhouettes = 0;  // mean misfit at rest, a share of the masks' area
+  double silhouettes = 0;  // mean silhouette error at rest, a share of the masks' area
 };
 
-// Parts of bodies have become bodies of their own (track/body_parts.h).
+// Parts of bodies have become separate bodies (track/body_parts.h).
 struct BodiesParted {
   int64_t iteration = 0;
   int64_t added = 0;
-  int64_t bodies = 0;  // from now on
+  int64_t bodies = 0;  // number afterwards
 };
 
-// Whether a body bends has been decided (train/options.h, BendOptions).
+// Training has decided whether a body deforms (train/options.h, BendOptions).
 struct BendingDecided {
   int64_t iteration = 0;
   int64_t body = 0;
   bool bends = false;
-  double silhouettes = 0;             // mean misfit, of all bodies, over that of the first view
-  std::optional<double> photographs;  // what differs of them with nodes, over without; of textured bodies
+  double silhouettes = 0;             // mean silhouette error of all bodies, over that of the first view
+  std::optional<double> photographs;  // photometric cost with nodes over that without; textured bodies only
 };
 
-// The bias of normal priors in masks has been measured, and is undone from now on (track/prior_bias.h).
+// The bias of normal priors in masks has been measured. It is corrected from now on (track/prior_bias.h).
 struct PriorsTurned {
   int64_t iteration = 0;
   double degrees = 0;
@@ -108,14 +107,14 @@ struct PhaseEntered {
   std::string phase;
 };
 
-// Means over views that training does not see.
+// Means over held-out views.
 struct Evaluated {
   int64_t iteration = 0;
   std::string split;
   int64_t views = 0;
   double psnr = 0;
   double ssim = 0;
-  double seconds = 0;  // that the evaluation took
+  double seconds = 0;  // of the evaluation
 };
 
 struct Warning {
@@ -123,7 +122,7 @@ struct Warning {
   std::string text;  // one line
 };
 
-// Somebody who watches has stopped the training for a while, or lets it go on.
+// A viewer has paused or continued the training.
 struct Paused {
   int64_t iteration = 0;
   bool paused = false;
@@ -133,16 +132,16 @@ struct Paused {
 struct Saved {
   int64_t iteration = 0;
   std::filesystem::path path;
-  double seconds = 0;  // that saving took
+  double seconds = 0;  // of saving
 };
 
-// Where the time of the iterations since the last of these went. On the CPU all are measured; on CUDA, where
-// measuring waits for every kernel, one in a hundred.
+// How long the parts of the iterations took since the last such event. On the CPU all iterations are
+// measured. On CUDA, where measuring waits for every kernel, one in a hundred is.
 struct Measured {
   int64_t iteration = 0;
-  std::string phase;                  // that they were of
-  int64_t iterations = 0;             // measured
-  std::vector<profile::Entry> steps;  // of those alone
+  std::string phase;                  // of these iterations
+  int64_t iterations = 0;             // the number of measured ones
+  std::vector<profile::Entry> steps;  // of the measured iterations only
 };
 
 enum class Ending {
@@ -150,24 +149,24 @@ enum class Ending {
   interrupted,
   diverged,
   out_of_memory,
-  no_input,  // a photograph that could no longer be read
+  no_input,  // a photograph can no longer be read
 };
 
-// Last of all events.
+// The last event.
 struct Finished {
   Ending ending = Ending::completed;
   int64_t iteration = 0;
-  double seconds = 0;  // of steps and saves, earlier sessions of a resumed run included
+  double seconds = 0;  // of steps and saves, including earlier sessions of a resumed run
   double psnr = 0;     // as in the last Step
   SurfelCounts surfels;
-  std::string reason;  // one line where the ending is not `completed`
+  std::string reason;  // one line unless the ending is `completed`
 };
 
 using Event = std::variant<Started, Step, DensityChanged, FollowingDecided, BodiesParted, BendingDecided,
                            PriorsTurned, PhaseEntered, Evaluated, Warning, Paused, Saved, Measured, Finished>;
 using Listener = std::function<void(const Event&)>;
 
-// Hands every event to every listener, in the order in which they were added.
+// Passes every event to every listener, in the order in which they were added.
 class Stream {
  public:
   void listen(Listener listener) { listeners_.push_back(std::move(listener)); }

@@ -16,15 +16,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Longer, deeper or fuller than any event is: not ours.
+// Larger, deeper or with more values than any event, so not written by this program.
 constexpr size_t line_cap = size_t{1} << 20;
 constexpr int depth_cap = 8;
 constexpr size_t value_cap = 4000;
-// Beyond what any run does; so small that sums over a whole log stay numbers.
+// Beyond any run, but small enough that sums over a whole log do not overflow.
 constexpr int64_t iteration_cap = int64_t{1} << 53;
 constexpr double call_cap = 1e11;
 
-// An object, or null.
+// Returns an object, or null.
 Json parsed(const std::string& line) {
   const auto shallow = [](int depth, Json::parse_event_t, Json&) { return depth <= depth_cap; };
   const bool is_ours = line.size() <= line_cap && json_extent(line).values <= value_cap;
@@ -42,21 +42,21 @@ double number_in(const Json& json, const char* key) {
   return found != json.end() && found->is_number() ? found->get<double>() : 0;
 }
 
-// Whether an iteration tells this event as it begins, with the number of iterations done before it.
+// Whether an iteration emits this event at its start, with the number of iterations done before it.
 bool is_told_first(const std::string& kind) {
   static const std::set<std::string> kinds{"phase_entered", "following_decided", "bodies_parted",
                                            "priors_turned", "bending_decided"};
   return kinds.contains(kind);
 }
 
-// Events so far, of which a later line may take some back.
+// The events so far. A later line may remove some of them.
 class History {
  public:
   void add(LoggedEvent event) {
     if (event.kind == "started") {
       go_back_to(event.iteration);
     } else if (event.kind == "step") {
-      // Steps that begin anew although no start was read.
+      // The iterations go back although no start was read.
       if (event.iteration <= last_step_) go_back_to(event.iteration - 1);
       last_step_ = event.iteration;
     }
@@ -71,7 +71,8 @@ class History {
   }
 
  private:
-  // To when `done` iterations were done. What the next one began with is told again.
+  // Goes back to `done` iterations. The events that the next iteration emits at its start will be emitted
+  // again.
   void go_back_to(int64_t done) {
     if (done <= 0) events_.clear();
     std::erase_if(events_, [&](const LoggedEvent& e) {
@@ -84,7 +85,7 @@ class History {
   int64_t last_step_ = 0;
 };
 
-// Adds the steps of a "measured" event, as if all of `iterations` had been measured.
+// Adds the steps of a "measured" event, scaled as if all `iterations` had been measured.
 void add_measured(const Json& json, double iterations, std::vector<profile::Entry>& sums) {
   const double measured = number_in(json, "iterations");
   const auto steps = json.find("steps");
@@ -123,7 +124,7 @@ LogLine next_line(std::istream& log) {
   LogLine line;
   std::array<char, 4096> piece{};
   do {
-    log.clear();  // a piece that is full is called a failure
+    log.clear();  // getline sets failbit when a piece is full
     log.getline(piece.data(), piece.size());
     line.ended = log.good();
     line.bytes += log.gcount();
@@ -168,7 +169,7 @@ std::vector<LoggedEvent> thinned(const std::vector<LoggedEvent>& events, size_t 
   size_t step = 0, next = 0;
   for (const LoggedEvent& event : events) {
     if (event.kind == "step") {
-      // The next-th of those that stay is the one at next·(count − 1)/(steps − 1).
+      // The kept step number `next` is the one at next·(count − 1)/(steps − 1).
       if (step++ != next * (count - 1) / (steps - 1)) continue;
       ++next;
     }
@@ -179,7 +180,7 @@ std::vector<LoggedEvent> thinned(const std::vector<LoggedEvent>& events, size_t 
 
 std::vector<LoggedPhase> phases_of(const std::vector<LoggedEvent>& events) {
   std::vector<LoggedPhase> phases;
-  // Training time and iterations up to which those are accounted for.
+  // The training time and the iterations that are already assigned to phases.
   double seconds = 0;
   int64_t measured_to = 0;
   const auto phase = [&](const std::string& name, int64_t first) -> LoggedPhase& {

@@ -7,7 +7,7 @@ namespace traceflow {
 
 namespace {
 
-// Enough of a line to tell it from every other: steps end with measured numbers.
+// Long enough to identify a line: steps end with measured numbers.
 constexpr size_t remembered = 512;
 
 }  // namespace

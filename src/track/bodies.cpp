@@ -21,26 +21,26 @@ namespace traceflow {
 
 namespace {
 
-// A part of a mask with fewer pixels, or with fewer surfels, is none: noise, or too small to be followed.
+// A part of a mask with fewer pixels or surfels is ignored: it is noise, or too small to be tracked.
 constexpr int64_t least_pixels = 24;
 constexpr int64_t least_surfels = 24;
 constexpr int32_t most_bodies = 8;
-// Surfels belong to a part of a mask where they lie beside it by at most such a share of the image's width.
+// A share of the image width. Surfels up to this far beside a part of a mask belong to it.
 constexpr double label_margin = 1.0 / 120;
-// A carried surfel belongs to its body where it lies in the masks, or beside them by at most such a share of
-// the image's width, in as many of the views that see it.
+// A surfel stays with its body if this share of the views that see it show it in the mask or at most
+// mask_margin of the image width beside it.
 constexpr double mask_margin = 1.0 / 80;
 constexpr double share_in_masks = 0.9;
-// Pictures are compared by means over squares of so many image widths to each side.
+// A share of the image width. Images are compared by means over squares of this size to each side.
 constexpr double unrest_half_window = 1.0 / 80;
 
 // Connected parts of a mask.
 struct Parts {
-  Tensor<int32_t> label;                     // H×W, of the part that a pixel lies in or beside, -1 for none
-  std::vector<std::vector<int64_t>> pixels;  // of each
+  Tensor<int32_t> label;  // H×W, index of the part that a pixel is in or beside, -1 for none
+  std::vector<std::vector<int64_t>> pixels;  // of each part
 };
 
-// Labels reach one pixel beyond the mask at a time.
+// Extends the labels by one pixel.
 void grow(Tensor<int32_t>& label) {
   const Tensor<int32_t> before = label;
   for (int64_t y = 0; y < label.dim(0); ++y) {
@@ -79,8 +79,8 @@ struct Candidate {
   float z;
 };
 
-// The rows of those that lie at most as far behind the part's front as the part is wide: what lies farther is
-// seen past it at other times. The front is the median of the nearest in each of some cells.
+// The rows of points no farther behind the part's front than the part is wide. Farther points are visible
+// beside it at other times. The front is the median of the nearest depths in a grid of cells.
 std::vector<int64_t> within_thickness(const std::vector<Candidate>& candidates, int64_t area,
                                       const Camera<float>& camera) {
   constexpr float cells_across = 6;
@@ -106,8 +106,8 @@ std::vector<int64_t> within_thickness(const std::vector<Candidate>& candidates, 
   return rows;
 }
 
-// Whether at least half of a part's points were seen to stand still: what is behind a thing that has no
-// points itself.
+// Whether at least half of a part's points are static. Then they lie on the background of a thing without
+// points.
 bool is_background(const Tensor<float>& position, const std::vector<int64_t>& part,
                    const Tensor<float>& standing) {
   if (part.empty() || standing.empty()) return false;
@@ -120,7 +120,7 @@ bool is_background(const Tensor<float>& position, const std::vector<int64_t>& pa
   return 2 * stand >= points.dim(0);
 }
 
-// Whether the front of a part's points lies behind what stands beside the part.
+// Whether the front of a part's points is behind what is beside the part.
 bool is_behind(std::vector<Candidate> points, const std::optional<float>& beside) {
   constexpr float farther = 1.08F;
   if (points.empty() || !beside) return false;
@@ -130,16 +130,15 @@ bool is_behind(std::vector<Candidate> points, const std::optional<float>& beside
   return front->z > farther * *beside;
 }
 
-// A part of a mask, and the rows of points on the thing that it shows.
+// A part of a mask, and the rows of the points on the thing that it shows.
 struct Thing {
   std::vector<int64_t> pixels;
-  std::vector<int64_t> rows, made_up;  // of the capture, and not
-  bool is_bare = false;                // the capture's are too few, or behind it
+  std::vector<int64_t> rows, made_up;  // points of the capture; invented points
+  bool is_bare = false;                // the capture's points are too few or behind it
   std::optional<float> depth_beside;
 };
 
-// position: the capture's points, `points` of them, and behind them such as were made up for things that have
-// none.
+// position: the capture's points, `points` rows, followed by invented points on things without points.
 std::vector<Thing> things_in(const Capture& capture, const View& view, const Tensor<float>& position,
                              int64_t points) {
   const std::shared_ptr<const ViewImages> images = load_images(capture, view);
@@ -174,7 +173,7 @@ std::vector<Thing> things_in(const Capture& capture, const View& view, const Ten
   return things;
 }
 
-// The first view that has a mask; null where none has.
+// The first view with a mask; null if there is none.
 const View* earliest_with_mask(const Capture& capture) {
   const View* earliest = nullptr;
   for (const View& view : capture.train) {
@@ -202,7 +201,7 @@ Vec3<float> median_of(const Surfels& surfels, const std::vector<int64_t>& rows) 
   return middle;
 }
 
-// The mask, wider by a square of `margin` pixels to each side.
+// The mask, dilated by a square of `margin` pixels to each side.
 Tensor<uint8_t> widened(const Tensor<uint8_t>& mask, int64_t margin) {
   const int64_t height = mask.dim(0), width = mask.dim(1);
   Tensor<uint8_t> along({height, width}), wide({height, width});
@@ -221,7 +220,8 @@ Tensor<uint8_t> widened(const Tensor<uint8_t>& mask, int64_t margin) {
 }
 
 // Removes a mark while too few of the point's neighbours are marked. The surface of a separate object keeps
-// its marks; scattered ones go, and a part of a larger surface, as a shadow marks, shrinks from its edge.
+// its marks. Scattered marks disappear, and marks on part of a larger surface, such as a shadow, shrink from
+// the edge.
 void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
   constexpr int neighbours = 16;
   constexpr double share = 0.6;
@@ -249,8 +249,8 @@ void keep_things(const Tensor<float>& points, std::vector<char>& marked) {
 
 void make_solid(const Motion& motion, Surfels& surfels) {
   constexpr float widest = 1.5F;  // medians
-  // Of what they start as, which is as wide as their neighbours are apart. Two neighbours still cover 0.9 of
-  // what lies half way between them.
+  // Relative to the initial width, which is the distance between neighbours. Two neighbours still cover 0.9
+  // of the point half way between them.
   constexpr float share = 0.6F;
   std::vector<std::vector<float>> scales(static_cast<size_t>(motion.bodies()));
   for (int64_t i = 0; i < surfels.count(); ++i) {
@@ -273,7 +273,7 @@ void make_solid(const Motion& motion, Surfels& surfels) {
 }
 
 Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>& points) {
-  constexpr int64_t most_points = 1500;  // of a thing
+  constexpr int64_t most_points = 1500;  // per thing
   std::vector<float> made;
   if (const View* const first = earliest_with_mask(capture)) {
     for (const Thing& thing : things_in(capture, *first, points, points.dim(0))) {
@@ -344,7 +344,7 @@ int64_t release_strays(const Capture& capture, const Motion& motion, float lates
 }
 
 Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, int64_t every) {
-  constexpr double radii = 0.6;  // of the distance between neighbours
+  constexpr double radii = 0.6;  // relative to the distance between neighbours
   std::vector<int32_t> body;
   std::vector<float> centre, radius;
   for (int32_t b = 0; b < motion.bodies(); ++b) {
@@ -354,7 +354,7 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
         points.push_back(load3<double>(surfels.position.row(i)));
     }
     if (points.empty()) continue;
-    // The farthest from those chosen, beginning at the centre.
+    // Farthest-point sampling, starting at the centre.
     std::vector<double> off(points.size());
     const Vec3<double> middle = load3<double>(motion.centre.row(b));
     for (size_t k = 0; k < points.size(); ++k) off[k] = -glm::length(points[k] - middle);
@@ -427,7 +427,7 @@ void anchor_nodes(const Motion& motion, int32_t body, Nodes& nodes) {
 
 namespace {
 
-// Where surfels are at a time.
+// The positions of surfels at a time.
 Tensor<float> positions_at(float time, const Motion& motion, const Surfels& surfels) {
   Surfels moved;
   moved.position = surfels.position;
@@ -441,7 +441,7 @@ struct Sphere {
   Vec3<float> middle;
   float radius;  // above 0
 };
-// Of a body's opaque surfels, which stand at `position`; of what carries none, the world's origin and 1.
+// The sphere of a body's opaque surfels, which are at `position`; the world's origin and 1 if it has none.
 Sphere sphere_around(const Tensor<float>& position, const Surfels& surfels, int32_t body) {
   Vec3<double> sum(0);
   double squares = 0, count = 0;
@@ -488,7 +488,7 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
   }
   Vec3<float> size = high - low;
   float longest = std::max({size.x, size.y, size.z});
-  if (!(longest > 0)) {  // nothing opaque is carried
+  if (!(longest > 0)) {  // no body has opaque surfels
     low = Vec3<float>(0);
     high = size = Vec3<float>(1);
     longest = 1;

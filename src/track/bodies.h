@@ -8,66 +8,68 @@
 #include "scene/nodes.h"
 #include "scene/surfels.h"
 
-// Which surfels move together, by the capture's masks.
+// Assigns surfels to bodies by the capture's masks.
 namespace traceflow {
 
-// The opacity of the points that bodies carry while they are followed. Where it learns, surfels of the front
-// fade, larger ones behind them show through, and the surface that pictures show moves away.
+// The fixed opacity of the points of bodies during tracking. If it were trained, surfels in front would fade,
+// larger ones behind would show through, and the visible surface would recede.
 inline constexpr float solid_opacity = 0.95F;
-// Gives that opacity to all that bodies carry and narrows them to 0.6 of their width, or of 1.5 times their
-// body's median. A solid surfel shows up to 1.1 of its width beyond its centre. Those on the sides that no
-// picture has shown yet stick out when they come to the rim: silhouettes then push the body away.
+// Sets that opacity for all surfels of bodies. Narrows them to 0.6 of their width, or of 1.5 times their
+// body's median if that is less. An opaque surfel is visible up to 1.1 of its width from its centre. At full
+// width, surfels on unseen sides would stick out when they reach the outline, and silhouettes would push the
+// body away.
 void make_solid(const Motion& motion, Surfels& surfels);
 
 // Points (P×3) of an inflated surface (track/inflation.h) for each part of the earliest mask that shows a
-// thing without points: fewer than 24 of `points` (P×3) lie in it, or what lies there is farther away than
-// what stands beside it, or most of it are standing points.
+// thing without points. That is a part with fewer than 24 of `points` (P×3), with points farther away than
+// what is beside it, or with mostly static points.
 Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>& points);
 
-// A body for each connected part of the earliest mask. It carries the surfels that project into the part and
-// lie no farther behind its front than it is wide; of a thing without points it carries those that stand at
-// points made up for it, which are surfels from row `points` on. Sets surfels.body and returns bodies that
-// stand still at the times of the training views; nothing where no part has enough surfels.
+// One body for each connected part of the earliest mask. A body gets the surfels that project into the part
+// and lie no farther behind its front than it is wide. The body of a thing without points gets the surfels at
+// its invented points, which are those from row `points` on. Sets surfels.body and returns bodies at rest at
+// the times of the training views. Returns nothing if no part has enough surfels.
 std::optional<Motion> find_bodies(const Capture& capture, int64_t points, Surfels& surfels);
 
-// Lets carried surfels go that their body takes out of the masks of the views up to the time
-// `latest`: they lay behind it, or beside it. surfels and motion on the CPU. Returns how many.
+// Releases surfels that the motion of their body moves out of the masks of the views up to the time `latest`:
+// they lay behind or beside the body. surfels and motion are on the CPU. Returns the number of released
+// surfels.
 int64_t release_strays(const Capture& capture, const Motion& motion, float latest, Surfels& surfels);
 
-// Nodes that let bodies bend, up to `each` of every body: spread evenly over its surfels of an opacity above
-// one half, at rest at every `every`th time of the motion. surfels and motion on the CPU.
+// Deformation nodes, up to `each` per body. They are spread evenly over the body's surfels with an opacity
+// above one half, and are at rest at every `every`th time of the motion. surfels and motion are on the CPU.
 Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, int64_t every);
 
-// Those of the bodies that are meant (one value a body). On the CPU.
+// The nodes of the selected bodies (one value per body). On the CPU.
 Nodes nodes_of(const Nodes& nodes, const std::vector<bool>& bodies);
 
-// Takes a body's poses, and what its nodes do, from elsewhere. On the CPU.
+// Copies the poses of a body and the motion of its nodes. On the CPU.
 void take_body(int32_t body, const Motion& from, const Nodes& nodes_from, Motion& motion, Nodes& nodes);
 
-// Training keeps a body's nodes where they are now (ops/motion/nodes.h). On the CPU.
+// Sets the anchors of a body's nodes (ops/motion/nodes.h) to their current positions. On the CPU.
 void anchor_nodes(const Motion& motion, int32_t body, Nodes& nodes);
 
-// Light that has not changed yet, in the box around all places of the bodies' opaque surfels, wider by 0.4 of
-// its longest side in each direction, at every `every`th time of the motion. cells: along the longest side.
-// on_bodies: on bodies too. On the CPU.
+// Unchanged light in the box around all places of the bodies' opaque surfels, at every `every`th time of the
+// motion. The box has a margin of 0.4 of its longest side in each direction. cells: along the longest side.
+// on_bodies: also on bodies. On the CPU.
 Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t cells, int64_t every,
                          bool on_bodies);
-// Sets the middle of light on each body to that of its opaque surfels at each time, and the radius to the
-// root of their mean squared distance from it at the first time. On the CPU.
+// Sets the centre of the light on each body to the mean of its opaque surfels at each time, and its radius to
+// their root mean square distance from it at the first time. On the CPU.
 void carry_lighting(const Motion& motion, const Surfels& surfels, Lighting& lighting);
 
-// How far pictures are from the photographs where surfels show that no body carries.
+// The differences between renders and photographs at surfels outside bodies.
 struct Unrest {
-  std::vector<double> sum;  // of squares, of each surfel
-  std::vector<int> count;   // of pictures
+  std::vector<double> sum;  // of squared differences, per surfel
+  std::vector<int> count;   // number of views, per surfel
 
-  // Adds one picture (H×W×3, with alpha and Σ w z of H×W) on the CPU. main: as it stands at the view's time.
-  // What lies behind something, and what is beside a mask, is left out.
+  // Adds one view: colour H×W×3, alpha and depth (Σ w z) H×W, on the CPU. main: the surfels, which are static
+  // outside bodies. Hidden surfels and those near a mask are left out.
   void look(const Surfels& main, const View& view, const ViewImages& images, const Tensor<float>& colour,
             const Tensor<float>& alpha, const Tensor<float>& depth);
 };
-// Marks the surfels that stand still: those whose pictures are no farther off than three times the median or
-// 0.1, and those of whose 16 nearest neighbours fewer than ten move. Returns their number. On the CPU.
+// Marks static surfels: those whose difference is at most three times the median or at most 0.1, and those
+// with fewer than ten moving ones among their 16 nearest neighbours. Returns their number. On the CPU.
 int64_t mark_still(const Unrest& unrest, Surfels& surfels);
 
 }  // namespace traceflow

@@ -7,8 +7,8 @@
 
 namespace traceflow {
 
-// Makes a body turn about another point (Motion::centre; world, at rest). Its points stay where they are at
-// every key.
+// Changes the point about which a body rotates (Motion::centre; world, at rest). The positions of its points
+// at all keys stay the same.
 void move_centre(int32_t body, const Vec3<double>& centre, Motion& motion);
 
 }  // namespace traceflow

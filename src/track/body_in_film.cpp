@@ -122,7 +122,7 @@ void BodyInFilm::find_what_is_in_front() {
 }
 
 void BodyInFilm::find_what_is_in_front(const raster::Output& picture, BodyInView& look) const {
-  constexpr float known = 0.7F;         // the share of a pixel that bodies cover
+  constexpr float known = 0.7F;         // share of a pixel that bodies must cover
   constexpr double behind = 0.1;        // radii
   constexpr double least_cosine = 0.3;  // between the surface and the ray to it
   const Camera<double> camera = convert<double>(look.view->drawn);
@@ -162,7 +162,6 @@ void BodyInFilm::show(BodyInView& look, bool with_derivatives) const {
   }
 }
 
-// Three film_channels at a point, and how they change with it; false where the picture does not show it.
 bool BodyInFilm::show(const BodyInView& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
                       ShownPoint& shown) const {
   const Camera<double> camera = convert<double>(photo.camera);

@@ -12,24 +12,24 @@
 #include "scene/surfels.h"
 #include "track/photo_alignment.h"
 
-// What the views of a film show of the points of a body (track/photometric_adjustment.h).
+// What the views of a video show of the points of a body (track/photometric_adjustment.h).
 namespace traceflow {
 
-// A view of the film as adjustment compares it with others.
+// A view of the video, as the adjustment compares it with others.
 struct FilmView {
   int64_t key = 0;      // of the motion
-  Camera<float> drawn;  // of the picture that tells what is in front
+  Camera<float> drawn;  // of the render that determines visibility
   DetailPhoto photo;
-  DetailPhoto normals;  // the prior's, in world, where the mask is set; empty without
+  DetailPhoto normals;  // of the prior, in world axes, where the mask is set; empty without priors
 };
 
 // Ascending by key.
 using FilmViews = std::shared_ptr<const std::vector<FilmView>>;
 
 inline constexpr size_t film_channels = 6;  // detail and normal
-inline constexpr size_t most_nodes = 4;     // that move a point: those of the largest weights
+inline constexpr size_t most_nodes = 4;     // that move a point: those with the largest weights
 
-// A node that moves a point: its place among those of the body, and its weight.
+// A node that moves a point: its index among the body's nodes, and its weight.
 struct NodeWeight {
   int64_t node = 0;
   double weight = 0;
@@ -51,19 +51,19 @@ struct NodeInView {
 struct ShownPoint {
   bool is_shown = false, has_normal = false;
   Mat3<double> bend{1};
-  Vec3<double> arm{0};  // from the body's pivot, in world
+  Vec3<double> arm{0};  // from the body's pivot, in world axes
   std::array<double, film_channels> value{};
-  std::array<Vec3<double>, film_channels> by_point{};  // in the frame at rest
-  std::array<Vec3<double>, 3> by_turn{};               // of the normal, by a turn of the bent frame
+  std::array<Vec3<double>, film_channels> by_point{};  // by the position in the rest frame
+  std::array<Vec3<double>, 3> by_turn{};               // of the normal, by a rotation of the deformed frame
 };
 
-// Where the body is in a view, and what that shows of it.
+// The pose of the body in a view, and what the view shows of it.
 struct BodyInView {
   const FilmView* view = nullptr;
   motion::KeySpan<float> span{nullptr, 0, 0};  // of the nodes' times
   std::vector<NodeInView> nodes;
   Mat3<double> rotation{1};
-  std::vector<uint8_t> in_front;  // of each point
+  std::vector<uint8_t> in_front;  // visibility of each point
   std::vector<ShownPoint> shown;
 };
 
@@ -73,14 +73,14 @@ struct BodyInFilm {
   int32_t body;
   raster::Options options;
   Motion& motion;
-  Nodes* all_nodes;            // of all bodies; null where the body is rigid
-  double radius = 1;           // root mean square of its surfels' distances from its pivot
+  Nodes* all_nodes;            // of all bodies; null if the body is rigid
+  double radius = 1;           // root mean square distance of its surfels from its centre
   std::vector<int64_t> nodes;  // of the body
   std::vector<FilmPoint> points;
   FilmViews film;
   std::vector<BodyInView> looks;
 
-  // At most 1,000 points: opaque surfels, evenly drawn.
+  // Selects at most 1,000 points: opaque surfels, evenly spaced by index.
   BodyInFilm(const Surfels& surfels, int32_t of_body, const raster::Options& drawing, Motion& moves,
              Nodes* bends);
 
@@ -90,13 +90,13 @@ struct BodyInFilm {
   float* turn(size_t n, int64_t time) const { return &all_nodes->turn(nodes[n], time, 0); }
   float* shift(size_t n, int64_t time) const { return &all_nodes->shift(nodes[n], time, 0); }
 
-  // Takes views instead of those it had.
+  // Replaces the views.
   void observe(FilmViews views);
-  // By pictures of all bodies where they stand.
+  // Determines visible points from renders of all bodies at their current poses.
   void find_what_is_in_front();
-  // What each view shows where the body stands.
+  // Samples all views at the current pose of the body.
   void show(bool with_derivatives);
-  // Where the body's pivot is at the time of a view.
+  // The position of the body's pivot at the time of a view.
   Vec3<double> pivot(const BodyInView& look) const;
 
  private:
@@ -108,10 +108,10 @@ struct BodyInFilm {
   Vec3<double> arm(const FilmPoint& point, const BodyInView& look) const;
   void find_what_is_in_front(const raster::Output& picture, BodyInView& look) const;
   void show(BodyInView& look, bool with_derivatives) const;
-  // Three channels at a point, and how they change with it; false where the picture does not show it.
+  // Three channels at a point, and their derivatives by its position; false if the image does not show it.
   bool show(const BodyInView& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
             ShownPoint& shown) const;
-  // The normal, as it would be at rest, and its derivatives.
+  // Rotates the normal and its derivatives back to the body at rest.
   static void take_to_rest(const BodyInView& look, bool with_derivatives, ShownPoint& shown);
 };
 

@@ -23,7 +23,8 @@ Tensor<float> places_of(const Surfels& main, const std::vector<int64_t>& rows) {
   return places;
 }
 
-// The connected components of points of which each is linked to those of its nearest that are near.
+// The connected components of points. Each point is linked to its nearest neighbours within a maximum
+// distance.
 std::vector<std::vector<int64_t>> linked_groups(const Tensor<float>& places) {
   const int64_t count = places.dim(0);
   const Neighbours near = nearest_neighbours(places, linked_neighbours);

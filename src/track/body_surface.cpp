@@ -14,7 +14,7 @@ Vec3<float> BodySurface::ray(int64_t pixel) const {
 
 BodySurface draw_bodies(const Camera<float>& camera, const Motion& motion, int64_t key,
                         const Surfels& surfels, const raster::Options& options) {
-  constexpr float known = 0.7F;  // the share of a pixel that a body covers where its surface is known
+  constexpr float known = 0.7F;  // share of a pixel that a body must cover
   PosedSurfels posed;
   deform::forward(surfels, nullptr, motion.time[key], {}, 0, field::Precision::fp32, posed, nullptr);
   motion::forward(motion, surfels.body, motion.time[key], {}, posed, *motion::make_saved());
@@ -25,7 +25,7 @@ BodySurface draw_bodies(const Camera<float>& camera, const Motion& motion, int64
   BodySurface surface{camera, {}, {}};
   raster::Output picture;
   for (int32_t body = 0; body < motion.bodies(); ++body) {
-    // The rasteriser's tint is then the share of this body.
+    // Uses the rasteriser's tint for the coverage by this body.
     for (int64_t i = 0; i < surfels.count(); ++i) posed.tint[i] = surfels.body[i] == body ? 1.0F : 0.0F;
     raster::forward(posed, camera, options, picture, nullptr);
     surface.points.resize(static_cast<size_t>(picture.alpha.size()));
@@ -49,7 +49,7 @@ std::vector<Mat3<double>> rotations_at(const Motion& motion, int64_t key) {
 }
 
 std::array<Vec3<double>, 2> pixel_by_point(const Camera<double>& camera, const Vec3<double>& in_camera) {
-  const Mat3<double> axes = transpose(camera.camera_from_world);  // columns: the camera's axes in world
+  const Mat3<double> axes = transpose(camera.camera_from_world);  // columns: the camera's axes in world axes
   const Vec3<double>& x = in_camera;
   return {camera.focal_x / x.z * (axes[0] - x.x / x.z * axes[2]),
           camera.focal_y / x.z * (axes[1] - x.y / x.z * axes[2])};

@@ -10,12 +10,12 @@ namespace traceflow {
 
 namespace {
 
-// Pixels, half open.
+// In pixels; x1 and y1 are exclusive.
 struct Box {
   int64_t x0, y0, x1, y1;
 };
 
-// The smallest that holds every pixel with a number that is not 0.
+// The smallest box that contains all pixels with a number other than 0.
 Box box_of(const Tensor<float>& image, int64_t height, int64_t width, int64_t numbers) {
   Box box{width, height, 0, 0};
   for (int64_t y = 0; y < height; ++y) {

@@ -16,7 +16,7 @@ Vec2<float> middle_of(int64_t pixel, int64_t width) {
   return {static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F};
 }
 
-// The part's pixels that have a neighbour outside of it. The picture's border is none.
+// The part's pixels with a neighbour outside the part. The image border does not count.
 std::vector<Vec2<float>> outline_of(const std::vector<int64_t>& part, const Camera<float>& camera) {
   const int64_t height = camera.height, width = camera.width;
   Tensor<uint8_t> mask({height, width});

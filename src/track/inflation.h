@@ -6,19 +6,19 @@
 #include "base/tensor.h"
 #include "math/camera.h"
 
-// A first shape of a thing that no point lies on: its silhouette, inflated.
+// The initial shape of a thing without points: its inflated silhouette.
 namespace traceflow {
 
-// How far from the camera's plane a thing is whose silhouette a part of a mask (indices of its pixels) is:
-// as far as the nearest of what stands beside it, for what it hides is farther, and what it stands on is not.
-// Of the points (P×3) in no part of the mask (H×W), the eight nearest in the picture to each pixel of the
-// outline count: a tenth of the outline has two of them that are nearer. None where points are half the
-// part's size away.
+// The depth of the thing whose silhouette is `part` (pixel indices): that of the nearest surface beside it.
+// Surface that the thing hides is farther away, but the surface that it rests on is not. Candidates are
+// points (P×3) outside all parts of the mask (H×W). Of the eight nearest in the image to each outline pixel,
+// the second smallest depth counts; the result is the lowest tenth percentile over the outline. Returns
+// nothing if the points are farther away than half the part's size.
 std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor<uint8_t>& mask,
                                   const Camera<float>& camera, const Tensor<float>& points);
 
-// Points of a surface that is as high over the plane of its outline, towards the camera, as a circle through
-// the outline is round: a disc becomes half a ball. One for each pixel, or evenly fewer, `most` at most.
+// Points of a surface that rises above the plane of its outline, towards the camera, like a circle: a disc
+// becomes half a ball. One point per pixel, or an evenly thinned set of at most `most`.
 Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& camera, float depth,
                        int64_t most);
 

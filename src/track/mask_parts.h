@@ -6,7 +6,7 @@
 
 namespace traceflow {
 
-// The connected parts (8 neighbours) of a mask (H×W): the indices of each one's pixels, in the order of their
+// The connected parts (8 neighbours) of a mask (H×W): the pixel indices of each part, in the order of their
 // first pixels.
 std::vector<std::vector<int64_t>> mask_parts(const Tensor<uint8_t>& mask);
 

@@ -16,15 +16,16 @@ Vec3<double> turn_of_mirror_image(const BodySurface& surface, int32_t body, cons
     const Vec3<double> to_eye = normalize(first_eye - position);
     const double cosine = dot(normal, to_eye);
     if (cosine < least_cosine) continue;
-    // What comes from this direction is seen where the normal is half way between it and the eye.
+    // The second view sees light from this direction where the normal is half way between it and the
+    // direction to the eye.
     const Vec3<double> mirrored = 2 * cosine * normal - to_eye;
     const Vec3<double> then = normalize(mirrored + normalize(eye - position - shift));
     a += Mat3<double>(1) - outerProduct(normal, normal);
     b += cross(normal, then);
     ++pixels;
   }
-  // A plane tells nothing of turns about its normal.
-  constexpr double pull = 1e-3;  // of a pixel, towards none
+  // A plane does not show rotations about its normal.
+  constexpr double pull = 1e-3;  // per pixel, towards zero
   return pixels < least_pixels ? Vec3<double>(0) : inverse(a + Mat3<double>(pull * pixels)) * b;
 }
 

@@ -15,16 +15,16 @@ namespace traceflow {
 
 namespace {
 
-// Shares of a pixel: that the mask covers where surface is missing, and that bodies cover there at most.
+// Shares of a pixel: the least that the mask covers and the most that bodies cover where surface is missing.
 constexpr float in_mask = 0.95F, uncovered = 0.5F;
 constexpr int most_rings = 6;
-// How far the surface may come nearer or go away from one pixel to the next, as a share of its distance.
+// The largest change of distance between neighbouring pixels, as a share of the distance.
 constexpr float most_step = 0.05F;
 constexpr float least_facing = 0.2F;  // cosine
 constexpr float pixels_per_scale = 0.6F, first_opacity = 0.7F;
 
-// Whether the mask covers a pixel and the four around it. A surfel at the mask's edge would stick out, and
-// the next time's silhouette would push its body away from the camera.
+// Whether the mask covers a pixel and its four neighbours. A surfel at the mask's edge would stick out, and
+// the next key's silhouette would push its body away from the camera.
 bool is_inside(const Tensor<float>& coverage, int64_t pixel) {
   const int64_t height = coverage.dim(0), width = coverage.dim(1);
   const int64_t row = pixel / width, column = pixel % width;
@@ -33,7 +33,7 @@ bool is_inside(const Tensor<float>& coverage, int64_t pixel) {
                    coverage[pixel + width]}) >= in_mask;
 }
 
-// The pixels inside the mask that no body covers. What the mask leaves out is taken out of the surface.
+// The pixels inside the mask that no body covers. Removes points outside the mask from the surface.
 std::vector<int64_t> missing_pixels(const TrackTarget& target, BodySurface& surface) {
   std::vector<int64_t> missing;
   for (int64_t at = 0; at < target.coverage.size(); ++at) {
@@ -43,7 +43,8 @@ std::vector<int64_t> missing_pixels(const TrackTarget& target, BodySurface& surf
   return missing;
 }
 
-// The mean of where the planes of the eight neighbours meet the pixel's ray; body −1 where none does.
+// The mean of the points where the planes of the eight neighbours meet the pixel's ray; body −1 if there are
+// none.
 SurfacePoint continued(const BodySurface& surface, const Tensor<float>& normal_prior, int64_t pixel) {
   const int64_t height = surface.camera.height, width = surface.camera.width;
   const Vec3<float> eye = surface.camera.position, ray = surface.ray(pixel);
@@ -55,7 +56,7 @@ SurfacePoint continued(const BodySurface& surface, const Tensor<float>& normal_p
     for (int64_t x = std::max<int64_t>(0, column - 1); x <= std::min(width - 1, column + 1); ++x) {
       const SurfacePoint& beside = surface.points[static_cast<size_t>(y * width + x)];
       if (beside.body < 0 || (sum.body >= 0 && sum.body != beside.body)) continue;
-      // The chord from one pixel to the next has the mean of both normals.
+      // The chord between the two pixels has the mean of both normals.
       const Vec3<float> normal = normalize(beside.normal + prior);
       const float cosine = dot(normal, ray) / length(ray);
       if (!(-cosine > least_facing)) continue;
@@ -72,7 +73,7 @@ SurfacePoint continued(const BodySurface& surface, const Tensor<float>& normal_p
   return {sum.body, sum.position / count, normalize(sum.normal)};
 }
 
-// Continues the surface ring by ring. Returns the pixels that got a point.
+// Continues the surface ring by ring. Returns the pixels with a new point.
 std::vector<int64_t> grow(BodySurface& surface, const Tensor<float>& normal_prior,
                           std::vector<int64_t> missing) {
   std::vector<int64_t> found;

@@ -8,12 +8,12 @@
 
 namespace traceflow {
 
-// Normal equations of P numbers: a (P×P, row-major, the lower triangle) and b.
+// Normal equations of P numbers: a (P×P, row-major, lower triangle) and b.
 struct NormalEquations {
   std::vector<double> a, b;
 
   explicit NormalEquations(size_t params) : a(params * params), b(params) {}
-  // Adds one weighted residual, whose derivatives by `count` numbers that follow each other are `row`.
+  // Adds one weighted residual. `row` has its derivatives by `count` consecutive numbers.
   template <size_t count>
   void add(size_t first, const std::array<double, count>& row, double residual, double share) {
     const size_t params = b.size();

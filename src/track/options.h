@@ -2,10 +2,10 @@
 
 #include "base/options.h"
 
-// The options of following bodies (docs/train.md, Bodies).
+// The options of tracking bodies (docs/train.md, Bodies).
 namespace traceflow {
 
-// How bodies are followed through the film before everything trains (deform.kind = nodes).
+// How bodies are tracked through the video before everything trains (deform.kind = nodes).
 struct TrackOptions {
   int warm_up = 300;
   int map_each = 4;
@@ -61,7 +61,7 @@ struct TrackOptions {
   void validate() const;
 };
 
-// How bodies bend that one rigid pose does not explain (deform.kind = nodes).
+// How bodies deform that one rigid pose does not explain (deform.kind = nodes).
 struct BendOptions {
   int nodes = 16;
   int every = 3;

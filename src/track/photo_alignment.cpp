@@ -14,11 +14,11 @@ namespace traceflow {
 
 namespace {
 
-// Detail is what is finer than so many pixels. Coarser patterns are shading, which stays where it is when a
-// body turns: at four pixels a quarter of each turn was lost on a small ball.
+// Detail is finer than this number of pixels. Coarser patterns are shading, which does not rotate with a
+// body: at four pixels a quarter of each rotation was lost on a small ball.
 constexpr double detail_sigma = 2;
-constexpr double widest_detail = 3;  // times the blur, where photographs are blurred
-// The weight of a difference of colours, and where the cost of one becomes linear.
+constexpr double widest_detail = 3;  // times the blur, if photographs are blurred
+// The weight of a colour difference, and the width of Huber's cost.
 constexpr double weight = 1.5, huber_width = 0.05;
 constexpr float least_cosine = 0.3F;  // between a surface and the ray to it
 constexpr int64_t most_samples = 2000;
@@ -27,8 +27,8 @@ bool faces(const Vec3<double>& normal, const Vec3<double>& ray) {
   return -dot(normal, ray) > least_cosine * length(ray);
 }
 
-// Turns an image (H×W×channels) into its mean within a few pixels, over what the mask covers: what is beside
-// a body does not move with it.
+// Replaces an image (H×W×channels) by its blurred mean over covered pixels, because what is beside a body
+// does not move with it.
 void take_mean(const Tensor<float>& coverage, int64_t channels, double sigma, Tensor<float>& image) {
   constexpr float least = 1e-3F;
   const int64_t height = coverage.dim(0), width = coverage.dim(1);
@@ -40,8 +40,9 @@ void take_mean(const Tensor<float>& coverage, int64_t channels, double sigma, Te
     image[i] = share[i / channels] > least ? image[i] / share[i / channels] : 0.0F;
 }
 
-// Takes what is clipped, and what is near it, out of a photograph's coverage. A highlight stays where it is
-// when a body turns, and is so bright that it outweighs the texture. Where much is clipped the body is white.
+// Removes clipped pixels and their surroundings from a photograph's coverage. A highlight does not rotate
+// with a body and is bright enough to outweigh the texture. If many pixels are clipped, the body is white and
+// keeps them.
 void leave_clipped_out(FinePhotograph& photograph) {
   constexpr float clipped = 0.97F;
   constexpr int64_t margin = 2;         // pixels
@@ -93,11 +94,11 @@ std::optional<SeenSample> see(const DetailSample& sample, const Camera<double>& 
   return seen;
 }
 
-// The cost of one body's samples. What is hidden costs as much as what is seen: a turn that hides what
-// differs pays nothing.
+// The cost of one body's samples. Hidden samples cost as much as visible ones, so that a rotation gains
+// nothing by hiding differences.
 double align_body(const Alignment& alignment, std::span<const DetailSample> samples, const Motion& motion,
                   int64_t key, const Mat3<double>& loose, NormalEquations* equations) {
-  constexpr double least_seen = 0.25;  // of the samples; where it is less, each costs 1
+  constexpr double least_seen = 0.25;  // of the samples; below it each costs 1
   const auto body = samples.front().rest.body;
   const Camera<double> camera = convert<double>(alignment.photo->camera);
   const Mat3<double> rotation = rotation_from_quaternion(load4<double>(&motion.rotation(body, key, 0)));
@@ -200,7 +201,7 @@ std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySur
       const Vec3<float> ray =
           photo.camera.ray_in_world(static_cast<float>(x) + 0.5F, static_cast<float>(y) + 0.5F);
       if (!faces(Vec3<double>(point.normal), Vec3<double>(ray))) continue;
-      // The drawn pixel's plane, where the finer pixel's ray meets it.
+      // The intersection of the finer pixel's ray with the plane of the rendered pixel.
       const float away = dot(point.normal, point.position - photo.camera.position) / dot(point.normal, ray);
       point.position = photo.camera.position + away * ray;
       found[static_cast<size_t>(point.body)].push_back(

@@ -8,55 +8,55 @@
 #include "track/body_surface.h"
 #include "track/normal_equations.h"
 
-// Direct alignment: how a body has turned from one photograph to another, by its texture. It needs no colours
-// of the model, which are blurred while bodies are followed.
+// Direct alignment: the rotation of a body between two photographs, by its texture. It does not use the
+// colours of the surfels, which are blurred during tracking.
 namespace traceflow {
 
-// A photograph as alignment compares it.
+// A photograph as the alignment compares it.
 struct DetailPhoto {
   Camera<float> camera;
   Tensor<float>
-      detail;  // H×W×3, the colour less its mean within a few pixels of the mask: what shading leaves
+      detail;  // H×W×3, the colour minus its mean within a few pixels inside the mask, without shading
   Tensor<uint8_t> mask;  // H×W
 };
-// blur: pixels; detail is then what is coarser than that and finer than three times it. The mask leaves out
-// what is clipped, unless that is more than a fifth.
+// blur: in pixels; if it is not 0, the detail is coarser than blur and finer than three times blur. The mask
+// leaves out clipped pixels, unless they are more than a fifth of it.
 DetailPhoto detail_of(FinePhotograph photograph, double blur = 0);
 
-// The part that the mask covers; as it is where it covers nothing.
+// The part covered by the mask; the whole image if the mask covers nothing.
 DetailPhoto cropped(const DetailPhoto& photo);
 
-// A photograph at a place between pixels, and its derivatives along both sides.
+// A photograph at a place between pixels, and its derivatives by x and y.
 struct Looked {
   Vec3<double> value, by_x, by_y;
 };
-// Bilinear; none outside of the mask or the picture.
+// Bilinear. Returns nothing outside the mask or the image.
 std::optional<Looked> look(const DetailPhoto& photo, double x, double y);
 
-// Points of bodies at rest, with the detail that the photograph of one time shows there.
+// A point of a body at rest, with the detail of a photograph there.
 struct DetailSample {
   SurfacePoint rest;
   Vec3<float> detail{0};
 };
 
-// Which turns of each body photographs decide: projects its ω onto them; 0 for none.
+// For each body, the projection of ω onto the rotations that photographs determine; 0 if there are none.
 using LooseTurns = std::vector<Mat3<double>>;
 
-// The samples of a key, body after body, at most 2,000 of each body that has loose turns. surface: as drawn
+// The samples of a key, ordered by body, at most 2,000 for each body with loose rotations. surface: rendered
 // at that key.
 std::vector<DetailSample> detail_samples(const DetailPhoto& photo, const BodySurface& surface,
                                          const Motion& motion, int64_t key, const LooseTurns& loose);
 
-// What an earlier time says of the photograph of another.
+// The comparison of an earlier key with the photograph of another.
 struct Alignment {
-  std::shared_ptr<const DetailPhoto> photo;  // of the time whose poses are sought
+  std::shared_ptr<const DetailPhoto> photo;  // of the key whose poses are solved
   std::vector<DetailSample> samples;
   double weight = 1;  // of a sample's cost
 };
 
-// The robust cost (Huber) of the alignment with bodies as they stand at a key; samples that do not show count
-// as the mean of their body's that do. Adds to `equations`, six numbers a body of which ω (about its pivot)
-// is used, unless it is null. Its b is the cost's derivative, negative.
+// The robust cost (Huber) of the alignment for the bodies at a key. Hidden samples cost as much as the mean
+// of the visible ones of their body. Adds to `equations` unless it is null: six numbers per body, of which
+// only ω (about its pivot) is used. b gets the negative derivative of the cost.
 double align(const Alignment& alignment, const Motion& motion, int64_t key, const LooseTurns& loose,
              NormalEquations* equations);
 

@@ -15,16 +15,17 @@ namespace traceflow {
 namespace {
 
 constexpr int64_t pose_numbers = 6;
-// Of residuals, of which those of detail and normals count alike, as squares up to the width.
+// Weights of the residuals of detail and normals, and the width of Huber's cost.
 constexpr double detail_weight = 1.5, normal_weight = 1, robust_width = 0.05;
-// Of neighbouring nodes, of their speed, and of what leaves its place: along the ray from the camera, of
-// which texture tells little, and elsewhere. In residuals of the size of a radius or radian.
+// Weights of the strain between neighbouring nodes, of their speed, and of displacements from the start:
+// along the camera ray, where texture determines little, and in all directions. For residuals in radii or
+// radians.
 constexpr double strain = 100, haste = 0.1, node_depth = 10, node_stays = 1, pose_depth = 1000,
                  pose_stays = 10;
 constexpr double damping_share = 1e-3;
 constexpr int step_tries = 3;
 constexpr double step_shortens = 0.4;
-constexpr int steps_of_a_look = 3;  // what is in front is found anew after so many
+constexpr int steps_of_a_look = 3;  // then visibility is determined again
 
 using Derivatives = PhotometricAdjustment::Derivatives;
 using Equations = PhotometricAdjustment::Equations;
@@ -34,7 +35,7 @@ struct ViewPair {
   size_t later, earlier;
 };
 
-// Numbers of the equations that follow each other, and where they come from: a pair's numbers, times a share.
+// Consecutive numbers of the equations, and their source: the numbers of a pair, times a share.
 struct Segment {
   int64_t block, offset, from, size;
   double share;
@@ -57,14 +58,14 @@ Vec3<double> unit_vector(int axis) {
 
 struct PhotometricAdjustment::State : BodyInFilm {
   std::vector<ViewPair> pairs;
-  // Of the equations: a block for each time of the nodes, of what they do there and of the poses up to the
-  // next, or for each pose where there are none.
+  // The blocks of the equations. With nodes, each of their times has one block, with the nodes at that time
+  // and the poses up to the next time. Without nodes each pose has one.
   std::vector<int64_t> block_of_key, first_key, block_sizes;
   int64_t half_bandwidth = 1;
   Motion start_motion;
   Nodes start_nodes;
   std::vector<Vec3<double>> pose_rays,
-      node_rays;  // unit; of each key in world; of each node and time at rest
+      node_rays;  // unit: per key in world axes; per node and time in the rest frame
 
   State(const Surfels& surfels, int32_t of_body, const raster::Options& drawing, Motion& moves, Nodes* bends)
       : BodyInFilm(surfels, of_body, drawing, moves, bends), start_motion(moves) {
@@ -101,7 +102,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
     find_rays();
   }
 
-  // Each with those of earlier keys whose cameras are the nearest.
+  // Pairs each view with that of the nearest camera at each of some earlier keys.
   void pair_views() {
     constexpr std::array<int64_t, 4> keys_apart = {1, 3, 9, 27};
     pairs.clear();
@@ -161,7 +162,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
       if (later.in_front[i] == 0 || earlier.in_front[i] == 0) continue;
       const ShownPoint &a = later.shown[i], &b = earlier.shown[i];
       if (!a.is_shown || !b.is_shown) {
-        cost += robust_width / 2;  // leaving the view pays no better than a difference
+        cost += robust_width / 2;  // hiding a point must not cost less than a difference
         continue;
       }
       const size_t count = a.has_normal && b.has_normal ? film_channels : 3;
@@ -186,8 +187,8 @@ struct PhotometricAdjustment::State : BodyInFilm {
     return static_cast<double>(count);
   }
 
-  // One channel's derivatives by what one view sees: of the nodes that move the point, and of the pose.
-  // by_point: in the frame at rest; by_turn: of the bent frame.
+  // The derivatives of one channel in one view: by the nodes that move the point, and by the pose. by_point:
+  // in the rest frame; by_turn: of the deformed frame.
   template <class F>
   void for_numbers(const FilmPoint& point, const BodyInView& look, const ShownPoint& shown,
                    const Vec3<double>& by_point, const Vec3<double>& by_turn, F&& f) const {
@@ -204,7 +205,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
     f(node_numbers(), cross(shown.arm, in_world) + look.rotation * by_turn, radius * in_world);
   }
 
-  // Of a pair's numbers: those of the nodes and of the pose as the later view sees them, then as the earlier.
+  // A pair has the numbers of nodes and pose in the later view, followed by those in the earlier one.
   int64_t view_numbers() const { return node_numbers() + pose_numbers; }
 
   void add_pair(const ViewPair& pair, Derivatives derivatives, Eigen::MatrixXd& a, Eigen::VectorXd& b) const {
@@ -226,7 +227,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
           const ShownPoint& in = *shown[view];
           const double sign = view == 0 ? weight_of(c) : -weight_of(c);
           Vec3<double> by_point = in.by_point[c];
-          // What moves a point out of the surface is parallax, which differs.
+          // Motion out of the surface is parallax, which differs between the views.
           if (derivatives == Derivatives::mean)
             by_point = mean + dot(by_point - mean, points[i].normal) * points[i].normal;
           const Vec3<double> by_turn = c < 3 ? Vec3<double>(0) : in.by_turn[c - 3];
@@ -297,7 +298,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
     return to;
   }
 
-  // Derivatives of a residual by numbers of the equations.
+  // The derivative of a residual by a number of the equations.
   struct Derivative {
     int64_t block, offset;
     double by;
@@ -324,7 +325,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
     return cost;
   }
 
-  // As nodes::resist has it.
+  // As in nodes::resist.
   double strain_cost(size_t n, int64_t time, Equations* to) const {
     const Vec3<double> rest = load3<double>(all_nodes->centre.row(nodes[n]));
     const Mat3<double> rotation = rotation_from_quaternion(quaternion_exp(load3<double>(turn(n, time))));
@@ -413,7 +414,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
 
   double cost() { return texture_cost() + shape_cost(nullptr); }
 
-  // The first time stays as it is.
+  // Fixes the first key.
   void hold_first(Equations& to) const {
     constexpr double stiff = 1e12;
     auto diagonal = to.a.at(0, 0).diagonal();

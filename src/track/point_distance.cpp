@@ -9,11 +9,11 @@ namespace traceflow {
 namespace {
 
 constexpr double inner = 0.4;  // radii from the outline
-constexpr double near = 0.6;   // radii from what is drawn
+constexpr double near = 0.6;   // radii from the rendered surface
 constexpr size_t least_points = 30;
 constexpr double least_errors = 3;
 
-// Whether all that is so many pixels away shows the same body.
+// Whether the pixels `away` pixels away in all eight directions show the same body.
 bool is_inside(const BodySurface& surface, int64_t row, int64_t column, int64_t away) {
   const int64_t height = surface.camera.height, width = surface.camera.width;
   const int32_t body = surface.points[static_cast<size_t>(row * width + column)].body;
@@ -67,7 +67,8 @@ std::vector<double> distance_by_points(const BodySurface& surface, const Tensor<
     if (of_body.size() < least_points) continue;
     const double ratio = median(of_body);
     for (double& value : of_body) value = std::abs(value - ratio);
-    // Of a median; the deviation of a normal distribution is 1.48 times the median of the absolute ones.
+    // The standard error of a median. A normal distribution's deviation is 1.48 times its median absolute
+    // deviation.
     const double error = 1.25 * 1.48 * median(of_body) / std::sqrt(static_cast<double>(of_body.size()));
     if (std::abs(ratio - 1) > least_errors * error) ratios[body] = ratio;
   }

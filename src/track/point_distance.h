@@ -8,10 +8,10 @@
 
 namespace traceflow {
 
-// How many times as far from the camera as they are drawn bodies are by the capture's points (P×3, where
-// things are at the first time): of each body the median over the points that show in its inner part and lie
-// within 0.6 of its radius from what is drawn there; what is farther is its back. 1 where fewer than 30 tell
-// or where it is within three standard errors. surface: of the first key.
+// For each body, the ratio of the distance of the capture's points (P×3, positions at the first key) to the
+// rendered distance. It is the median over points in the inner part of the body's image that lie within 0.6
+// radii of the rendered surface; farther ones are on its back. 1 if there are fewer than 30 points or if the
+// difference from 1 is within three standard errors. surface: of the first key.
 std::vector<double> distance_by_points(const BodySurface& surface, const Tensor<float>& points,
                                        int64_t bodies);
 

@@ -21,14 +21,14 @@ constexpr int pose_size = 6;
 constexpr int channels = 7;  // silhouette, normal, colour
 constexpr double huber = 0.05;
 constexpr double blur_falls = 0.7;
-// A step turns a body by at most so many radians and shifts it by so many of its radii.
+// The largest rotation of a step, in radians, and its largest translation, in radii of the body.
 constexpr double most_turn = 0.1, most_shift = 0.15;
 constexpr double relative_damping = 1e-3, least_damping = 1e-3;
 constexpr double pi = 3.141592653589793;
 constexpr int tries = 3;
 constexpr double shorter = 0.4;
 
-// Solves a x = b for a symmetric positive definite a (n×n), by elimination.
+// Solves a x = b for a symmetric positive definite a (n×n), by Gaussian elimination.
 std::vector<double> solve_symmetric(std::vector<double> a, std::vector<double> b) {
   const size_t n = b.size();
   for (size_t i = 0; i < n; ++i) {
@@ -45,7 +45,7 @@ std::vector<double> solve_symmetric(std::vector<double> a, std::vector<double> b
   return b;
 }
 
-// Turns priors by what those of the surroundings are off by.
+// Corrects priors by the bias of those outside the mask.
 void turn_by_surroundings(const raster::Output& picture, TrackTarget& target) {
   PriorBias surroundings;
   for (int64_t i = 0; i < picture.alpha.size(); ++i) {
@@ -137,14 +137,14 @@ PoseSolver::PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, 
       normal_weight_(targets_.size()),
       colour_weight_(targets_.size()),
       blended_(raster::make_saved()) {
-  options_.sort = raster::SortOrder::centre;  // as body_jacobian asks
-  // The low-pass widens surfels by a share of a pixel: by more than in training where pixels are larger.
+  options_.sort = raster::SortOrder::centre;  // required by body_jacobian
+  // The low-pass widens surfels by a share of a pixel, which is more than in training if pixels are larger.
   const bool is_any_shrunk =
       std::any_of(targets_.begin(), targets_.end(), [](const TrackTarget& t) { return t.is_shrunk; });
   if (is_any_shrunk) options_.low_pass = 0;
   deform::forward(main, nullptr, motion.time[key], {}, 0, field::Precision::fp32, still_, nullptr);
   if (nodes != nullptr) nodes::forward(*nodes, main.body, motion.time[key], {}, still_, *nodes::make_saved());
-  // The rasteriser's tint is then the silhouette.
+  // Uses the rasteriser's tint for the silhouette.
   still_.tint.resize({main.count()});
   for (int64_t i = 0; i < main.count(); ++i) still_.tint[i] = main.body[i] >= 0 ? 1.0F : 0.0F;
   pose();
@@ -180,7 +180,7 @@ void PoseSolver::weigh_normals(const TrackWeights& weights, Over over) {
   }
 }
 
-// Where bodies with different weights meet, a pixel has the mean of what shows there.
+// A pixel where bodies with different weights meet gets the blended weight.
 void PoseSolver::weigh_colour(const TrackWeights& weights) {
   const bool any = std::any_of(weights.colour.begin(), weights.colour.end(), [](float w) { return w > 0; });
   PosedSurfels weighted = posed_;
@@ -258,7 +258,7 @@ void PoseSolver::hold_loose(NormalEquations& equations) const {
   for (size_t body = 0; body < loose_.size(); ++body) {
     const Mat3<double> keep = Mat3<double>(1) - loose_[body];
     const size_t first = pose_size * body;
-    // Of three numbers `apart` places from one another.
+    // For three numbers with a stride of `apart`.
     const auto project = [&](double* values, size_t apart) {
       const Vec3<double> kept = keep * Vec3<double>(values[0], values[apart], values[2 * apart]);
       for (size_t c = 0; c < 3; ++c) values[c * apart] = kept[static_cast<int>(c)];
@@ -291,7 +291,7 @@ double PoseSolver::cost_of_texture(const TrackWeights& weights, NormalEquations*
 }
 
 std::vector<PoseSolver::PoseStiffness> PoseSolver::pose_stiffness(const TrackWeights& weights) {
-  // Surfels are flat. The blur takes out how they show one by one as a round surface turns.
+  // Surfels are flat. The blur removes how each one shows as a round surface rotates.
   constexpr double sigma = 2;  // pixels
   weigh(weights);
   NormalEquations equations(params_);
@@ -337,7 +337,7 @@ std::vector<Vec3<double>> PoseSolver::turn_centres(const TrackWeights& weights) 
   std::vector<Vec3<double>> result;
   const std::vector<PoseStiffness> stiffness = pose_stiffness(weights);
   for (size_t body = 0; body < stiffness.size(); ++body) {
-    // About a point d from the pivot, shifts and turns are coupled by A_sω + A_ss [d]×.
+    // About a point d from the pivot, translations and rotations are coupled by A_sω + A_ss [d]×.
     const auto& [turn, both, shift] = stiffness[body];
     Mat3<double> a(0);
     Vec3<double> b(0);
@@ -368,7 +368,7 @@ std::vector<double> PoseSolver::step(const TrackWeights& weights, double sigma, 
 
 std::vector<double> PoseSolver::solved(NormalEquations equations, double damping, bool depth_is_held) const {
   auto& [a, b] = equations;
-  // Shifts in radii, so that both kinds of numbers are of one size.
+  // Translations in radii, so that both kinds of numbers have the same scale.
   const auto unit = [&](size_t p) { return p % pose_size < 3 ? 1.0 : radius_[p / pose_size]; };
   for (size_t p = 0; p < params_; ++p) {
     for (size_t q = 0; q <= p; ++q) {
@@ -388,7 +388,7 @@ std::vector<double> PoseSolver::solved(NormalEquations equations, double damping
 }
 
 void PoseSolver::hold_depth(std::vector<double>& matrix) const {
-  constexpr double stiffness = 1e3;  // beside what pictures tell
+  constexpr double stiffness = 1e3;  // relative to that of the images
   const Vec3<double> eye(targets_[0].camera.position);
   for (size_t body = 0; body < radius_.size(); ++body) {
     const Vec3<double> ray = normalize(load3<double>(pivot_.row(static_cast<int64_t>(body))) - eye);
@@ -401,7 +401,7 @@ void PoseSolver::hold_depth(std::vector<double>& matrix) const {
   }
 }
 
-// Turns and shifts the bodies: by ω (left) and s for each.
+// Rotates (from the left) and translates each body, by ω and s.
 void PoseSolver::take(const std::vector<double>& step) {
   for (int64_t b = 0; b < motion_.bodies(); ++b) {
     const double* const d = step.data() + pose_size * b;
@@ -452,7 +452,7 @@ std::vector<Vec3<double>> PoseSolver::turns_of_steps(F&& next) {
   constexpr int steps = 3;
   const Tensor<float> rotation = motion_.rotation, shift = motion_.shift;
   for (int k = 0; k < steps; ++k) {
-    constexpr double damping = 1;  // what is not told stays
+    constexpr double damping = 1;  // holds what the residuals do not determine
     take(solved(next(), damping, false));
   }
   std::vector<Vec3<double>> turns;

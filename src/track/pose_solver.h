@@ -26,98 +26,100 @@ struct TrackTarget {
   bool prior_is_unbiased = false;  // in the mask
 };
 
-// Weights of what is compared: residuals are in [0, 1], normals unit.
+// Weights of the residuals: colours and silhouettes are in [0, 1], normals are unit vectors.
 struct TrackWeights {
   float silhouette = 0, normal = 0;
-  // Of each body.
+  // For each body.
   std::vector<float> colour = {};
   std::vector<bool> tracks =
-      {};  // whether tracked points decide its pose, or its loose turns alone; empty: those
+      {};  // per body: tracks determine the whole pose, or only loose rotations; empty: the latter
 };
 
 // How poses are solved.
 struct PoseSteps {
   int count = 0;
-  double blur = 0;          // of the first step, pixels; 0.7 of it at each step that follows
-  bool hold_depth = false;  // bodies stay as far away as they are, where one camera sees them
+  double blur = 0;          // of the first step, in pixels; each further step has 0.7 of it
+  bool hold_depth = false;  // the distances of bodies are fixed if one camera sees them
 };
 
-// Gauss–Newton on the poses of all bodies at one key of a motion, six numbers a body, on pictures of that
-// time. On the CPU; the same bytes at any thread count.
+// Gauss–Newton on the poses of all bodies at one key of a motion, six numbers per body, on the images of that
+// key. On the CPU; the result has the same bytes at any thread count.
 class PoseSolver {
  public:
-  // Keeps references. nodes: null where bodies are rigid. options: how pictures are drawn.
+  // Keeps references. nodes: null if bodies are rigid. options: of the rasteriser.
   PoseSolver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key,
              const raster::Options& options, std::vector<TrackTarget> targets);
 
-  // Turns each target's priors whose bias is not known, in the camera's axes, so that those of what stands
-  // still agree with the model.
+  // Rotates the priors of each target whose bias is not known, in camera axes, so that those of static
+  // surfaces agree with the model.
   void turn_priors();
   const std::vector<TrackTarget>& targets() const { return targets_; }
-  // How pictures are drawn.
+  // The options of the rasteriser.
   const raster::Options& drawing() const { return options_; }
-  // How stiffly what is weighed holds each body's turns where it stands, least first: eigenvalues of the
-  // normal equations of ω (radians, its shift free), over the pixels of a disk of its size, and their axes.
-  // Empty without normal priors: silhouettes alone hold hardly anything.
+  // How strongly the weighted residuals constrain the rotations of each body, lowest first: the eigenvalues
+  // of the normal equations of ω (radians, with the translation eliminated), over the pixels of a disk of the
+  // body's size, and their axes. Empty without normal priors, because silhouettes alone constrain hardly
+  // anything.
   std::vector<SymmetricEigen<3, double>> turn_stiffness(const TrackWeights& weights);
-  // The points, in world, about which what is weighed tells turns and shifts apart: the centre of a ball,
-  // about which nothing but its texture tells a turn. At most a radius from where a body turns now.
+  // The points, in world coordinates, about which the weighted residuals decouple rotations and translations.
+  // For a ball it is the centre, about which only texture shows rotations. At most a radius from the present
+  // pivot.
   std::vector<Vec3<double>> turn_centres(const TrackWeights& weights);
-  // Turns that silhouettes, normals and the model's colours do not change: only photographs that are compared
-  // and tracked points do, by_texture of them.
+  // Sets the loose rotations, which silhouettes, normals and the model's colours do not change. Of these,
+  // photographs and tracked points change those in by_texture.
   void loosen(LooseTurns loose, LooseTurns by_texture) {
     loose_ = std::move(loose);
     by_texture_ = std::move(by_texture);
   }
   void compare(Alignment alignment) { alignments_.push_back(std::move(alignment)); }
   void compare(Reprojection reprojection) { reprojections_.push_back(std::move(reprojection)); }
-  // Steps on blurred residuals; each is taken where the cost falls, else shorter ones are tried.
+  // Makes steps on blurred residuals. A step is accepted if the cost falls; otherwise shorter ones are tried.
   void solve(const TrackWeights& weights, const PoseSteps& steps);
-  // What the targets cost where bodies stand.
+  // The cost of the targets at the current poses.
   double cost(const TrackWeights& weights);
-  // After the motion has been changed by others.
+  // Call after others have changed the motion.
   void refresh() { pose(); }
-  // How colour alone, or tracked points alone, would turn the bodies from where they are, which stay there: ω
-  // of each, radians.
+  // The rotations ω of the bodies, in radians, that colour alone or tracked points alone would add. The
+  // bodies stay where they are.
   std::vector<Vec3<double>> turns_by_colour();
   std::vector<Vec3<double>> turns_by_tracks();
 
  private:
-  // One view's residuals and how they change.
+  // The residuals of one view and their derivatives.
   struct Residuals {
     Tensor<float> value;     // n×7: silhouette, normal, colour
-    Tensor<float> jacobian;  // n×P×7; as it was where not asked for
+    Tensor<float> jacobian;  // n×P×7; unchanged if not requested
   };
-  // The blocks of a body in the normal equations: of ω, of ω by the shift, and of the shift.
+  // The blocks of a body in the normal equations: of ω, of ω with the translation, and of the translation.
   struct PoseStiffness {
     Mat3<double> turn, both, shift;
   };
   std::vector<PoseStiffness> pose_stiffness(const TrackWeights& weights);
   void pose();
-  // Set each pixel's weights, which then stand while bodies move. Normals count in the masks, or only as far
-  // as bodies cover them: what a mask shows beyond them is surface that has come into view, and normals that
-  // are compared there pull a body nearer until it covers it.
+  // Set the weight of each pixel, which is constant while bodies move. Normals count everywhere in the masks,
+  // or only in proportion to the bodies' coverage. Outside the bodies, the mask shows newly visible surface;
+  // normals compared there would pull a body nearer until it covers them.
   enum class Over { masks, bodies };
   void weigh(const TrackWeights& weights);  // over the masks
   void weigh_normals(const TrackWeights& weights, Over over);
   void weigh_colour(const TrackWeights& weights);
-  // at: of a target. sigma: of the blur, pixels. Until the next call.
+  // at: index of a target. sigma: blur in pixels. Valid until the next call.
   const Residuals& look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
-  // Adds what the targets ask for; returns the cost.
+  // Adds the equations of the targets and returns their cost.
   double add_targets(const TrackWeights& weights, double sigma, NormalEquations& equations);
-  // Takes the loose turns out of the equations.
+  // Removes the loose rotations from the equations.
   void hold_loose(NormalEquations& equations) const;
-  // The cost of the photographs and the tracked points that are compared.
+  // The cost of the photographs and the tracked points.
   double cost_of_texture(const TrackWeights& weights, NormalEquations* equations) const;
   double cost_of_tracks(const std::vector<bool>& decide, NormalEquations* equations) const;
-  // The step that a view of all targets asks for, limited; the cost where they stand.
+  // The step for all targets, limited in size. cost: at the current poses.
   std::vector<double> step(const TrackWeights& weights, double sigma, bool depth_is_held, double& cost);
-  // Of equations in radians and world units.
+  // Solves equations in radians and scene units.
   std::vector<double> solved(NormalEquations equations, double damping, bool depth_is_held) const;
-  // Takes some steps, and returns how they have turned the bodies, which are put back.
+  // Makes some steps, restores the bodies, and returns their rotations by the steps.
   template <class F>
   std::vector<Vec3<double>> turns_of_steps(F&& next);
-  // Adds to the normal equations' matrix, of shifts in radii, what keeps bodies as far from the camera.
+  // Adds to the matrix, with translations in radii, what keeps the distances from the camera fixed.
   void hold_depth(std::vector<double>& matrix) const;
   void take(const std::vector<double>& step);
 
@@ -132,7 +134,7 @@ class PoseSolver {
   motion::SavedPtr saved_;
   Tensor<float> pivot_;
   std::vector<Tensor<float>> normal_weight_, colour_weight_;  // of each target, H×W
-  LooseTurns loose_, by_texture_;                             // empty, or of each body
+  LooseTurns loose_, by_texture_;                             // empty, or one per body
   std::vector<Alignment> alignments_;
   std::vector<Reprojection> reprojections_;
   raster::Output whole_;

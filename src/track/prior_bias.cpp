@@ -9,10 +9,10 @@ namespace traceflow {
 
 namespace {
 
-// The rotation that takes `from` nearest to `to`, given Σ to · fromᵀ.
+// The rotation that best takes `from` to `to`, given Σ to · fromᵀ.
 Mat3<double> rotation_of_moments(const Mat3<double>& moments) {
   std::array<Vec3<double>, 6> from, to;
-  // Axes and their opposites: as points about the origin they have these moments.
+  // The axes and their opposites, as points about the origin, have these moments.
   for (int axis = 0; axis < 3; ++axis) {
     const auto k = static_cast<size_t>(axis);
     Vec3<double> unit(0);
@@ -35,7 +35,7 @@ void PriorBias::add(const Camera<float>& camera, const Vec3<double>& normal, con
 }
 
 std::optional<Mat3<double>> PriorBias::rotation() const {
-  constexpr double pull = 0.05;  // towards the round before
+  constexpr double pull = 0.05;  // towards the previous round
   constexpr int rounds = 6;
   constexpr int64_t least_pairs = 50;
   constexpr double degree = 0.017453292519943295;

@@ -14,16 +14,16 @@ namespace traceflow {
 
 namespace {
 
-// A body is lost where less than this share of what it shows lies inside the mask.
+// A body is lost if less than this share of its visible pixels is inside the mask.
 constexpr double least_inside = 0.3;
-// Parts of the mask that are smaller than this share of what the body showed before are not it.
+// Parts of the mask smaller than this share of the body's previous area are ignored.
 constexpr double least_part = 0.2;
 constexpr double fewest_free_pixels = 12;
-// Radians, of the turns that are tried beside none.
+// Radians, of the rotations that are tried.
 constexpr std::array<double, 2> turned_by = {0.4, 0.9};
 constexpr double wide_blur = 4;  // pixels
 
-// The largest part of the mask that shows no body but the one that is sought.
+// The largest part of the mask without other bodies than the lost one.
 struct FreePart {
   double area = 0;         // pixels
   Vec2<double> middle{0};  // pixels
@@ -51,7 +51,7 @@ FreePart free_part(const TrackTarget& target, const BodySurface& surface, int64_
   return part;
 }
 
-// Pixels that each body shows, and of them those inside the mask.
+// For each body, the number of its visible pixels, and of those inside the mask.
 struct Shown {
   std::vector<int64_t> all, inside;
 };
@@ -73,7 +73,7 @@ void put(Motion& motion, int64_t body, int64_t key, const Vec3<double>& shift, c
   store3(&motion.shift(body, key, 0), shift);
 }
 
-// Where a body is put that has lost its place: its shift; nothing where no free part of the mask is like it.
+// The new translation of a lost body; empty if no free part of the mask is large enough.
 std::optional<Vec3<double>> place_in(const FreePart& part, const PoseSolver& solver, const Surfels& main,
                                      const Motion& motion, int64_t body, int64_t previous) {
   const TrackTarget& target = solver.targets().front();
@@ -92,7 +92,7 @@ std::optional<Vec3<double>> place_in(const FreePart& part, const PoseSolver& sol
   return Vec3<double>(camera.position) + depth * ray - centre;
 }
 
-// Solves for a body from several turns, and keeps the best if it costs less than how it stands.
+// Solves a body from several rotations. Keeps the best if it costs less than the current pose.
 bool try_turns(PoseSolver& solver, Motion& motion, int64_t body, int64_t key, const Vec3<double>& shift,
                const TrackWeights& weights, const PoseSteps& steps) {
   double least = solver.cost(weights);

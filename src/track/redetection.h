@@ -4,11 +4,11 @@
 
 namespace traceflow {
 
-// Finds bodies again that have lost their place at a key: that show nothing in the first target, or hardly
-// anything inside its mask. Each is put where the largest part of the mask is that no body covers, as far
-// away as that part's size says, and solved for from several turns: as at the key before, and turned by 0.4
-// and 0.9 radians about each axis either way. The best is kept if it explains the targets better. Where no
-// such part is large enough, the body is left alone. Returns how many were found.
+// Finds bodies that were lost at a key: those invisible in the first target, or hardly inside its mask. Each
+// is moved to the largest part of the mask that no other body covers, at the distance given by that part's
+// size. It is solved from several rotations: that of the previous key, and ±0.4 and ±0.9 radians about each
+// axis from it. The best is kept if it costs less. If no such part is large enough, the body stays as it is.
+// Returns the number of bodies found.
 int find_lost_bodies(PoseSolver& solver, const Surfels& main, Motion& motion, int64_t key,
                      const TrackWeights& weights, const PoseSteps& steps);
 

@@ -7,9 +7,9 @@ namespace traceflow {
 
 namespace {
 
-// Errors much larger than this hardly count: the program that tracked the point has lost it. Pixels.
+// In pixels. Much larger errors hardly count, because the point tracker has lost the point.
 constexpr double lost = 1;
-// Between the surface and the ray to it: near a body's edge, tracks slip off.
+// Between the surface and the ray to it: tracks slip off near a body's edge.
 constexpr float least_cosine_of_track = 0.3F;
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace traceflow {
 
 namespace {
 
-// Sizes that are tried: 1 + size_step · i, i from −most_steps to most_steps.
+// The ratios that are tried: 1 + size_step · i, for i from −most_steps to most_steps.
 constexpr double size_step = 0.0025;
 constexpr size_t most_steps = 60, sizes = 2 * most_steps + 1;
 double growth(size_t i) { return size_step * (static_cast<double>(i) - static_cast<double>(most_steps)); }
@@ -29,7 +29,7 @@ int64_t nearest_key(const Motion& motion, float time) {
   return nearest;
 }
 
-// How much of a body has left its place, with each size at the k-th time.
+// How much of a body has left its first place, for each ratio at the k-th time.
 std::array<double, sizes> costs_of_sizes(const Vec3<double>& eye, const Motion& motion, const Nodes& nodes,
                                          int32_t body, int64_t k) {
   constexpr double near = 0.5;  // radii

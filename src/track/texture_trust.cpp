@@ -7,17 +7,16 @@ namespace traceflow {
 
 namespace {
 
-// Colour, or what is tracked, is trusted where it takes back less than such a share of the turns, of which
-// there were enough.
+// Colour, or tracks, are trusted if they undo less than this share of the rotations, once there were enough.
 constexpr double most_taken_back = 0.15;
-constexpr double enough_turned = 0.06;  // radians², Σ over times: as one turn of 14 degrees
+constexpr double enough_turned = 0.06;  // radians², Σ over keys: as much as one rotation of 14 degrees
 
-// Turns less stiff than this are left to texture. The middle one of balls is 0.2 to 0.4, of a kettle and a
-// bust 2 to 4, and of a smooth cylinder 0.55.
+// Rotations with a lower stiffness are left to texture. The middle one of balls is 0.2 to 0.4, of a kettle
+// and a bust 2 to 4, and of a smooth cylinder 0.55.
 constexpr double least_stiffness = 0.45;
 
-// A ball mirrors where its photographs turn as a mirror image does, up to such a share; of a textured one, at
-// rest or turning, it is near 1. The mirror image must have turned enough to tell.
+// A ball is a mirror if its rotations by photographs differ from those of a mirror image by less than this
+// share. For a textured ball, at rest or rotating, it is near 1. The mirror image must have rotated enough.
 constexpr double most_unlike = 0.4;
 constexpr double enough_of_mirror_image = 0.02;  // radians²
 
@@ -45,7 +44,7 @@ bool TextureTrust::mirrors(int64_t body) const {
 void TextureTrust::add_stiffness(const std::vector<SymmetricEigen<3, double>>& now) {
   if (stiffness.empty() && !now.empty()) *this = of(static_cast<int64_t>(now.size()));
   for (size_t b = 0; b < now.size(); ++b) {
-    if (!(now[b].values[2] > 0)) continue;  // it is not in view
+    if (!(now[b].values[2] > 0)) continue;  // not visible
     double* const sums = stiffness.row(static_cast<int64_t>(b));
     sums[0] += now[b].values[0];
     sums[1] += now[b].values[1];

@@ -19,16 +19,16 @@ namespace traceflow {
 
 namespace {
 
-// Small bodies' sizes are told on pictures as they are trained.
+// Sizes of small bodies need images of the size used in training.
 constexpr int widest_for_sizes = 320;
 constexpr int keys_for_speed = 3;
-// How far back the turn lies that colour may take back.
+// The number of keys back for the rotation that colour may undo.
 constexpr int64_t keys_for_trust = 5;
-// Texture could take back no more than so much of a turn, radians: the solver's steps are short. What a body
-// turned beyond it, over a gap in the film say, is no evidence.
+// Radians. The solver's steps are short, so texture cannot undo more of a rotation. Larger rotations, for
+// example over a gap in the video, are no evidence beyond it.
 constexpr double most_judged = 0.3;
 
-// Photographs are compared at this width or less, and with those of so many keys before at most.
+// The largest width of compared photographs, and how many keys back the oldest one is.
 constexpr int64_t widest_photograph = 640, oldest_photograph = 9;
 
 template <class Views>
@@ -37,7 +37,7 @@ auto oldest_of(const Views& earlier) {
                       [](const auto& view) { return view.keys_back == oldest_photograph; });
 }
 
-// Average of factor × factor pixels.
+// The mean of factor × factor pixels.
 Tensor<float> smaller(const Tensor<float>& image, int64_t numbers, int64_t factor) {
   const int64_t height = image.dim(0) / factor, width = image.dim(1) / factor;
   Tensor<float> result(numbers == 1 ? Shape{height, width} : Shape{height, width, numbers});
@@ -59,15 +59,15 @@ bool any_turns(const LooseTurns& loose) {
 
 int shrink_factor(const Camera<float>& camera, int widest) { return (camera.width + widest - 1) / widest; }
 
-// The turn of a body from one key to another, radians about world axes.
+// The rotation of a body between two keys, radians about world axes.
 Vec3<double> turn_between(const Motion& motion, int64_t body, int64_t first, int64_t last) {
   const Vec4<double> from = unit_quaternion(load4<double>(&motion.rotation(body, first, 0)));
   const Vec4<double> to = unit_quaternion(load4<double>(&motion.rotation(body, last, 0)));
   return quaternion_log(quaternion_product(to, quaternion_conjugate(from)));
 }
 
-// Bodies turn about the points in world (one a body) that they have at a key, where turns of them are loose:
-// a turn of a ball about another point moves it.
+// Makes bodies with loose rotations rotate about the given points (world coordinates at the key, one per
+// body). A rotation of a ball about another point would move it.
 void centre_loose_bodies(const std::vector<Vec3<double>>& centres, const LooseTurns& loose, int64_t key,
                          Motion& motion) {
   for (size_t b = 0; b < loose.size(); ++b) {
@@ -78,7 +78,7 @@ void centre_loose_bodies(const std::vector<Vec3<double>>& centres, const LooseTu
   }
 }
 
-// Nothing tells the loose turns of bodies that mirror: they do not go on.
+// Stops the loose rotations of bodies that mirror, because nothing determines them.
 void hold_mirrors(Motion& motion, int64_t key, const LooseTurns& loose, const TextureTrust& trust) {
   for (int64_t b = 0; b < motion.bodies() && !loose.empty(); ++b) {
     if (!trust.mirrors(b)) continue;
@@ -175,7 +175,7 @@ std::vector<size_t> Tracker::views_at(const Motion& motion, int64_t key) const {
 
 std::vector<Tracker::EarlierView> Tracker::earlier_views(const Surfels& main, const Motion& motion,
                                                          int64_t key, float extent) const {
-  // The nearest tell the most, the farther ones keep errors from adding up.
+  // Near keys give the most precise motion, far ones keep errors from accumulating.
   constexpr std::array<int64_t, 4> keys_back = {1, 3, 9, 27};
   std::vector<EarlierView> earlier;
   for (const int64_t back : keys_back) {
@@ -192,7 +192,8 @@ std::vector<Tracker::EarlierView> Tracker::earlier_views(const Surfels& main, co
 
 void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier,
                                   const Motion& motion, int64_t key, const LooseTurns& loose) const {
-  // Over few times a glaze, which shows what hardly moves, holds a texture back.
+  // The weight grows with the distance: over a few keys the reflection in a glossy coat, which hardly moves,
+  // holds the texture back.
   constexpr double weight = 1.0 / oldest_photograph;
   if (!any_turns(loose)) return;
   std::shared_ptr<const DetailPhoto> now;
@@ -208,7 +209,7 @@ void Tracker::compare_photographs(PoseSolver& solver, const std::vector<EarlierV
       if (newest.coverage.empty()) return;
       now = std::make_shared<const DetailPhoto>(detail_of(std::move(newest)));
     }
-    // A drawn pixel counts as much as in the other residuals.
+    // Scales the weight so that a rendered pixel counts as in the other residuals.
     const double finer = static_cast<double>(now->camera.focal_x) / surface.camera.focal_x;
     solver.compare(
         Alignment{now, detail_samples(detail_of(std::move(photograph)), surface, motion, key - back, loose),
@@ -294,7 +295,7 @@ void Tracker::solve(const Surfels& main, const Nodes* nodes, Motion& motion, int
   held.hold_depth = steps.hold_depth || key == 0;
   PoseSolver solver = this->solver(main, nodes, motion, key, extent);
   const LooseTurns loose = loosen(solver, motion, trust), by_texture = trust.without_mirrors(loose);
-  // Where bodies bend, what a photograph showed at rest is not known.
+  // If bodies deform, the state at rest of a photograph's points is not known.
   if (nodes == nullptr && (any_turns(by_texture) || has_tracks())) {
     const std::vector<EarlierView> earlier = earlier_views(main, motion, key, extent);
     compare_photographs(solver, earlier, motion, key, by_texture);
@@ -341,7 +342,7 @@ FilmViews Tracker::film_views(const Motion& motion, int64_t widest, double blur,
 
 std::vector<Tracker::Adjusted> Tracker::adjust(const Surfels& main, const std::vector<int32_t>& bodies,
                                                const Motion& motion, const Nodes& nodes, float extent) const {
-  constexpr double blurs_across = 60;  // the coarsest blur, in a picture's width
+  constexpr double blurs_across = 60;  // the coarsest blur is the image width over this
   std::vector<Adjusted> adjusted(bodies.size());
   std::vector<Motion> rigid(bodies.size(), motion);
   std::vector<PhotometricAdjustment> as_rigid, as_bent;
@@ -377,7 +378,7 @@ std::vector<Tracker::Adjusted> Tracker::adjust(const Surfels& main, const std::v
 
 std::vector<double> Tracker::distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                              const PoseSteps& steps, const TextureTrust& trust) const {
-  constexpr double most = 1.1;       // beyond it the first picture misleads
+  constexpr double most = 1.1;       // larger ratios come from errors of the first view
   constexpr double unknown = 0.004;  // true poses have ratios of up to 1.003
   Motion moved = motion;
   PoseSolver solver = this->solver(main, nullptr, moved, 0, extent, widest_for_sizes);
@@ -408,7 +409,7 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   predict(motion, key);
   const TrackWeights geometry = weights(motion, {}, {});
   PoseSolver solver = this->solver(main, nullptr, motion, key, extent);
-  // Without a mask nothing is known of this time but what goes on.
+  // Without a mask the key keeps the extrapolated poses.
   if (solver.targets().empty()) return;
   const PoseSteps steps{options_.steps, options_.blur};
   if (options_.colour == 0) {
@@ -436,7 +437,8 @@ void Tracker::follow(const Surfels& main, Motion& motion, int64_t key, float ext
   compare_tracks(solver, earlier, motion, key);
   const std::vector<Vec3<double>> by_colour = solver.turns_by_colour(), by_tracks = solver.turns_by_tracks();
   for (int64_t b = 0; b < motion.bodies(); ++b) {
-    // Up to the key before: what errs at this one is not taken for a turn that texture takes back.
+    // Only up to the previous key, so that an error at this key does not count as a rotation that texture
+    // undoes.
     Vec3<double> turn = turn_between(motion, b, std::max<int64_t>(0, key - keys_for_trust), key - 1);
     turn *= most_judged / std::max(most_judged, length(turn));
     trust.taken_back_by_colour[b] -= dot(by_colour[static_cast<size_t>(b)], turn);
@@ -472,7 +474,7 @@ Tracker::Refollowed Tracker::follow_again(const Surfels& main, Motion motion, in
 }
 
 int64_t Tracker::part_bodies(Surfels& main, int64_t points, Motion& motion, int64_t key, float extent) const {
-  // Of cost, for each pixel of the part. Parts of one rigid thing gain up to 0.03.
+  // Cost per pixel of the part. Parts of one rigid thing gain up to 0.03.
   constexpr double least_gain = 0.05;
   constexpr int64_t most_bodies = 8;
   const TrackWeights geometry = weights(motion, {}, {});
@@ -487,10 +489,10 @@ int64_t Tracker::part_bodies(Surfels& main, int64_t points, Motion& motion, int6
       Refollowed apart =
           follow_again(parted, with_part(motion, body, parts[p], parted), key, motion.bodies(), extent);
       if (!(together - apart.cost > least_gain * apart.pixels)) continue;
-      // Poses that are solved again gain by that alone.
+      // Solving poses again lowers the cost by itself.
       const double as_one = follow_again(main, motion, key, body, extent).cost;
       if (!(as_one - apart.cost > least_gain * apart.pixels)) continue;
-      // What lay behind the thing gains as much where nothing carries it.
+      // Background that was taken for the thing gains as much if no body has it.
       Surfels without = main;
       for (const int64_t row : parts[p]) without.body[row] = moved_by_field;
       const Refollowed left = follow_again(without, motion, key, body, extent);

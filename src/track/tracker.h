@@ -13,107 +13,104 @@
 
 namespace traceflow {
 
-// How bodies are drawn for the tracker: one sample a pixel, with a low-pass as wide as the samples that they
-// are trained with.
+// How the tracker renders bodies: one sample per pixel, with a low-pass as wide as the samples in training.
 raster::Options raster_for_tracking(const RenderOptions& render, float extent);
 
-// Finds where rigid bodies are at a time of the film: Gauss–Newton on six numbers a body, from what does not
-// depend on how their surface reflects: that they cover what the masks cover, and that their normals are
-// those of the capture's priors; and from colour and tracked points where they are trusted. The priors'
-// error, which estimators share over a picture, is turned away by one rotation a view, from what stands
-// still. Works on the CPU, on pictures of at most 160 pixels' width (320 for distance_ratios).
+// Finds the poses of rigid bodies at a key, by Gauss–Newton on six numbers per body. The residuals do not
+// depend on how surfaces reflect: silhouettes against masks, and normals against the capture's priors. Colour
+// and tracked points are added where they are trusted. One rotation per view, from static surfaces, corrects
+// the error that an estimator's normals share over an image. On the CPU, with images at most 160 pixels wide
+// (320 for distance_ratios).
 class Tracker {
  public:
   Tracker(const TrackOptions& options, const RenderOptions& render, const Capture& capture);
 
-  // Puts key k where bodies that go on as in the three keys before would be, and the keys behind it there
-  // too.
+  // Sets the poses of `key` and of all later keys by extrapolating the motion of the three keys before.
   static void predict(Motion& motion, int64_t key);
-  // Predicts and finds the poses of a new key, and learns whether colour and tracks are to be trusted. A body
-  // that is lost is looked for elsewhere (track/redetection.h). main, motion: on the CPU.
+  // Extrapolates and solves the poses of a new key, and updates whether colour and tracks are trusted.
+  // Searches for lost bodies (track/redetection.h). main, motion: on the CPU.
   void follow(const Surfels& main, Motion& motion, int64_t key, float extent, TextureTrust& trust) const;
-  // Finds the poses of a key from where they are. At the first key, where one camera sees it, bodies stay as
-  // far from that camera as the points are. nodes: null where bodies are rigid.
+  // Solves the poses of a key from their current values. At the first key, if one camera sees it, bodies keep
+  // their distance from that camera, which is that of the points. nodes: null if bodies are rigid.
   void solve(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
              const PoseSteps& steps, const TextureTrust& trust) const;
-  // How many times as far from the camera each rigid body would be at the first key if its distance were
-  // solved there as at other keys: how much larger than the first picture shows it all others have made it.
-  // What lies within 0.4 % is not known, and not counted.
+  // For each rigid body, the ratio by which its distance from the camera would change at the first key if it
+  // were solved there as at other keys. This is how much larger the other keys have made the body than the
+  // first view shows it. Ratios within 0.4 % of 1 are uncertain and ignored.
   std::vector<double> distance_ratios(const Surfels& main, const Motion& motion, float extent,
                                       const PoseSteps& steps, const TextureTrust& trust) const;
 
-  // How many times as far from the first key's camera as they are drawn bodies are by the capture's points
-  // (track/point_distance.h).
+  // For each body, the ratio of the distance of the capture's points from the first key's camera to the
+  // rendered distance (track/point_distance.h).
   std::vector<double> distances_by_points(const Surfels& main, const Motion& motion, float extent) const;
 
-  // Photometric bundle adjustment (track/photometric_adjustment.h) of each of some bodies over all keys, on
-  // photographs from coarse to fine: as if it were rigid, and as its nodes bend it. To one camera what grows
-  // looks like what comes closer: of the two, bodies that bend then do what leaves the most of them in place
-  // (track/rescale.h).
+  // Photometric bundle adjustment (track/photometric_adjustment.h) of each given body over all keys, on
+  // photographs from coarse to fine, rigid and with nodes. To a single camera, growing looks like
+  // approaching, so the deformation that leaves the most of the body in place is chosen (track/rescale.h).
   struct Adjusted {
     int32_t body = 0;
-    double as_rigid = 0, as_bent = 0;  // what remains: the mean cost of a point
-    Motion motion;                     // as bent, like the nodes
+    double as_rigid = 0, as_bent = 0;  // the remaining mean cost of a point
+    Motion motion;                     // with deformation, like the nodes
     Nodes nodes;
   };
   std::vector<Adjusted> adjust(const Surfels& main, const std::vector<int32_t>& bodies, const Motion& motion,
                                const Nodes& nodes, float extent) const;
 
-  // Makes bodies of parts of bodies (track/body_parts.h) that move by themselves: with poses of their own the
-  // keys from 1 to `key` cost clearly less. Those poses are found anew. Returns how many bodies have been
-  // added.
+  // Turns parts of bodies (track/body_parts.h) into separate bodies if they move separately: if separate
+  // poses make the keys from 1 to `key` cost clearly less. These poses are solved anew. Returns the number of
+  // added bodies.
   int64_t part_bodies(Surfels& main, int64_t points, Motion& motion, int64_t key, float extent) const;
 
-  // Surfels for surface that comes into view at a key, at most `limit` (track/new_surface.h).
+  // Surfels for surface that becomes visible at a key, at most `limit` (track/new_surface.h).
   Surfels new_surface(const Surfels& main, Motion& motion, int64_t key, float extent, float tint,
                       int64_t limit) const;
 
  private:
-  // The keys from 1 to another followed again from where the motion stands at key 0.
+  // The keys from 1 to a given one, tracked again from the motion's state at key 0.
   struct Refollowed {
     Motion motion;
-    double cost = 0;    // of all of them
-    double pixels = 0;  // that a body shows, in all of them
+    double cost = 0;    // sum over these keys
+    double pixels = 0;  // number that show a body, over these keys
   };
   Refollowed follow_again(const Surfels& main, Motion motion, int64_t key, int64_t body, float extent) const;
-  // Pictures that are wider are shrunk.
+  // Wider images are reduced.
   static constexpr int usual_width = 160;
   TrackTarget target_of(const View& view, int widest) const;
   PoseSolver solver(const Surfels& main, const Nodes* nodes, Motion& motion, int64_t key, float extent,
                     int widest = usual_width) const;
-  // Tells the solver which turns are loose, where photographs decide turns; returns them.
+  // Gives the solver the loose rotations if photographs may determine them, and returns them.
   LooseTurns loosen(PoseSolver& solver, const Motion& motion, const TextureTrust& trust) const;
   TrackWeights weights(const Motion& motion, const TextureTrust& trust, const LooseTurns& loose) const;
   bool has_tracks() const { return !capture_.tracks.empty() && options_.tracks > 0; }
-  // An earlier key, and what a view of it shows of the bodies.
+  // An earlier key, and what one of its views shows of the bodies.
   struct EarlierView {
     int64_t keys_back;
-    size_t view;  // index of the training view
+    size_t view;  // index of a training view
     BodySurface surface;
   };
-  // The nearest first: one of each key, or all where tracks are to be compared.
+  // The nearest first. One view per key, or all if tracks are used.
   std::vector<EarlierView> earlier_views(const Surfels& main, const Motion& motion, int64_t key,
                                          float extent) const;
-  // Lets the solver compare the key's photograph with earlier ones, where photographs decide turns.
+  // Makes the solver compare the key's photograph with earlier ones, if photographs determine rotations.
   void compare_photographs(PoseSolver& solver, const std::vector<EarlierView>& earlier, const Motion& motion,
                            int64_t key, const LooseTurns& loose) const;
-  // Seeks loose turns that went astray (track/turn_search.h) in the photograph of nine keys before, and turns
-  // the keys between by their share. Returns whether any was found.
+  // Searches the photograph nine keys before for loose rotations that went wrong (track/turn_search.h), and
+  // spreads a correction over the keys between. Returns whether any was found.
   bool seek_turns(const std::vector<EarlierView>& earlier, Motion& motion, int64_t key,
                   const LooseTurns& loose) const;
-  // Whether what photographs decided is how a mirror image turns.
+  // Updates whether the rotations by photographs are those of a mirror image.
   void look_for_mirror_images(const std::vector<EarlierView>& earlier, const Motion& motion, int64_t key,
                               const LooseTurns& loose, TextureTrust& trust) const;
   void compare_tracks(PoseSolver& solver, const std::vector<EarlierView>& earlier, const Motion& motion,
                       int64_t key) const;
-  // The views as adjustment compares them, photographs at most `widest` wide, less what is finer than `blur`
-  // pixels. normals: priors of each training view, empty where there is none.
+  // The views for the adjustment: photographs at most `widest` wide, blurred by `blur` pixels. normals:
+  // priors of each training view, empty if it has none.
   FilmViews film_views(const Motion& motion, int64_t widest, double blur,
                        const std::vector<DetailPhoto>& normals) const;
-  // The priors as they agree with what stands still, at the size for tracking.
+  // The priors at the size for tracking, corrected to agree with static surfaces.
   std::vector<DetailPhoto> film_normals(const Surfels& main, const Motion& motion, float extent) const;
   std::vector<size_t> views_at(const Motion& motion, int64_t key) const;
-  // Of the pictures that are drawn of a view.
+  // The camera of a view's reduced image.
   static Camera<float> drawn_camera(const View& view, int widest = usual_width);
 
   TrackOptions options_;

@@ -11,7 +11,7 @@ namespace traceflow {
 
 namespace {
 
-// Straight between two of the truth's times.
+// Linear between two of the truth's times.
 Vec3<double> point_at(const MotionTruth& truth, int64_t point, double time) {
   const double at = std::clamp(time, 0.0, 1.0) * static_cast<double>(truth.times() - 1);
   const auto before = std::min(static_cast<int64_t>(at), truth.times() - 2);

@@ -23,7 +23,7 @@ struct Turn {
   double cost = 0;
 };
 
-// Takes steps along the axes that make it cheaper, half as long where none does.
+// Makes steps along the axes while the cost falls, and halves the step when it does not.
 template <class Cost>
 Turn refined(Turn best, const Mat3<double>& loose, const Cost& cost_of) {
   for (double step = spacing / 2; step > finest;) {
@@ -59,7 +59,7 @@ std::optional<Vec3<double>> seek_turn(const Alignment& alignment, const Motion& 
     for (int y = -steps_each_way; y <= steps_each_way; ++y) {
       for (int z = -steps_each_way; z <= steps_each_way; ++z) {
         const Vec3<double> offset = spacing * Vec3<double>(x, y, z), turn = turns * offset;
-        if (length(turn - offset) > 0.6 * spacing) continue;  // near others where only some turns are loose
+        if (length(turn - offset) > 0.6 * spacing) continue;  // near others if few are loose
         const double cost = cost_of(turn);
         if (cost < best.cost) best = {turn, cost};
       }

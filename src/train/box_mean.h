@@ -4,8 +4,8 @@
 
 namespace traceflow {
 
-// The mean of an image (H×W×C or H×W) over the square of `half_window` pixels to each side of every pixel, as
-// far as it lies in the image.
+// The mean of an image (H×W×C or H×W) over a square around each pixel, `half_window` pixels to each side.
+// Parts of the square outside the image are left out.
 Tensor<float> box_mean(const Tensor<float>& image, int64_t half_window);
 
 }  // namespace traceflow

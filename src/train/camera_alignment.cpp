@@ -10,7 +10,8 @@ namespace traceflow {
 
 namespace {
 
-// With the main surfels' geometry, which the renderer needs for the camera's gradient.
+// Trainable.main stays set, because the renderer needs the geometry of the main surfels for the camera's
+// gradient.
 Trainable camera_alone() {
   Trainable trainable;
   trainable.tint = trainable.main_field = trainable.main_motion = trainable.main_nodes = false;

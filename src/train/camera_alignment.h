@@ -8,15 +8,14 @@ namespace traceflow {
 
 struct CameraAlignment {
   int iterations = 80;
-  double rate = 1e-3;      // radians, first iteration; shifts in extents
-  double rate_end = 2e-5;  // last iteration, log-linear between
+  double rate = 1e-3;      // first iteration: radians, and extents for translations
+  double rate_end = 2e-5;  // last iteration, log-linear in between
 };
 
-// The camera, near that of the request, from which a scene at the request's time looks most like the
-// photograph by L1 and SSIM (loss.ssim). A scene whose training cameras were refined may fit held-out cameras
-// as they were given less well; BARF (Lin et al. 2021, §4.2) measures with aligned ones for that. The
-// photograph has the size of the request's camera and is on the scene's device; what is unknown of it is
-// overwritten.
+// The camera near that of the request for which the render at the request's time has the lowest loss (L1 and
+// SSIM, loss.ssim) against the photograph. A scene that trained with refined cameras may not fit held-out
+// cameras as given. BARF (Lin et al. 2021, §4.2) therefore measures with aligned ones. The photograph has the
+// size of the request's camera and is on the scene's device; its unknown pixels are overwritten.
 Camera<float> aligned_camera(Renderer& renderer, const Scene& scene, const FrameRequest& request,
                              ViewImages& photograph, const LossOptions& loss,
                              const CameraAlignment& options = {});

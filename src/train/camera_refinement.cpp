@@ -100,8 +100,8 @@ void CameraRefinement::step(int64_t view, const CameraGradient<float>& gradient,
   leave_out_similarity();
 }
 
-// Least squares of shift_i = t + ω × r_i + s r_i and turn_i = ω, with r_i from the mean of the centres and
-// lengths in units of their root mean square. Σ r_i = 0 parts the unknowns.
+// Least squares of shift_i = t + ω × r_i + s r_i and turn_i = ω, with r_i relative to the mean of the centres
+// and lengths in units of their root mean square. Σ r_i = 0 decouples the unknowns.
 void CameraRefinement::leave_out_similarity() {
   const auto count = static_cast<double>(given_.size());
   Vec3<double> middle(0);
@@ -120,7 +120,7 @@ void CameraRefinement::leave_out_similarity() {
     turns += load3<double>(corrections_.turn.row(row));
     inertia += Mat3<double>(dot(r, r)) - outerProduct(r, r);
   }
-  // Centres that coincide tell nothing of a turn of all, nor of a scale.
+  // Centres that coincide do not determine a scale or a common rotation.
   const double per_length2 = spread > 0 ? count / spread : 0;
   const double growth = spread > 0 ? along / spread : 0;
   const Vec3<double> turn =

@@ -21,7 +21,7 @@ constexpr const char* arithmetic_key = "arithmetic";
 constexpr const char* version_key = "program_version";
 constexpr const char* other_end = ": it ends in other bytes than one that was never stopped";
 
-// Rounded, so that a compiler that rounds the last bit otherwise makes no other capture of it.
+// Rounded, so that another compiler's rounding of the last bit does not change the checksum.
 int64_t rounded(double value) { return std::llround(value * 1e5); }
 
 bool agree(const SceneNormalisation& a, const SceneNormalisation& b) {
@@ -36,7 +36,7 @@ struct Difference {
   std::string path, before, now;
 };
 
-// The first option of which `counts` that the two have different.
+// The first differing option for which `counts` is true.
 std::optional<Difference> first_difference(TrainOptions before, TrainOptions now,
                                            const std::function<bool(const std::string&)>& counts) {
   const std::vector<OptionField> old_fields = option_fields(before), new_fields = option_fields(now);
@@ -53,7 +53,7 @@ std::string arithmetic_of(Device device) {
   return "CUDA (" + cuda::facts().name + (cuda::deterministic() ? "), deterministic" : ")");
 }
 
-// An entry that older checkpoints lack.
+// Older checkpoints may lack the entry.
 std::optional<std::string> entry(const Safetensors& checkpoint, const std::string& key) {
   const auto found = checkpoint.metadata.find(key);
   return found == checkpoint.metadata.end() ? std::nullopt : std::optional(found->second);
@@ -63,7 +63,7 @@ std::optional<std::string> entry(const Safetensors& checkpoint, const std::strin
 
 TrainOptions options_in(const Safetensors& checkpoint, const std::string& where) {
   TrainOptions options = preset("paper");
-  // Checkpoints from before these options pruned from the first density control on, by extents alone.
+  // Checkpoints from before these options pruned from the first density control on, by extents only.
   options.density.prune_above_from = options.environment_density.prune_above_from = 0;
   options.environment_density.prune_above_cloud = 1000;
   options_from_json(checkpoint.text("options"), option_fields(options), where + ": options");

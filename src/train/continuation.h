@@ -8,43 +8,42 @@
 #include "train/memory.h"
 #include "train/options.h"
 
-// What a run that goes on must have in common with the run as it began, so that it ends in the same bytes:
-// written into the checkpoint's metadata, and compared when it is resumed. Checkpoints from before these were
-// written are taken as they are.
+// What a resumed run must have in common with the run at its start to end with the same bytes. It is written
+// into the checkpoint's metadata and compared on resuming. Older checkpoints that lack it are accepted.
 namespace traceflow {
 
-// The options that a checkpoint was written with. where: what refusals name it.
+// The options that a checkpoint was written with. where: the name of the checkpoint in error messages.
 TrainOptions options_in(const Safetensors& checkpoint, const std::string& where = "checkpoint");
 
-// Throws InputError for a setting that is part of what the checkpoint holds already, so that another value
-// would do nothing: what the scene started from and what its fields are.
+// Throws InputError when a setting differs that the checkpoint's content already fixes: how the scene started
+// and what its fields are. A new value would have no effect.
 void refuse_reshaping(const TrainOptions& before, const TrainOptions& now);
-// Throws InputError where a preset has another value, of whatever option, than the run has.
+// Throws InputError when any option of the preset differs from that of the run.
 void refuse_other_preset(const std::string& name, const TrainOptions& of_preset, const TrainOptions& now);
 
-// Of the training views' names, times and poses.
+// A checksum of the training views' names, times and poses.
 std::string checksum_of_views(const Capture& capture);
 void put_views(const std::string& checksum, Safetensors& checkpoint);
-// What a checkpoint says of the views that it was trained on; nothing in older ones.
+// The checksum of the training views in a checkpoint; empty in older ones.
 std::string views_in(const Safetensors& checkpoint);
-// Whether they are the capture's, for a scene that is normalised so: by the views' names, times and poses,
-// not by their pixels.
+// Whether the views are those of the capture, for a scene with this normalisation. Compares names, times and
+// poses, not pixels.
 bool are_views_of(const std::string& views, const SceneNormalisation& normalisation, const Capture& capture);
-// Throws InputError where the capture is not the one that the run, whose scene is normalised so, was begun
-// with.
+// Throws InputError when the capture is not the one that the run began with. normalisation: that of the run's
+// scene.
 void check_views(const Safetensors& checkpoint, const SceneNormalisation& normalisation,
                  const Capture& capture);
 
 void put_caps(const SurfelCaps& caps, Safetensors& checkpoint);
-// Those that the run was dealt when it began, unless it is told to take other sizes or another budget now.
+// The caps that the run had at its start, unless the caps or the memory budget in the options have changed.
 std::optional<SurfelCaps> caps_to_keep(const Safetensors& checkpoint, const TrainOptions& now);
 
-// On what numbers are computed: other bytes come of it where it differs.
+// The device and instructions that compute the numbers. A difference changes the resulting bytes.
 void put_arithmetic(Device device, Safetensors& checkpoint);
-// What is to be said where it is another than the checkpoint's; else nothing.
+// The warning if they differ from the checkpoint's; else empty.
 std::string other_arithmetic(const Safetensors& checkpoint, Device device);
 
-// Which program computed them. As above.
+// The version of the program that computed the numbers, likewise.
 void put_version(Safetensors& checkpoint);
 std::string other_version(const Safetensors& checkpoint);
 

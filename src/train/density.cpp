@@ -60,8 +60,8 @@ std::vector<DensityControl::Fate> DensityControl::fates(const Surfels& surfels, 
       if (mean_signal(i) > options_.gradient_threshold) growing.push_back(i);
     }
   }
-  // Either way of multiplying adds one surfel; where there is no room for all, those with the largest signal
-  // go first.
+  // Cloning and splitting each add one surfel. If there is not room for all, those with the largest signal
+  // come first.
   const int64_t room = std::max<int64_t>(0, limits.cap - left);
   const auto share = static_cast<int64_t>(static_cast<double>(options_.growth) * static_cast<double>(count));
   const int64_t allowed = std::min(room, std::max<int64_t>(1, share));
@@ -95,7 +95,7 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
   };
   change.pruned_transparent = each(Fate::prune_transparent, [](int64_t) {});
   change.pruned_large = each(Fate::prune_large, [](int64_t) {});
-  // A set without surfels cannot be rendered or grow again: the last ones stay.
+  // A set without surfels could not be rendered or grow again, so nothing is removed.
   if (change.pruned_transparent + change.pruned_large == surfels.count()) {
     change.pruned_transparent = change.pruned_large = 0;
     change.count = surfels.count();
@@ -103,7 +103,7 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
   }
 
   RowEdit edit;
-  std::vector<int64_t> sharing;  // rows of the cloned and of their clones
+  std::vector<int64_t> sharing;  // rows of cloned surfels and of their clones
   for (size_t i = 0; i < fate.size(); ++i) {
     if (fate[i] == Fate::clone) sharing.push_back(edit.count());
     if (fate[i] == Fate::keep || fate[i] == Fate::clone) edit.keep(static_cast<int64_t>(i));
@@ -117,7 +117,7 @@ events::DensityChanged DensityControl::update(Surfels& surfels, SurfelMoments& m
     edit.add(i);
     edit.add(i);
   });
-  // Everything is made before anything is replaced: where memory runs out, the set is as it was.
+  // All new tensors are made before any is replaced, so that running out of memory leaves the set unchanged.
   const Device device = surfels.device();
   const PlacedEdit placed(edit, device);
   Surfels edited = edited_rows(surfels, placed);

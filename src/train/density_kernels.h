@@ -8,7 +8,7 @@
 
 namespace traceflow {
 
-// One surfel's signal of one iteration, added to its statistics.
+// Adds the signal of one surfel in one iteration to its statistics.
 struct AccumulateSignal {
   const float* signal;
   const uint8_t* touched;
@@ -21,14 +21,14 @@ struct AccumulateSignal {
   }
 };
 
-// Moves the children of split surfels, the last rows of a set, to points drawn from their parents' own
-// Gaussians, and shrinks them.
+// Moves the children of split surfels, the last rows of a set, to points drawn from their parents' Gaussians,
+// and shrinks them.
 struct ScatterChild {
   // As in 2DGS.
   static constexpr float shrink = 1.6F;
 
   int64_t first;
-  const float* drawn;  // two normal numbers a child
+  const float* drawn;  // two normal random numbers per child
   float *position, *log_scale;
   const float* rotation;
 
@@ -43,11 +43,11 @@ struct ScatterChild {
   }
 };
 
-// Gives a surfel and its clone the opacity 1 − √(1 − o), o being the surfel's: where both lie on each other
-// they cover what it did (Rota Bulò et al., Revising Densification in Gaussian Splatting, 2024).
+// Gives a surfel of opacity o and its clone the opacity 1 − √(1 − o) each. Where they overlap they cover what
+// the surfel covered (Rota Bulò et al., Revising Densification in Gaussian Splatting, 2024).
 struct ShareOpacity {
   const int64_t* rows;
-  float faint;  // under this none is made fainter
+  float faint;  // opacities are not lowered below this
   float* opacity_logit;
 
   TRACEFLOW_HD void operator()(int64_t k) const {
@@ -61,7 +61,7 @@ struct ShareOpacity {
 };
 
 // Shortens a surfel that is longer than `longest` and than `aspect` times its width to the larger of the two.
-// All are logarithms.
+// All values are logarithms.
 struct ShortenNeedle {
   float aspect, longest;
   float* log_scale;

@@ -7,9 +7,9 @@ namespace traceflow {
 
 namespace {
 
-// Weight of one iteration in the smoothed PSNR: about the last hundred views count.
+// The weight of one iteration in the smoothed PSNR: about the last hundred views count.
 constexpr double smoothing = 0.01;
-// The mean over fewer views says nothing about a collapse.
+// The mean over fewer views does not show a collapse.
 constexpr int64_t settling_steps = 300;
 
 }  // namespace

@@ -7,19 +7,19 @@
 
 namespace traceflow {
 
-// Watches a run for divergence: losses or gradients that are not numbers, and a PSNR that collapses.
+// Detects divergence of a run: losses or gradients that are not finite, and a PSNR that collapses.
 class DivergenceMonitor {
  public:
   DivergenceMonitor(NonFinite policy, float collapse_decibels)
       : policy_(policy), collapse_decibels_(collapse_decibels) {}
 
-  // After each iteration. Returns why the run must stop, or nothing.
+  // Call after each iteration. Returns why the run must stop, or an empty string.
   std::string check(const LossValues& terms, const NonFiniteGradients& gradients);
-  // An opacity reset makes the PSNR fall on purpose: the best seen so far is forgotten.
+  // Forgets the best PSNR so far, because an opacity reset lowers the PSNR on purpose.
   void expect_fall();
 
   double smoothed_psnr() const { return smoothed_; }
-  // The run may be saved: its PSNR is not far under its best.
+  // Whether the run may be saved: its PSNR is not far below its best.
   bool sound() const;
   int64_t dropped() const { return dropped_; }
 
@@ -37,7 +37,7 @@ class DivergenceMonitor {
   double smoothed_ = 0;
   double best_ = 0;
   int64_t steps_ = 0;    // since the last expected fall
-  int64_t dropped_ = 0;  // gradient entries that were not finite and not applied
+  int64_t dropped_ = 0;  // gradient entries that were not finite and were not applied
 };
 
 }  // namespace traceflow

@@ -24,7 +24,7 @@ constexpr float moves_above = 0.4F;
 
 float ramp(float value, float from, float to) { return std::clamp((value - from) / (to - from), 0.0F, 1.0F); }
 
-// f of each pixel's numbers.
+// Applies f to each pixel index.
 template <class F>
 Tensor<float> per_pixel(int64_t height, int64_t width, F&& f) {
   Tensor<float> result({height, width});
@@ -32,8 +32,8 @@ Tensor<float> per_pixel(int64_t height, int64_t width, F&& f) {
   return result;
 }
 
-// How far a photograph is from the still scene, whatever the brightness: a shadow is no object. The larger of
-// the mean difference over squares and of a share of their root mean square.
+// The difference of a photograph from the static scene after correcting brightness, since a shadow is not an
+// object. It is the larger of the mean difference over squares and a multiple of its root mean square.
 Tensor<float> difference(const Tensor<float>& still, const Tensor<float>& photograph) {
   constexpr int64_t half_window = 2;
   constexpr float darkest = 0.55F, brightest = 1.25F, rough = 0.6F;
@@ -60,7 +60,7 @@ Tensor<float> difference(const Tensor<float>& still, const Tensor<float>& photog
   return result;
 }
 
-// Pixels are alike where their normals are, and their colours, which count more where there are no normals.
+// The similarity of two pixels, from their normals and colours. Colours have a higher weight without normals.
 float likeness(const ViewImages& photograph, int64_t i, int64_t j) {
   constexpr float steep = 60, least = 1e-4F, colour_weight = 1, colour_alone = 9, normal_weight = 9;
   const Vec3<float> colour =
@@ -72,11 +72,10 @@ float likeness(const ViewImages& photograph, int64_t i, int64_t j) {
          least;
 }
 
-// How much of each pixel of a view has values above the threshold, where a coarser picture is read between
-// its pixels.
+// The share of each pixel of a view with values above the threshold. The coarser image is interpolated.
 Tensor<uint8_t> coverage_above(const Tensor<float>& coarse, float threshold, int64_t height, int64_t width,
                                float factor) {
-  constexpr int64_t samples = 4;  // to each side of a pixel
+  constexpr int64_t samples = 4;  // along each side of a pixel
   const auto read = [&](float y, float x) {
     const float row = std::clamp(y - 0.5F, 0.0F, static_cast<float>(coarse.dim(0) - 1));
     const float column = std::clamp(x - 0.5F, 0.0F, static_cast<float>(coarse.dim(1) - 1));
@@ -103,9 +102,9 @@ Tensor<uint8_t> coverage_above(const Tensor<float>& coarse, float threshold, int
   return coverage;
 }
 
-// Without parts that are too small to be followed.
+// Removes parts that are too small to be tracked.
 void leave_out_specks(Tensor<float>& share) {
-  constexpr double least = 0.005;  // of the picture
+  constexpr double least = 0.005;  // of the image
   Tensor<uint8_t> mask(share.shape());
   for (int64_t i = 0; i < mask.size(); ++i) mask[i] = share[i] > moves_above ? 1 : 0;
   for (const std::vector<int64_t>& part : mask_parts(mask)) {
@@ -118,7 +117,7 @@ bool has_object_mask(const Capture& capture, const View& view) {
   return !capture.masks_are_estimated && capture.images->has_mask(view.id);
 }
 
-// Whether a view of the first time has a mask of the objects.
+// Whether a view of the first frame has a mask of the objects.
 bool shows_first_objects(const Capture& capture) {
   const auto earlier = [](const View& a, const View& b) { return a.time < b.time; };
   const auto first = std::min_element(capture.train.begin(), capture.train.end(), earlier);
@@ -141,7 +140,8 @@ int iterations_to_find_objects(const Capture& capture, const TrainOptions& optio
 }
 
 Tensor<float> moving_share(const StillScene::Look& still, const ViewImages& photograph) {
-  // Evidence counts where most photographs agree with the still scene: what is always hidden is not known.
+  // Evidence counts where most photographs agree with the static scene. Where the scene is always hidden, it
+  // is unknown.
   constexpr float known_from = 0.6F, known_to = 0.9F;
   constexpr float same_to = 0.02F, undecided = 0.05F, differs_from = 0.13F;
   constexpr float weight = 0.3F, doubt = 2e-4F;

@@ -13,17 +13,17 @@ namespace traceflow {
 namespace {
 
 constexpr size_t earliest_count = 8;
-// A surfel hides what lies behind a square around it, this many of its widths to either side so that
-// scattered ones leave no holes, by more than so many widths. Neighbours on a plane that is seen at a slant
-// do not hide each other down to an angle of asin 1.5/8 = 11°.
+// A surfel hides what is more than hiding_widths of its widths behind a square around it. The square extends
+// hiding_reach widths to each side, so that scattered surfels leave no holes. Neighbours on a plane do not
+// hide each other if it is seen at an angle of at least asin 1.5/8 = 11°.
 constexpr float hiding_reach = 1.5F;
 constexpr float hiding_widths = 8;
-// No square goes further to either side than this, in pixels.
+// The largest extent of a square to each side, in pixels.
 constexpr float widest_square = 32;
 
 float width_of(const Surfels& s, int64_t i) { return std::exp(s.log_scale(i, 0)); }
 
-// Where a surfel stands in a photograph.
+// The position of a surfel in a photograph.
 struct Place {
   int column = 0, row = 0;
   float z = 0;
@@ -72,7 +72,7 @@ float median(std::vector<float>& values) {
   return *middle;
 }
 
-// What nothing was seen of takes over what the nearest seen surfel has.
+// Gives unseen surfels the values of the nearest seen surfel.
 void fill_unseen(const Surfels& s, InitialObservations& observations) {
   std::vector<int64_t> seen, unseen;
   for (int64_t i = 0; i < s.count(); ++i)
@@ -96,7 +96,7 @@ void fill_unseen(const Surfels& s, InitialObservations& observations) {
 
 }  // namespace
 
-// In sides of the image.
+// A share of the image's longer side.
 constexpr float view_margin = 0.1F;
 
 Tensor<float> points_in_view(const Tensor<float>& points, const std::vector<View>& views, float near_plane) {

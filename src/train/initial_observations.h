@@ -9,21 +9,21 @@
 
 namespace traceflow {
 
-// What the earliest photographs show of each of N surfels, while the scene still stands as its points do.
-// A surfel counts as seen in a photograph where no other one stands clearly before it; one that is seen in
-// none takes over what its nearest seen neighbour has: the back of an object belongs to its front, and the
-// wall behind an object to the wall beside it.
+// What the earliest photographs show of each of N surfels, while the scene is still where its points are. A
+// surfel counts as seen in a photograph if no other surfel is clearly in front of it. A surfel seen in none
+// takes the values of its nearest seen neighbour: the back of an object counts as its front, and the wall
+// behind an object as the wall beside it.
 struct InitialObservations {
-  Tensor<float> colour;      // N×3, the median of its colours: it forgives the odd wrong one
-  std::vector<int> outside;  // sightings outside the masks less those inside: < 0 on the moving object,
-                             // 0 where no photograph with a mask shows it
-  std::vector<uint8_t> any;  // 0 where nothing is known, which is only when no surfel is seen at all
+  Tensor<float> colour;      // N×3, the median of its colours, robust to outliers
+  std::vector<int> outside;  // sightings outside the masks minus those inside. < 0: on the moving object, 0:
+                             // no photograph with a mask shows it
+  std::vector<uint8_t> any;  // 0: nothing is known, only if no surfel is seen at all
 };
 
-// Those of the points (P×3, scene) that some view sees at whatever time, in their order: what falls into its
-// image, or beside it by at most a tenth of its longer side, and more than near_plane before its camera.
-// Nothing is asked of what stands before them. The margin is what a camera beside those of training sees more
-// than they: without it, its pictures end in holes.
+// The points (P×3, scene) that at least one view sees at any time, in their order. A view sees a point that
+// projects into its image, or beside it by at most a tenth of its longer side, and that is more than
+// near_plane in front of its camera. Occlusion is ignored. The margin covers what a camera beside the
+// training cameras sees in addition; without it, its images have holes at the border.
 Tensor<float> points_in_view(const Tensor<float>& points, const std::vector<View>& views, float near_plane);
 
 // A training view with its pixels.
@@ -31,10 +31,10 @@ struct Photograph {
   Camera<float> camera;
   std::shared_ptr<const ViewImages> images;
 };
-// The eight earliest by time, or all where there are fewer.
+// The eight earliest by time, or all if there are fewer.
 std::vector<Photograph> earliest_photographs(const Capture& capture);
 
-// `surfels` as they start: as wide as their neighbours are apart.
+// `surfels` in their initial state: as wide as the distance to their neighbours.
 InitialObservations observe(const Surfels& surfels, std::span<const Photograph> photographs);
 
 }  // namespace traceflow

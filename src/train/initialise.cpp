@@ -23,7 +23,7 @@ namespace {
 
 constexpr int neighbours_for_scale = 3;
 constexpr int neighbours_for_normal = 10;
-// Neighbours at one place would give a scale of zero, whose logarithm is not a number.
+// Coincident neighbours would give a scale of zero, whose logarithm is not finite.
 constexpr float least_distance2 = 1e-10F;
 
 float logit(float p) { return std::log(p / (1 - p)); }
@@ -65,7 +65,7 @@ void set_rotations_from_neighbours(Surfels& s) {
   });
 }
 
-// Grey where nothing is known.
+// Unobserved surfels stay grey.
 void set_colours(Surfels& s, const InitialObservations& observations) {
   for (int64_t i = 0; i < s.count(); ++i) {
     if (!observations.any[static_cast<size_t>(i)]) continue;
@@ -191,8 +191,8 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
   const int cells = options.environment_cells;
   const int64_t places = static_cast<int64_t>(cells) * cells * cells * options.environment_per_cell;
   const int64_t count = std::min(places, limit);
-  // Where there are more places than surfels, each surfel takes one of its share, at random: an even step
-  // could fall in with the grid.
+  // If there are more places than surfels, each surfel takes a random place of its share. An even step could
+  // align with the grid.
   const auto place_of = [&](int64_t i) {
     if (count == places) return i;
     const double share = static_cast<double>(places) / static_cast<double>(count);
@@ -203,7 +203,7 @@ Surfels surfels_around(const Tensor<float>& points, const std::vector<View>& vie
   for (int64_t i = 0; i < count; ++i) {
     const int64_t cell = place_of(i) / options.environment_per_cell;
     const glm::vec<3, int64_t> corner(cell % cells, cell / cells % cells, cell / cells / cells);
-    // Braces, because they alone fix the order of the draws.
+    // Braces, because only they fix the order of the draws.
     const Vec3<float> offset{random.uniform(), random.uniform(), random.uniform()};
     store3(s.position.row(i),
            centre + size * ((Vec3<float>(corner) + offset) / static_cast<float>(cells) - 0.5F));
@@ -220,7 +220,7 @@ Surfels surroundings_at_points(const Capture& capture, const Tensor<float>& poin
   as_environment.sh_degree = options.environment_sh_degree;
   Surfels s = surfels_at_points(thinned(points, limit, random), as_environment, random);
   s.tint_logit = s.roughness_logit = {};
-  // What the camera sees beside the object is also what the object mirrors.
+  // The object mirrors what the camera sees beside it.
   const InitialObservations observations = observe(s, earliest_photographs(capture));
   set_colours(s, observations);
   RowEdit surroundings;
@@ -275,7 +275,7 @@ bool follows_bodies(const Capture& capture, const TrainOptions& options) {
 
 InitialScene initial_scene(const Capture& capture, const TrainOptions& options, Random& random) {
   const int64_t limit = std::min(options.initial.max_points, options.density.max_surfels);
-  // What no photograph shows teaches a main surfel nothing, and a mirror may still show it.
+  // Main surfels need photographs to train. A mirror may show the other points, so the environment uses all.
   Tensor<float> points = finite_points(capture.points);
   Tensor<float> seen =
       points_in_view(points, capture.train, options.render.raster_options(capture.extent).near_plane);
@@ -300,8 +300,8 @@ InitialScene initial_scene(const Capture& capture, const TrainOptions& options, 
   const Tensor<float> kept = thinned(seen, limit - made_up.dim(0), random);
   made.at_points = kept.dim(0);
   scene.main = surfels_at_points(joined(kept, made_up), options.initial, random);
-  // Masks that were estimated say what moves. Of a film in which nothing mirrors, what they started as
-  // mirrors grew into one before the camera, which can show any scene.
+  // Estimated masks show what moves, not what reflects. In videos without mirrors, surfels that started as
+  // mirrors grew into a mirror in front of the camera, which can show any scene.
   const bool by_masks = options.initial.tint_in_mask > 0 && capture.has_masks &&
                         !capture.masks_are_estimated && !capture.masks_are_found;
   if (options.initial.colours_from_views || by_masks) {

@@ -11,21 +11,23 @@ namespace traceflow {
 namespace {
 
 constexpr int64_t mebibyte = 1 << 20;
-// Parameter, gradient and two moments; and while rows are edited, or a checkpoint is written, another three.
+// The parameter, its gradient and two moments, and three more while rows are edited or a checkpoint is
+// written.
 constexpr int64_t copies_of_parameters = 7;
-// Tensors of one number a pixel that a frame, its gradient and the ops' saved state hold, tile lists on the
-// CPU included.
+// Tensors with one number per pixel in a frame, its gradient and the saved state of the ops, including tile
+// lists on the CPU.
 constexpr int64_t planes_of_a_frame = 160;
-// A ray's saved hits and their gradient records on the CPU, where they are not limited.
+// The saved hits of a ray and their gradient records on the CPU, where they are not limited.
 constexpr int64_t bytes_per_ray = 64 * 48;
-// A ray's place in the order, sums and basis on the CUDA device.
+// A ray's place in the order, its sums and its basis on the CUDA device.
 constexpr int64_t device_bytes_per_ray = 320;
-// An entry of a tile's list with its keys and its share of the gradient, and how many tiles a surfel is in.
+// An entry of a tile list with its keys and its part of the gradient, and the number of tiles per surfel.
 constexpr int64_t device_bytes_per_entry = 192;
 constexpr int64_t entries_per_surfel = 8;
-// A surfel's node, disk and keys in the tracer's tree, and its sums.
+// The node, disk and keys of a surfel in the tracer's hierarchy, and its sums.
 constexpr int64_t device_bytes_per_disk = 640;
-// Of the matrix library, the fields' sums and the segments that pass through them, and of small lists.
+// For the matrix library, the sums of the fields, the segments in which points pass through them, and small
+// lists.
 constexpr int64_t device_bytes_of_ops = 512 * mebibyte;
 
 struct SetShape {
@@ -42,14 +44,14 @@ int64_t bytes_per_surfel(const SetShape& set) {
   return 4 * (copies_of_parameters * numbers + posed + screen + encoding);
 }
 
-// Of a field at so many points: the activations, as far as they are kept.
+// The kept activations of a field at `count` points.
 int64_t field_bytes(const SetShape& set, int64_t count, const KeptMemory& kept) {
   if (!set.has_field) return 0;
   const int64_t each = 4 * static_cast<int64_t>(set.network.depth + 1) * set.network.width;
   return std::min(each * count, kept.field_bytes);
 }
 
-// Of a grid whose box is a cube, which holds the most points.
+// For a grid whose box is a cube, which has the most points.
 int64_t lighting_bytes(const LightingOptions& light, int64_t times) {
   if (light.cells == 0) return 0;
   const int64_t side = light.cells + 1;
@@ -58,12 +60,12 @@ int64_t lighting_bytes(const LightingOptions& light, int64_t times) {
 
 KeptMemory kept_memory(Device device, int64_t budget) {
   if (device == Device::cpu) return {};
-  // What does not fit is computed again, so that a small device is slower instead of refused.
+  // What does not fit is recomputed, so that a run on a small device is slower instead of refused.
   return {.field_bytes = std::min(budget / 12, 4096 * mebibyte),
           .hit_bytes = std::min(budget / 6, 4096 * mebibyte)};
 }
 
-// What the options ask for.
+// The caps in the options.
 SurfelCaps caps_of(const TrainOptions& options) {
   const bool traced = options.specular == Specular::environment_gaussians;
   return {options.density.max_surfels, traced ? options.environment_density.max_surfels : 0, false};
@@ -87,7 +89,7 @@ MemorySetting memory_setting(const TrainOptions& options, Device device, const C
 int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t main, int64_t environment) {
   const TrainOptions& o = run.options;
   const int64_t pixels = run.pixels;
-  const int64_t samples = int64_t{o.render.samples} * o.render.samples;  // of a pixel
+  const int64_t samples = int64_t{o.render.samples} * o.render.samples;  // per pixel
   const bool traced = o.specular == Specular::environment_gaussians;
   const bool mapped = o.specular == Specular::environment_map;
   const SetShape main_set{o.initial.sh_degree, o.deform.main, o.deform.network};
@@ -138,7 +140,7 @@ MemoryPlan plan_memory(const MemorySetting& run) {
   };
   plan.caps = asked;
   if (!fits(plan.caps)) {
-    // What is kept only up to a limit makes the forecast bend, so that the share is searched for.
+    // The limits on kept memory make the forecast nonlinear, so the share is found by bisection.
     double low = 0, high = 1;
     constexpr int halvings = 24;
     for (int i = 0; i < halvings; ++i) (fits(caps((low + high) / 2)) ? low : high) = (low + high) / 2;

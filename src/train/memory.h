@@ -6,38 +6,38 @@
 
 namespace traceflow {
 
-// Where a run trains, and on what: all that its memory depends on beside the sets' sizes.
+// What the memory of a run depends on besides the sizes of the sets.
 struct MemorySetting {
   const TrainOptions& options;
   Device device;
-  int64_t pixels;  // of its largest photograph
-  int64_t times;   // at which it has views
+  int64_t pixels;  // of the largest photograph
+  int64_t times;   // number of times with views
 };
 MemorySetting memory_setting(const TrainOptions& options, Device device, const Capture& capture);
 
-// Pixels of the largest view of both splits: a run renders them all.
+// The pixels of the largest view of both splits; a run renders them all.
 int64_t largest_view(const Capture& capture);
 
-// Bytes that the device, for the CPU the machine, can give.
+// The bytes available on the device; for the CPU, of the machine.
 int64_t available_bytes(Device device);
 
-// Bytes that a run may take: options.memory_budget, or three quarters of what can be given.
+// The bytes that a run may use: options.memory_budget, or three quarters of the available ones.
 int64_t memory_budget_bytes(const TrainOptions& options, Device device);
 
-// What a run with sets of these sizes takes at most, in bytes on its device: parameters, gradients, moments,
-// posed copies, the fields' activations, tile lists, the tracer's tree and hit lists, images and those that
-// are kept. An estimate from the shapes, on the high side.
+// An upper bound on the bytes that a run with sets of these sizes uses on its device: parameters, gradients,
+// moments, posed copies, activations of the fields, tile lists, the tracer's hierarchy and hit lists, images
+// and cached images. Estimated from the shapes; rather too high than too low.
 int64_t forecast_bytes(const MemorySetting& run, const KeptMemory& kept, int64_t main, int64_t environment);
 
-// Caps on the two sets' sizes that keep a run within its memory budget.
+// Caps on the sizes of the two sets that keep a run within its memory budget.
 struct SurfelCaps {
   int64_t main = 0;
   int64_t environment = 0;
-  bool lowered = false;  // the budget allows less than the options ask for
+  bool lowered = false;  // below what the options ask for, because of the budget
 };
 
-// How a run's memory is dealt out before it starts. Throws InputError where the budget does not even hold its
-// images.
+// The distribution of a run's memory, made before it starts. Throws InputError when the budget is too small
+// even for the images.
 struct MemoryPlan {
   int64_t budget_bytes = 0;
   int64_t forecast_bytes = 0;  // with both sets at their caps
@@ -46,11 +46,11 @@ struct MemoryPlan {
   int64_t image_bytes = 0;  // photographs kept on the device
 };
 MemoryPlan plan_memory(const MemorySetting& run);
-// The same with given caps, within the budget or not.
+// The same plan with given caps, which may exceed the budget.
 MemoryPlan with_caps(MemoryPlan plan, const MemorySetting& run, const SurfelCaps& caps);
 
-// What a run takes at most, in bytes, where no budget limits it: both sets at the options' caps, all kept
-// that is worth keeping.
+// An upper bound on the bytes of a run without a budget: both sets at the options' caps, and everything
+// cached that is worth caching.
 int64_t unlimited_forecast(const MemorySetting& run);
 
 }  // namespace traceflow

@@ -85,8 +85,8 @@ class LossMeans {
 // Compares a frame with its photograph and sets dL/dframe and dL/d(stored positions).
 void evaluate_objective(const LossInputs& inputs, const LossGradient& gradient, LossMeans& means);
 
-// The network of LPIPS where the options give it a weight. Throws InputError where its file cannot be used or
-// the capture's images are too small for it.
+// The LPIPS network, if the options give LPIPS a weight. Throws InputError when its file cannot be used or
+// when the capture's images are too small for it.
 std::optional<lpips::Network> perceptual_network(const LossOptions& options, const Capture& capture);
 
 }  // namespace traceflow

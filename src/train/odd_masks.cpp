@@ -33,7 +33,7 @@ MaskExtent extent_of(const std::string& id, const Tensor<uint8_t>& mask) {
   return extent;
 }
 
-// Up to three that are not blank on one side of `at`, nearest first.
+// The indices of up to three non-blank extents on one side of `at`, nearest first.
 std::vector<size_t> beside(const std::vector<MaskExtent>& extents, size_t at, std::ptrdiff_t step) {
   std::vector<size_t> found;
   for (auto k = static_cast<std::ptrdiff_t>(at) + step;

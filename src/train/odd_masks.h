@@ -5,23 +5,23 @@
 
 #include "capture/capture.h"
 
-// Masks that those of the times beside them contradict.
+// Ignores masks that contradict those of neighbouring times.
 namespace traceflow {
 
-// What a view's mask covers.
+// The extent of a view's mask.
 struct MaskExtent {
   std::string id;
   double share = 0;           // of the image
-  bool touches_edge = false;  // of the image, or nearly: what it shows may be leaving the picture
+  bool touches_edge = false;  // or almost: the thing may be leaving the image
 };
-// Of extents in the order of time, the places of those that are odd: blank, or 1.7 times smaller or larger
-// than the median of the three before and the three after that are not blank. A small one is not odd where
-// what it shows may be leaving the picture: where it, or the next one on either side that is not blank and
-// small as well, touches the image's edge.
+// The indices of implausible extents. The input is ordered by time. An extent is implausible if it is blank,
+// or 1.7 times smaller or larger than the median of up to three non-blank ones before and after it. A small
+// extent is plausible if the thing may be leaving the image: if it touches the image border, or if the
+// nearest non-blank one on either side is small and touches it.
 std::vector<size_t> odd_extents(const std::vector<MaskExtent>& extents);
 
-// Takes odd masks away from training views, each camera's by themselves: a view without a mask tells nothing
-// of silhouettes, one with a wrong mask misleads. Adds a warning that names them.
+// Removes implausible masks from training views, separately for each camera. A view without a mask gives no
+// silhouette, but a wrong mask misleads. Adds a warning that names the views.
 void leave_out_odd_masks(Capture& capture);
 
 }  // namespace traceflow

@@ -11,13 +11,13 @@ optimize::AdamState zero_state(const Tensor<float>& parameter) {
           Tensor<float>(parameter.shape(), parameter.device()), 0};
 }
 
-// Of the rate of poses: those have been found when nodes begin.
+// Relative to the rate of poses, which are already solved when nodes start.
 constexpr double node_rates = 4;
-// Of the rate of the grid's brightness. A picture tells four numbers of a body at two times only; at the full
-// rate each of its steps changes them by 4 %.
+// Relative to the rate of the grid's brightness. A view determines the four numbers of a body at two times
+// only; at the full rate each step would change them by 4 %.
 constexpr double body_brightness_rates = 0.1;
 
-// Of a field, a motion, nodes or lighting.
+// For a field, motion, nodes or lighting.
 template <class Parameters>
 std::vector<optimize::AdamState> zero_states(const Parameters& parameters) {
   std::vector<optimize::AdamState> states;
@@ -26,7 +26,7 @@ std::vector<optimize::AdamState> zero_states(const Parameters& parameters) {
   return states;
 }
 
-// Collects the tensors of a step, so that all of them are stepped at once.
+// Collects the tensors of a step, so that all are updated in one call.
 class Stepper {
  public:
   explicit Stepper(StepNotes& notes) : notes_(notes) { notes_.tensors.clear(); }
@@ -35,7 +35,7 @@ class Stepper {
                   optimize::AdamState& state, double rate) {
     (*this)(name, parameter, gradient, state, std::vector<float>{static_cast<float>(rate)});
   }
-  // A rate for each column of a row.
+  // With one rate per column.
   void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
                   optimize::AdamState& state, const std::vector<float>& rates) {
     tasks_.push_back({&parameter, &gradient, &state, rates});
@@ -204,7 +204,7 @@ void Optimiser::for_each(Self& self, F&& f) {
 }
 
 void Optimiser::put(Safetensors& file) const {
-  // for_each visits without changing anything when its function does not.
+  // for_each itself changes nothing; only its function could.
   for_each(const_cast<Optimiser&>(*this), [&](const std::string& name, const optimize::AdamState& state) {
     if (state.first.empty()) return;
     file.add(name + "/first", state.first);

@@ -11,34 +11,34 @@
 
 namespace traceflow {
 
-// Adam's state for each field of one set of surfels.
+// Adam's state for each field of a set of surfels.
 struct SurfelMoments {
   optimize::AdamState position, log_scale, rotation, opacity_logit, sh, tint_logit, roughness_logit;
 
-  // f(name, state) for each field of surfels, in the order of for_each_field.
+  // Calls f(name, state) for each field of surfels, in the order of for_each_field.
   template <class F>
   void for_each(F&& f) {
     for_each_field([&](const SurfelField& field, auto& state) { f(std::string(field.name), state); }, *this);
   }
   void reset_like(const Surfels& surfels);
-  // Fresh rows get zero moments (method §7.7).
+  // New rows get zero moments (method §7.7).
   SurfelMoments edited(const PlacedEdit& edit) const;
 };
 
-// Gradients that were not finite: how many, and where the first one was ("main.position, surfel 17").
+// The number of gradient entries that were not finite, and the place of the first ("main.position, row 17").
 struct NonFiniteGradients {
   int64_t count = 0;
   std::string first;
 };
 
-// What was not finite in a step, by the tensors that it went through, where they are.
+// What was not finite in a step, by tensor, on the tensors' device.
 struct StepNotes {
   struct Stepped {
     std::string name;
     int64_t row_size;
   };
   std::vector<Stepped> tensors;
-  Tensor<optimize::LeftAlone> left_alone;  // one for each
+  Tensor<optimize::LeftAlone> left_alone;  // one per tensor
 
   NonFiniteGradients report() const;
 };
@@ -46,17 +46,17 @@ struct StepNotes {
 // Updates a scene by Adam with the schedule's rates (method §7.6).
 class Optimiser {
  public:
-  // Zero moments in the shapes of the scene.
+  // Zero moments with the shapes of the scene's tensors.
   explicit Optimiser(const Scene& scene);
 
-  // One step on whatever is trainable, of positions at that share of their rate. Entries that are not finite
-  // are left alone. Where memory runs out, nothing has changed.
+  // One step for everything trainable. Positions use share_of_positions of their rate. Entries that are not
+  // finite change nothing. If memory runs out, nothing has changed.
   void step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable, const Schedule& schedule,
             const RateOptions& rates, int iteration, double share_of_positions = 1);
-  // What the last step left alone. Waits for the device.
+  // What was not finite in the last step. Waits for the device.
   NonFiniteGradients left_alone() const { return notes_.report(); }
 
-  // Of parameters that the scene has got since.
+  // For parameters that were added to the scene later.
   void begin(const Motion& motion);
   void begin(const Nodes& nodes);
   void begin(const Lighting& lighting);
@@ -65,11 +65,11 @@ class Optimiser {
   SurfelMoments& environment() { return environment_; }
 
   void put(Safetensors& file) const;
-  // Throws InputError where the file's moments do not fit the scene that this optimiser was made for.
+  // Throws InputError when the file's moments do not fit the scene that this optimiser was made for.
   void get(const Safetensors& file);
 
  private:
-  // f(name, state) for all.
+  // Calls f(name, state) for all states.
   template <class Self, class F>
   static void for_each(Self& self, F&& f);
 

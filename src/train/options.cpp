@@ -6,18 +6,18 @@ namespace traceflow {
 
 namespace {
 
-// The numbers as published. Hidden layers in bf16 with fp32 sums, which is what tensor cores are fast at; the
-// encodings' layers keep more digits.
+// The published values. Hidden layers use bf16 with fp32 sums, at which tensor cores are fast; the layers
+// that read encodings keep more digits.
 TrainOptions paper_preset() {
   TrainOptions o;
   o.render.precision = field::Precision::bf16;
   return o;
 }
 
-// Short runs cannot find everything from photographs alone, as the paper's 60,000 iterations do. They lean on
-// the capture: geometry starts opaque at its points, its masks say what reflects, reflection and normals
-// count from the start (without them a mirror's surface drifts behind itself, to where its images seem to
-// be), and motion is followed from the first pictures on, that of bodies where masks show them.
+// Short runs cannot determine everything from photographs alone, as the paper's 60,000 iterations do. They
+// use more of the capture: surfels start opaque at its points, and its masks show what reflects. Reflection
+// and normals count from the start, because without them a mirror's surface sinks to the depth of its virtual
+// images. Motion is learnt from the first frames on, with bodies if there are masks.
 TrainOptions cpu_preset() {
   TrainOptions o;
   o.iterations = 8000;
@@ -85,11 +85,11 @@ TrainOptions cpu_preset() {
 TrainOptions demo_preset() {
   TrainOptions o = cpu_preset();
   o.iterations = 6000;
-  o.render.samples = 1;  // two would take a fifth longer
+  o.render.samples = 1;  // 2 would take a fifth longer
   o.density.max_surfels = 16000;
   o.initial.max_points = 8000;
   o.environment_density.max_surfels = 8000;
-  o.loss.environment_residual = 0;  // what its balls mirror moves
+  o.loss.environment_residual = 0;  // the scene that its balls mirror moves
   return o;
 }
 
@@ -142,7 +142,7 @@ void LossOptions::validate() const {
   check_not_negative(normal_prior_on_mirrors, "loss.normal_prior_on_mirrors");
   check_not_negative(distortion, "loss.distortion");
   check_not_negative(rigidity, "loss.rigidity");
-  // Its square is divided by, in single precision.
+  // The code divides by its square in single precision.
   check_option(rigidity_strain >= 1e-6F, "loss.rigidity_strain", rigidity_strain, "1e-6 or more");
   check_not_negative(silhouette, "loss.silhouette");
   check_not_negative(environment_residual, "loss.environment_residual");

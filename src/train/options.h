@@ -10,11 +10,11 @@
 #include "scene/scene.h"
 #include "track/options.h"
 
-// Every number of the training method under its name (method §7, §9).
+// All options of the training method (method §7, §9).
 namespace traceflow {
 
-// Marks of the coarse-to-fine schedule (method §7.1–§7.3, §7.6), counted in a schedule of `length`
-// iterations; a run of another length scales every mark in proportion.
+// Iteration numbers of the coarse-to-fine schedule (method §7.1–§7.3, §7.6) for a run of `length` iterations;
+// runs of other lengths scale them in proportion.
 struct ScheduleOptions {
   int length = 60000;
   int deform_from = 3000;
@@ -52,7 +52,7 @@ struct ScheduleOptions {
   void validate() const;
 };
 
-// Learning rates of Adam (method §7.6). Positions are relative to the scene's extent.
+// Learning rates of Adam (method §7.6). Those of positions are relative to the scene's extent.
 struct RateOptions {
   float position = 1.6e-4F;
   float position_end = 1.6e-6F;
@@ -148,8 +148,8 @@ struct LossOptions {
   void validate() const;
 };
 
-// Density control of one set (method §7.7). Marks are counted in schedule.length iterations and scale with
-// the run.
+// Density control of one set (method §7.7). Iteration numbers are for schedule.length iterations and scale
+// with the run.
 struct DensityOptions {
   int from = 500;
   int every = 100;
@@ -198,7 +198,7 @@ struct DensityOptions {
   void validate(const std::string& group) const;
 };
 
-// How light changes: on what stands still, as where shadows of bodies move, and on bodies (scene/lighting.h).
+// How light changes: on static surfaces, for example by moving shadows, and on bodies (scene/lighting.h).
 struct LightingOptions {
   int cells = 32;
   int every = 3;
@@ -306,7 +306,7 @@ struct InitialOptions {
   void validate() const;
 };
 
-// What happens to a gradient that is not a number.
+// What happens to a gradient that is not finite.
 enum class NonFinite { stop, drop };
 constexpr std::array<std::string_view, 2> enum_names(NonFinite) { return {"stop", "drop"}; }
 
@@ -326,9 +326,8 @@ struct TrainOptions {
   RateOptions rates;
   ScheduleOptions schedule;
   DensityOptions density;
-  // Surroundings start coarse all over their box (method §7.8), which a camera that moves a little sees
-  // large: a tenth of its extent would take nearly all of them before they have trained. So they are held to
-  // their box.
+  // The environment starts coarse throughout its box (method §7.8). If the camera moves little, a tenth of
+  // its extent would remove nearly all surfels before they have trained. So the limit is relative to the box.
   DensityOptions environment_density{.from = 9000,
                                      .every = 500,
                                      .gradient_threshold = 1e-4F,
@@ -363,8 +362,8 @@ struct TrainOptions {
   void validate() const;
 };
 
-// The named starting points: "paper" (60,000 iterations as published), "cpu" (two cores, a quarter of an hour
-// at 240×135), "demo" (minutes). Throws InputError for another name.
+// The presets: "paper" (60,000 iterations as published), "cpu" (two cores, a quarter of an hour at 240×135),
+// "demo" (minutes). Throws InputError for another name.
 TrainOptions preset(const std::string& name);
 
 }  // namespace traceflow

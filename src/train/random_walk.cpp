@@ -60,7 +60,7 @@ double product(const std::vector<double>& a, const std::vector<double>& b) {
 
 Tensor<float> random_walk(const WalkTerms& terms) {
   constexpr int most_steps = 2000;
-  constexpr double accuracy = 1e-10;  // of the first residual's square, as the preconditioner measures it
+  constexpr double accuracy = 1e-10;  // relative to the first squared residual, in the preconditioner's norm
   const auto count = static_cast<size_t>(terms.one.size());
   const Grid grid(terms);
   const auto precondition = [&](const std::vector<double>& r, std::vector<double>& z) {

@@ -4,10 +4,10 @@
 
 namespace traceflow {
 
-// What a segmentation of an image into two parts is made from. All weights are 0 or more.
+// The input of a segmentation into two parts. All weights are 0 or more.
 struct WalkTerms {
   Tensor<float> one, zero;    // H×W, evidence that a pixel belongs to the part, and that it does not
-  Tensor<float> right, down;  // H×W, how much a pixel is like the next one in its row and in its column
+  Tensor<float> right, down;  // H×W, similarity of a pixel to the next one in its row and in its column
 };
 
 // Random walker segmentation with priors (Grady 2005, Multilabel random walker image segmentation using prior

@@ -99,7 +99,7 @@ bool Schedule::solves_poses_again(int iteration, int64_t followed) const {
   const int rounds = options_.deform.track.rounds;
   if (rounds == 0) return false;
   const int part = std::clamp(options_.iterations / rounds, 1, longest);
-  // What was followed a moment ago is not known better yet.
+  // Soon after tracking, solving again would not improve poses.
   return iteration % part == 0 && 2 * (iteration - followed) >= part;
 }
 

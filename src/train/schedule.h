@@ -5,12 +5,12 @@
 
 namespace traceflow {
 
-// Which part of the method is training (method §7.1–§7.3).
+// The phase of training (method §7.1–§7.3).
 enum class Phase { diffuse, specular, joint };
 const char* to_string(Phase phase);
 
-// What an iteration of a run does (method §7): the options' marks scaled to the run's length. Iterations
-// count from 0.
+// What an iteration of a run does (method §7): the options' iteration numbers scaled to the run's length.
+// Iterations count from 0.
 class Schedule {
  public:
   explicit Schedule(const TrainOptions& options) : options_(options) {}
@@ -21,53 +21,53 @@ class Schedule {
   bool deforms_environment(int iteration) const;
   bool uses_normal_losses(int iteration) const;
   bool uses_lpips(int iteration) const;
-  // Along each side of a pixel (RenderOptions).
+  // The number along each side of a pixel (RenderOptions).
   int samples(int iteration) const;
-  // The options' own, with the samples of the iteration.
+  // The render options with the iteration's number of samples.
   RenderOptions render(int iteration) const;
   int sh_degree_main(int iteration) const;
   int sh_degree_environment(int iteration) const;
-  // Standard deviation of the noise on the time (method §7.6), in frame intervals.
+  // The standard deviation of the noise on the time (method §7.6), in frame intervals.
   double time_jitter(int iteration) const;
-  // The latest time, of a capture's from `first` to `last`, whose views are trained on: motion is followed
-  // from where the surfels start, a little further at a time, instead of being found across the whole capture
-  // at once.
+  // The latest time of the views in use, for a capture from `first` to `last`. It grows gradually, so that
+  // motion is learnt starting from the initial surfels instead of over the whole capture at once.
   double latest_time(int iteration, double first, double last) const;
 
-  // Whether all poses are solved again before this iteration. followed: the iteration at which bodies had
-  // been followed to the film's end. Poses that train drift away, the farther the longer they are not solved.
+  // Whether all poses are solved again before this iteration. followed: the iteration at which tracking
+  // reached the end of the video. Poses that train drift away, the farther the longer they are not solved.
   bool solves_poses_again(int iteration, int64_t followed) const;
 
-  // What is done to a set after so many iterations. The environment is left alone until it has trained.
+  // What density control does to a set after so many iterations. It leaves the environment alone until that
+  // has trained.
   bool densifies_main(int iteration) const;
   bool densifies_environment(int iteration) const;
   bool prunes_large_main(int iteration) const;
   bool prunes_large_environment(int iteration) const;
-  // Opacities that were reset have so many iterations to recover as lie between two density controls of a run
-  // of full length: a shorter one has more controls, and the optimiser is not faster for it. Where resets
-  // would follow each other before twice that, there are none.
+  // After a reset, opacities recover for as many iterations as lie between two density controls of a
+  // full-length run: a shorter run has more frequent controls, but its optimiser is not faster. There are no
+  // resets if they would follow each other within twice that.
   bool prunes_faint_main(int iteration) const;
   bool prunes_faint_environment(int iteration) const;
   bool resets_main_opacity(int iteration) const;
   bool resets_environment_opacity(int iteration) const;
 
-  // Learning rates that fall along the run.
+  // Learning rates that fall over the run.
   double position_rate(int iteration) const;
   double field_rate(int iteration) const;
-  // Of poses: log-linear over the run or 8,000 iterations, whichever is shorter, and on beyond. Poses that
-  // keep a high rate for longer drift away with the surfels that they carry.
+  // For poses: log-linear over the run or 8,000 iterations, whichever is shorter, and falling at the same
+  // pace beyond. Poses with a high rate for longer drift away together with their surfels.
   double motion_rate(int iteration) const;
   double map_rate(int iteration) const;
   double camera_rate(int iteration) const;
 
  private:
-  // A mark of the schedule in iterations of this run.
+  // An iteration number of the schedule, scaled to this run.
   int mark(int in_schedule) const;
-  // Iterations from one event to the next, at least one.
+  // A scaled interval, at least one iteration.
   int interval(int in_schedule) const;
   bool densifies(int iteration, const DensityOptions& density) const;
   bool resets(int iteration, const DensityOptions& density) const;
-  // The last multiple of the interval of resets before an iteration.
+  // The last multiple of the reset interval before an iteration.
   int last_reset(int iteration, const DensityOptions& density) const;
   bool has_recovered(int iteration, int reset, const DensityOptions& density) const;
   int sh_degree(int iteration, int start, int limit) const;
@@ -76,10 +76,10 @@ class Schedule {
   TrainOptions options_;
 };
 
-// The parts of the scene that take part in a picture after so many iterations: those that the last one
-// trained with. A run stopped early has parts that never saw a photograph.
+// The parts of the scene that a render after so many iterations shows: those that the last iteration trained
+// with. In a run that was stopped early, other parts have never trained.
 FrameRequest picture_request(const TrainOptions& options, int64_t iterations);
-// And how they are drawn.
+// The matching render options.
 RenderOptions picture_render(const TrainOptions& options, int64_t iterations);
 
 }  // namespace traceflow

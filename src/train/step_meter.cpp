@@ -8,12 +8,12 @@ namespace traceflow {
 
 namespace {
 
-// Shares no factor with the intervals of the schedule: density control is measured as often as it happens.
+// Coprime to the intervals of the schedule, so that density control is measured as often as it happens.
 constexpr int64_t stride_on_cuda = 101;
 constexpr int64_t first_on_cuda = 10;
 
-// The entry of this name; looked for first at `place`, where it is as long as the lists grow at their ends
-// alone.
+// The entry with this name. Looks at `place` first: the entry is there as long as the lists only grow at
+// their end.
 template <class Entries>
 auto find(Entries& entries, const std::string& name, size_t place) {
   if (place < entries.size() && entries[place].name == name)
@@ -39,7 +39,7 @@ StepMeter::Iteration::~Iteration() {
   try {
     meter_->add(before_, profile::entries());
   } catch (const std::bad_alloc&) {
-    // An iteration that was not measured; it may end because of this very want of memory.
+    // The iteration does not count as measured. It may itself end for lack of memory.
   }
 }
 

@@ -7,14 +7,14 @@
 
 namespace traceflow {
 
-// Measures where the time of iterations goes, by the steps of base/profile.h, beside whoever else profiles:
-// what was on stays on, and the profile's table is not cleared. On the CPU every iteration is measured; on
-// CUDA one in a hundred, unless profiling is on already.
+// Measures where the time of iterations goes, by the steps of base/profile.h. Works beside other users of the
+// profile: profiling that was on stays on, and the table is not cleared. On the CPU every iteration is
+// measured, on CUDA one in a hundred, unless profiling is already on.
 class StepMeter {
  public:
   explicit StepMeter(Device device) : device_(device) {}
 
-  // Stands while the iteration works.
+  // Measures an iteration during its lifetime.
   class Iteration {
    public:
     Iteration(StepMeter& meter, int64_t iteration);
@@ -28,11 +28,11 @@ class StepMeter {
     std::vector<profile::Entry> before_;
   };
 
-  // What was measured since the last call; nothing where no iteration was.
+  // The measurements since the last call; nothing if no iteration was measured.
   std::optional<events::Measured> take(int64_t iteration, const std::string& phase);
 
  private:
-  // Of the time between two looks at the profile's table.
+  // Adds the time between two states of the profile's table.
   void add(const std::vector<profile::Entry>& before, const std::vector<profile::Entry>& after);
 
   Device device_;

@@ -14,10 +14,10 @@ namespace traceflow {
 
 namespace {
 
-// Differences in [0, 1]. A pixel that differs by more teaches nothing; a photograph that differs by less
+// Differences in [0, 1]. A pixel that differs by more has no gradient; a photograph that differs by less
 // agrees.
 constexpr float teaches_below = 0.06F, agrees_below = 0.045F;
-// Every so many times in training, surfels are tested, from the start of the last three fifths on.
+// Surfels are tested this many times, over the last three fifths of training.
 constexpr int tests = 6;
 constexpr double first_test = 0.4;
 constexpr double least_share = 0.5;
@@ -34,7 +34,7 @@ FrameRequest request_of(const View& view, const Scene& scene) {
   return request;
 }
 
-// Of each surfel, how many photographs show it, and how many of them agree with it.
+// For each surfel, how many photographs show it, and how many of them agree with it.
 struct Votes {
   std::vector<int32_t> shown, agree;
 
@@ -65,7 +65,7 @@ Votes vote(const Scene& scene, const Capture& capture, const RenderOptions& opti
   return votes;
 }
 
-// What the object hides in a photograph, and the object, teach nothing. A hole may still be filled.
+// The object and what it hides in a photograph have no gradient. A hole may still be filled.
 void leave_what_differs(const Frame& frame, const ViewImages& target, FrameGradient& gradient) {
   constexpr float whole = 0.9F;
   const Tensor<float> off = mean_difference(frame.colour, target.colour);
@@ -75,7 +75,7 @@ void leave_what_differs(const Frame& frame, const ViewImages& target, FrameGradi
   }
 }
 
-// A sample a pixel throughout: what is trained with one looks thin with several.
+// One sample per pixel throughout, because a scene trained with one looks thin with several.
 RenderOptions drawn_by(const TrainOptions& options) {
   RenderOptions render = options.render;
   render.samples = 1;
@@ -144,7 +144,7 @@ StillScene::StillScene(const Capture& capture, const TrainOptions& options, int 
 }
 
 Tensor<float> StillScene::standing(const Tensor<float>& points) const {
-  constexpr float beside = 1.5F;  // distances between neighbours
+  constexpr float beside = 1.5F;  // in distances between neighbours
   if (points.empty() || agreed_.empty()) return Tensor<float>({0, 3});
   const Tensor<int32_t> nearest = nearest_of(agreed_, points);
   const Tensor<float> log_distance = log_spacing(points);

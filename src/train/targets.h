@@ -8,14 +8,14 @@
 
 namespace traceflow {
 
-// The photographs that training compares with, where the scene is.
+// The photographs that training compares with, on the scene's device.
 class Targets {
  public:
-  // On the CUDA device the first views up to the limit stay there, small as the capture keeps them: views
-  // come in random order, so that dropping one for another would save nothing.
+  // On the CUDA device the first views stay resident up to the limit, in the capture's compact format. Views
+  // come in random order, so replacing one by another would save nothing.
   Targets(Device device, int64_t limit_bytes) : device_(device), limit_bytes_(limit_bytes) {}
 
-  // Stands until the next call. with_coverage: the masks' coverage too.
+  // Valid until the next call. with_coverage: also the coverage by the masks.
   ViewImages& of(const Capture& capture, const View& view, bool with_coverage);
 
  private:

@@ -18,13 +18,13 @@ namespace traceflow {
 
 namespace {
 
-// A surfel is bound to every fourth of its 32 nearest: enough to hold a shape, far enough to hold it beyond a
-// wrinkle.
+// Every fourth of a surfel's 32 nearest neighbours: enough to keep a shape, and far enough to suppress
+// wrinkles.
 constexpr int bond_stride = 4;
-// Of their rates, after a collapse: held a film of 8,000 iterations that fell apart at the preset's
-// (docs/results.md).
+// Relative to the rates, suggested after a collapse. It saved a video of 8,000 iterations that diverged with
+// the preset's rates (docs/results.md).
 constexpr float slower_fields = 0.25F;
-// Of the rate of positions while bodies are followed: a shape that learns fast takes on each time's lag.
+// Relative to the rate of positions, during tracking: a shape that learns fast absorbs the lag of each key.
 constexpr double share_while_tracking = 1.0 / 3;
 
 using Clock = std::chrono::steady_clock;
@@ -32,7 +32,7 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Bonds are among what the field moves.
+// Keeps only edges between surfels that the field moves.
 void leave_others(const Tensor<int32_t>& body, Tensor<int32_t>& edges) {
   for (int64_t i = 0; i < edges.dim(0); ++i) {
     for (int64_t k = 0; k < edges.dim(1); ++k) {
@@ -42,27 +42,27 @@ void leave_others(const Tensor<int32_t>& body, Tensor<int32_t>& edges) {
   }
 }
 
-// A checkpoint that the disk refused.
+// The disk refused a checkpoint.
 class NotSaved : public InputError {
  public:
   explicit NotSaved(const std::string& why) : InputError(why, "", "", "") {}
 };
 
-// As it was given where there is no working directory any more.
+// The absolute path, or the given one if there is no working directory any more.
 std::filesystem::path whole_path(const std::filesystem::path& given) {
   std::error_code error;
   std::filesystem::path whole = std::filesystem::absolute(given, error);
   return error ? given : whole;
 }
 
-// The weights are found again wherever the run is resumed.
+// Makes paths absolute, so that the weights are found wherever the run is resumed.
 TrainOptions with_whole_paths(TrainOptions options) {
   std::string& weights = options.loss.lpips_weights;
   if (!weights.empty()) weights = whole_path(weights).string();
   return options;
 }
 
-// The sets start within what they may grow to.
+// Limits the initial sizes of the sets to their caps.
 TrainOptions within(TrainOptions options, const SurfelCaps& caps) {
   const auto lowered = [](int& cap, int64_t to) { cap = static_cast<int>(std::clamp<int64_t>(to, 1, cap)); };
   lowered(options.density.max_surfels, caps.main);
@@ -70,7 +70,7 @@ TrainOptions within(TrainOptions options, const SurfelCaps& caps) {
   return options;
 }
 
-// Bodies are followed by masks.
+// Removes implausible masks if bodies are tracked, since tracking relies on masks.
 Capture with_likely_masks(Capture capture, const TrainOptions& options) {
   if (follows_bodies(capture, options)) leave_out_odd_masks(capture);
   return capture;
@@ -165,7 +165,7 @@ FrameRequest Trainer::request_for(const View& view) {
 
 NormalLosses Trainer::normal_losses(const Trainable& trainable, const Tracking& now) const {
   if (!trainable.main || !schedule_.uses_normal_losses(iteration_)) return NormalLosses::none;
-  // With more of them while bodies are followed, their depth errors were twice as large.
+  // A higher weight during tracking doubled the depth errors of mirrors.
   const bool mirrors = schedule_.phase(iteration_) != Phase::diffuse;
   return mirrors && !now.goes_on ? NormalLosses::more_on_mirrors : NormalLosses::even;
 }
@@ -176,7 +176,7 @@ const View& Trainer::draw_view() {
   const auto [first, last] =
       std::minmax_element(capture_.train.begin(), capture_.train.end(),
                           [](const View& a, const View& b) { return a.time < b.time; });
-  // Bodies have been followed through all times.
+  // If there are bodies, they have been tracked through all times.
   const double latest =
       scene_.main_motion ? last->time : schedule_.latest_time(iteration_, first->time, last->time);
   for (;;) {
@@ -207,7 +207,7 @@ LossValues Trainer::step() {
   trainable.main_motion = has_followed && !bodies_stand_ && !options_.deform.track.true_poses;
   trainable.main_nodes = has_followed && scene_.main_nodes;
   trainable.lighting = has_followed && scene_.lighting;
-  // Gradients through reflections hold back the rotation of a body, so it is followed without them.
+  // Gradients through reflections suppress the rotation of a body, so tracking does without reflections.
   if (now.goes_on) {
     request.specular = false;
     request.deform_main = false;
@@ -249,12 +249,12 @@ void Trainer::learn(const View& view, const Frame& frame, const FrameRequest& re
     lighting::resist(*scene_.lighting, {light.size, light.haste, light.roughness}, gradient_.lighting);
   }
   const bool follows = tracking(iteration_).goes_on;
-  // New surface that was wrong may fade.
+  // Only the initial surfels: newly added ones that are wrong may fade.
   if (follows) motion::hold_opacities(scene_.main.body, initial_main_count_, gradient_.main);
   parallel_for(device_, "train: add gradients at rest", grad_rest_.size(),
                AddNumbers{grad_rest_.data(), gradient_.main.position.data()});
-  // Nothing has changed up to here: an iteration that finds no memory before is as if it had not begun.
-  // Nothing behind this asks for memory, but the driver may, to start a kernel.
+  // Nothing has changed so far, so an iteration that runs out of memory before this line has no effect. The
+  // code below allocates no memory, but the driver may when it starts a kernel.
   torn_ = true;
   const double share_of_positions = follows ? share_while_tracking : 1;
   optimiser_.step(scene_, gradient_, trainable, schedule_, options_.rates, iteration_, share_of_positions);
@@ -293,7 +293,7 @@ const Neighbours& Trainer::neighbour_edges() {
 }
 
 void Trainer::control_density(int done, const Surfels& new_surface) {
-  // Where memory runs out in an update, that set is as it was; what follows an update asks for none.
+  // If memory runs out in an update, the set is unchanged. The code after an update allocates none.
   const auto tell = [&](events::DensityChanged change, bool reset) {
     change.iteration = done;
     change.opacity_reset = reset;
@@ -303,7 +303,7 @@ void Trainer::control_density(int done, const Surfels& new_surface) {
     tell(main_density_.add(scene_.main, optimiser_.main(), new_surface), false);
     neighbour_edges_ = {};
   }
-  // Surfels that multiply where a body lags behind its picture bake the lag into its shape.
+  // Surfels that multiply where a body lags behind the photograph fix the lag in its shape.
   if (tracking(done - 1).goes_on) return;
   if (schedule_.densifies_main(done)) {
     const bool reset = schedule_.resets_main_opacity(done);
@@ -452,8 +452,8 @@ events::Finished Trainer::run(const std::atomic<bool>& stop) {
   const End end = iterate(stop);
   if (end.ending == events::Ending::out_of_memory || end.ending == events::Ending::no_input) rollback_draws();
   if (torn_) return finish(end.ending, end.reason);
-  // A collapsed scene must not replace the last good checkpoint; one with a bad gradient, not applied, is
-  // still good.
+  // A collapsed scene must not replace the last good checkpoint. A scene with a bad gradient is still good,
+  // because the gradient was not applied.
   if (end.ending != events::Ending::diverged || divergence_.sound() ||
       checkpoint_state_ == CheckpointState::none)
     save_or_say_why_not();
@@ -487,8 +487,8 @@ void Trainer::save_or_say_why_not() {
   }
 }
 
-// The work of hours is not given up for a disk that may have room again when the next checkpoint is due. One
-// that has not taken the first is another matter: little is lost yet.
+// Training continues if the disk refuses a checkpoint, because it may have room at the next one. It ends if
+// the first one is refused, when little is lost.
 void Trainer::save_on_the_way() {
   try {
     save_or_say_why_not();
@@ -503,7 +503,7 @@ void Trainer::rollback_draws() {
     random_ = before_step_.random;
     views_ = before_step_.views;
     if (before_step_.motion) {
-      // A body that was parted in the step has moments that no checkpoint without it could hold.
+      // If the step added a body, the moments would not fit a checkpoint without it.
       if (scene_.main_motion->bodies() != before_step_.motion->bodies())
         optimiser_.begin(*before_step_.motion);
       scene_.main_motion = before_step_.motion;
@@ -515,7 +515,7 @@ void Trainer::rollback_draws() {
     }
   }
   tell_density();
-  // What the next frame would need is free for the copies that saving makes.
+  // Frees the renderer's memory for the copies that saving makes.
   renderer_ = Renderer(options_.render, memory_.kept);
   gradient_ = {};
   grad_frame_ = {};

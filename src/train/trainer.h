@@ -27,7 +27,7 @@
 
 namespace traceflow {
 
-// Draws training views in random order, each once before any comes again.
+// Draws training views in random order, each view once before any repeats.
 class ViewOrder {
  public:
   explicit ViewOrder(int64_t views) : order_({views}), next_(views) {
@@ -48,34 +48,37 @@ class ViewOrder {
 // nothing.
 class Trainer {
  public:
-  // Starts a scene from the capture and takes it to the device. The run's folder is made when the first
-  // checkpoint is saved.
+  // Makes the initial scene from the capture and moves it to the device. The run's folder is created with the
+  // first checkpoint.
   Trainer(const TrainOptions& options, Capture capture, const std::filesystem::path& run,
           Device device = Device::cpu);
 
-  // Continues from the run's checkpoint; call before run(). Throws InputError when it does not fit.
+  // Continues from the run's checkpoint; call before run(). Throws InputError when the checkpoint does not
+  // fit.
   void resume();
 
-  // Trains to the last iteration, until `stop` is set, until memory runs out or until a photograph can no
-  // longer be read; saves in every case but one: where the driver has no memory to start a kernel amid a
-  // change of the scene, the checkpoint before stands. A save on the way that the disk refuses is a warning,
-  // and tried again at the next; throws InputError when the first or the last one is refused.
+  // Trains until the last iteration, until `stop` is set, until memory runs out or until a photograph can no
+  // longer be read, and then saves. There is one exception: if the driver has no memory to start a kernel in
+  // the middle of a change to the scene, the previous checkpoint remains. If the disk refuses a checkpoint
+  // during training, run() warns and tries again at the next one. Throws InputError when the first or the
+  // last checkpoint is refused.
   events::Finished run(const std::atomic<bool>& stop);
 
-  // One iteration of the loop, without saving; returns the loss.
+  // One iteration of the loop, without saving. Returns the loss.
   LossValues step();
 
-  // Is called with each picture, its photograph and the gradient by the picture: what it sets to zero teaches
-  // nothing.
+  // Is called with each render, its photograph and the gradient by the render. The callback may set entries
+  // of the gradient to zero, so that these pixels do not train the scene.
   using Review = std::function<void(const Frame&, const ViewImages&, FrameGradient&)>;
   void review_gradients(Review review) { review_ = std::move(review); }
-  // Makes main surfels transparent: density control removes them.
+  // Makes main surfels transparent, so that density control removes them.
   void fade(std::span<const int64_t> rows);
 
-  // Ends run() after the iteration that goes on. On any thread.
+  // Ends run() after the current iteration. May be called on any thread.
   void stop_soon() { stop_soon_ = true; }
-  // Saves what stands. May be called between two iterations, so by a listener. The checkpoint before the
-  // current one is always sound: a run that collapses drops its own.
+  // Saves the current state. May be called between two iterations, and so by a listener. The previous
+  // checkpoint is always sound: while the current checkpoint is of a collapsed state, saving replaces it and
+  // keeps the previous.
   void save();
 
   events::Stream& stream() { return stream_; }
@@ -85,110 +88,107 @@ class Trainer {
   int iteration() const { return iteration_; }
 
  private:
-  // Takes over what is told of the scene that the run starts from.
+  // Stores the counts of the initial scene and returns the scene.
   Scene begin(InitialScene made);
-  // Where the run is while bodies are tracked (deform.kind = nodes).
+  // The state of tracking (deform.kind = nodes).
   struct Tracking {
-    bool goes_on = false;  // the film has not been followed to its end
-    bool enters = false;   // this iteration begins with a new time
-    bool refines = false;  // this iteration begins with all poses solved again, depths held
-    int64_t key = 0;       // the newest time
+    bool goes_on = false;  // tracking has not reached the end of the video
+    bool enters = false;   // this iteration starts with a new key
+    bool refines = false;  // this iteration starts by solving all poses again, depths fixed
+    int64_t key = 0;       // the newest key
   };
   Tracking tracking(int iteration) const;
   Tracker make_tracker() const;
-  // What an iteration does to bodies before it trains. Returns surfels for surface that has come into view.
+  // Changes the bodies before an iteration trains. Returns surfels for newly visible surface.
   Surfels follow_bodies(const Tracking& now);
-  // Follows bodies to a new time.
+  // Tracks the bodies to a new key.
   void follow(int64_t key);
-  // Some times after the first: what moves apart becomes several bodies.
+  // A few keys after the first: splits bodies whose parts move separately.
   void part_bodies(int64_t key);
-  // Surfels for surface of bodies that has come into view at the newest time.
+  // Surfels for the surface of bodies that has become visible at the newest key.
   Surfels new_surface(int64_t key) const;
-  // Finds the poses of all times again: when the film has been followed to its end, and after that as shapes
-  // get better.
+  // Solves the poses of all keys again: at the end of the video, and later as shapes improve.
   void follow_again();
-  // Measures the bias of normal priors in masks, and undoes it from then on.
+  // Measures the bias of normal priors in masks and corrects it from then on.
   void turn_priors();
   void set_prior_bias(const Mat3<double>& bias);
-  // Before the second time is followed: whether the masks of all times fit bodies that stand still. Then none
-  // is followed, and their poses stay at rest.
+  // Before tracking the second key: decides whether the masks of all keys fit bodies at rest. If so, no body
+  // is tracked and the poses stay at rest.
   void see_whether_bodies_stand();
-  // Whether everything trains as soon as bodies are known to stand, and not from the film's end on. Without
-  // normal priors reflections that begin so early harm the shape.
+  // Whether everything trains as soon as bodies are known to stand still, and not only from the end of the
+  // video on. Without normal priors, reflections that start so early harm the shape.
   bool skips_following() const;
-  // Makes rigid bodies as large as the first picture shows them, where poses are known well, and puts them as
-  // far away as the points are; and the motion what fits. Everything on the CPU; the scene takes it over, all
-  // but the motion.
+  // Scales rigid bodies to the size in the first view, if poses are well known, and to the distance of the
+  // points. Changes the motion accordingly. main and motion are on the CPU; the scene takes over the surfels
+  // but not the motion.
   void keep_sizes(const Tracker& tracker, bool poses_are_known, Surfels& main, Motion& motion);
-  // What lies behind a body may have been taken for a part of it: the times up to this one tell.
+  // Releases surfels that the views up to this key show to lie behind or beside their body.
   void let_strays_go(int64_t key);
-  // What bodies become when the film has been followed.
+  // Decides, after tracking, what deforms and what else moves.
   void settle();
-  // Bodies that do not fit carry nothing: a field moves all that moves.
+  // Releases all surfels of bodies that do not fit, so that a field moves everything.
   void let_everything_go();
-  // Makes a beginning of the surfels that are no longer carried as `carried` says. Everything on the CPU.
+  // Resets the surfels whose body differs from `carried`. main and carried are on the CPU.
   void begin_anew(const Tensor<int32_t>& carried, Surfels main);
-  // What no body carries stands still, unless the pictures are far from the photographs there.
+  // Marks surfels outside bodies as static, unless the renders differ much from the photographs there.
   void let_stand();
-  // Gives bodies nodes, so that they may bend, where silhouettes get worse after the first time, or where
-  // photographs of a body whose texture is trusted match much better with nodes than without.
+  // Gives nodes to bodies, so that they can deform, if the silhouette error grows after the first view or if
+  // the photographs of a body with trusted texture fit much better with nodes than without.
   void let_bend(const std::vector<double>& misfits);
-  // From then on the light on what stands still may change.
+  // Adds changing light, from then on.
   void let_light_change();
-  // Spreads the gradient of poses over times that are near; none at the first.
+  // Convolves the gradient of poses over neighbouring keys. The first key gets none.
   void share_among_keys();
-  // Adds to the nodes' gradient what holds them together, and none at the first time.
+  // Adds the regularisation of nodes to their gradient. The first time gets none.
   void hold_nodes();
 
-  // How far the bodies' silhouettes are off in a view, as a share of the mask's area; none without a mask.
+  // The silhouette error of the bodies in a view, as a share of the mask's area; empty without a mask.
   std::optional<double> silhouette_misfit(const View& view);
-  // In some views, in the order of time.
+  // The errors in some views, in the order of time.
   std::vector<double> silhouette_misfits();
-  // What the colours are off by in some views, over what they are off by while the bodies stand where they
-  // began; both where bodies are seen, moving or standing.
+  // The colour error in some views, relative to that with the bodies at rest. Both count where bodies are
+  // visible in either state.
   double colour_error_over_standing();
   const View& draw_tracked_view(const Tracking& now);
   // The next view among those whose times the schedule has reached.
   const View& draw_view();
   FrameRequest request_for(const View& view);
   NormalLosses normal_losses(const Trainable& trainable, const Tracking& now) const;
-  // Add the terms on the main surfels' rigidity (loss.rigidity) and on what the environment's field adds
-  // (loss.environment_residual), with their gradients.
-  // The edges between neighbouring main surfels, found when they are first needed.
+  // The edges between neighbouring main surfels. Finds them at the first call.
   const Neighbours& neighbour_edges();
-  // Refines the camera of a training view by the gradient of its picture.
+  // Refines the camera of a training view by the gradient of its render.
   void refine_camera(const View& view);
   void set_refined_cameras();
-  // Everything of a step that follows a loss that is a number.
+  // The part of a step after a finite loss.
   void learn(const View& view, const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done, const Surfels& new_surface);
   void tell_start();
   void warn(const std::string& text) { stream_.emit(events::Warning{iteration_, text}); }
   void keep_caps(const Safetensors& file);
-  // Tells what was measured up to here, in the phase of the last iteration.
+  // Emits the measurements so far, for the phase of the last iteration.
   void tell_measured();
   void tell_density();
   struct End {
     events::Ending ending;
     std::string reason;
   };
-  // Iterations until something ends them.
+  // Iterates until something ends the run.
   End iterate(const std::atomic<bool>& stop);
-  // One of them, with what is told of it; what is wrong with its numbers, or nothing.
+  // One iteration with its events. Returns what is wrong with its numbers, or an empty string.
   std::string tell_iteration();
-  // What to do about memory that ran out.
+  // The advice after running out of memory.
   std::string when_there_is_room() const;
-  // What to try where the fields made the scene fly apart.
+  // The advice if the fields made the scene diverge.
   std::string collapse_advice() const;
-  // Throw NotSaved where save() fails, the second only where no checkpoint stands.
+  // Throw NotSaved when save() fails; save_on_the_way only if there is no checkpoint yet.
   void save_or_say_why_not();
   void save_on_the_way();
-  // What a step draws from.
+  // The state before a step, which the step draws from or changes.
   struct Draws {
     Random random;
     ViewOrder views;
     int iteration;
-    // As the step found them, where it solves poses.
+    // The values before the step, if it solves poses.
     std::optional<Motion> motion;
     std::optional<Nodes> nodes;
     std::optional<Lighting> lighting;
@@ -196,8 +196,7 @@ class Trainer {
     TextureTrust texture_trust;
     bool bodies_stand = false;
   };
-  // Makes ready to save after a step that failed: an iteration that did not come to its end draws the same
-  // again.
+  // Prepares for saving after a failed step: an incomplete iteration will draw the same again.
   void rollback_draws();
   Safetensors checkpoint() const;
   events::SurfelCounts counts() const { return {scene_.main.count(), scene_.environment.count()}; }
@@ -207,30 +206,31 @@ class Trainer {
   TrainOptions options_;
   Device device_;
   Capture capture_;
-  std::string views_checksum_;  // of the capture as it was given
-  CameraRefinement cameras_;    // of its training views, whose cameras are kept as refined
-  std::string capture_folder_;  // whole paths both, so that neither needs the working directory again
+  std::string views_checksum_;  // of the capture as given
+  CameraRefinement cameras_;    // of the training views; their cameras are stored refined
+  std::string capture_folder_;  // absolute, like run_, so that the working directory no longer matters
   RunFolder run_;
-  // Of the current checkpoint.
+  // The state of the current checkpoint.
   enum class CheckpointState { none, sound, unsound } checkpoint_state_ = CheckpointState::none;
   Schedule schedule_;
   std::optional<lpips::Network> perceptual_;
   Random random_;
   MemoryPlan memory_;
   Targets targets_;
-  int64_t points_ = 0, points_in_view_ = 0;  // that the scene began with
-  // Main surfels at these points; those made up, or added while bodies are followed, come after.
+  int64_t points_ = 0, points_in_view_ = 0;  // at the start of the scene
+  // Main surfels before this row are at points of the capture. Invented ones and those added during tracking
+  // follow.
   int64_t initial_main_count_ = 0;
-  bool carries_ = true;        // bodies carry something
-  bool bodies_stand_ = false;  // and none is followed
+  bool carries_ = true;        // bodies have surfels
+  bool bodies_stand_ = false;  // and none is tracked
   Scene scene_;
   Optimiser optimiser_;
   DensityControl main_density_, environment_density_;
   static constexpr int neighbours_each = 8;  // of a surfel
-  Neighbours neighbour_edges_;               // of the main surfels, for loss.rigidity; empty until wanted
+  Neighbours neighbour_edges_;               // of main surfels, for loss.rigidity; empty until needed
   Tensor<float> grad_rest_;                  // dL/d(stored positions) of that term
   float cloud_radius_;                       // of the capture's points
-  float environment_radius_;                 // half the diagonal of the box that the environment began in
+  float environment_radius_;                 // half the diagonal of the environment's initial box
   ViewOrder views_;
   DivergenceMonitor divergence_;
   Renderer renderer_;
@@ -240,17 +240,17 @@ class Trainer {
   NonFiniteGradients non_finite_;
   events::Stream stream_;
   StepMeter meter_;
-  std::vector<events::DensityChanged> density_changes_;  // of the step, not told yet
+  std::vector<events::DensityChanged> density_changes_;  // of the step, not emitted yet
   Draws before_step_;
   Review review_;
-  TextureTrust texture_trust_;              // while bodies are followed
-  std::optional<Mat3<double>> prior_bias_;  // of normal priors in masks, where it is undone
-  // Whether an iteration has begun to change the scene and not come to the end of it: such a state is none.
+  TextureTrust texture_trust_;              // during tracking
+  std::optional<Mat3<double>> prior_bias_;  // of normal priors in masks, if it is corrected
+  // An iteration has begun to change the scene and has not finished. Such a state must not be saved.
   bool torn_ = false;
   std::atomic<bool> stop_soon_{false};
   int iteration_ = 0;   // done so far
-  double seconds_ = 0;  // of steps and saves, earlier sessions included; listeners may take their time
-  double rate_ = 0;     // steps a second, smoothed
+  double seconds_ = 0;  // of steps and saves, earlier sessions included; listeners do not count
+  double rate_ = 0;     // steps per second, smoothed
 };
 
 }  // namespace traceflow

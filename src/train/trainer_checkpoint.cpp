@@ -9,7 +9,7 @@
 #include "train/continuation.h"
 #include "train/trainer.h"
 
-// What a checkpoint holds of a run, and how a run goes on from it.
+// The content of a checkpoint, and how a run continues from it.
 namespace traceflow {
 
 namespace {
@@ -21,7 +21,7 @@ Tensor<double> row_of(const std::array<double, count>& values) {
   return row;
 }
 
-// A count that the checkpoint holds as metadata.
+// A count stored in the checkpoint's metadata.
 int64_t count_in(const Safetensors& file, const std::string& key) {
   const double value = file.number(key);
   if (value > 1e9 || value != std::floor(value)) {
@@ -58,7 +58,7 @@ Mat3<double> rotation_in(const Tensor<double>& rows) {
   return matrix;
 }
 
-// each: neighbours of a surfel.
+// each: neighbours per surfel.
 void check_neighbour_edges(const Neighbours& edges, int64_t surfels, int64_t each) {
   bool fits = edges.index.shape() == Shape{surfels, each} && edges.distance2.shape() == edges.index.shape();
   for (const int32_t j : edges.index.values()) fits = fits && j >= -1 && j < surfels;
@@ -146,7 +146,7 @@ void Trainer::resume() {
     trust.taken_back_by_tracks = file.tensor<double>("texture_trust/taken_back_by_tracks");
     trust.stiffness = file.tensor<double>("texture_trust/stiffness");
     const Shape bodies{scene_.main_motion ? scene_.main_motion->bodies() : 0};
-    // Checkpoints of programs before 26 November 2026 have none.
+    // Checkpoints from before 26 November 2026 do not have it.
     trust.mirror_image = file.has("texture_trust/mirror_image")
                              ? file.tensor<double>("texture_trust/mirror_image")
                              : Tensor<double>({bodies[0], 2});
@@ -156,7 +156,7 @@ void Trainer::resume() {
       throw InputError("checkpoint", "texture_trust", texture_trust_.turned.shape().to_string(),
                        bodies.to_string());
   }
-  // Checkpoints of programs before 28 November 2026 have none.
+  // Checkpoints from before 28 November 2026 do not have it.
   if (file.has("prior_bias")) set_prior_bias(rotation_in(file.tensor<double>("prior_bias")));
   cameras_.get(file);
   if (cameras_.is_begun()) set_refined_cameras();
@@ -178,7 +178,7 @@ void Trainer::resume() {
   const Tensor<int32_t> body = scene_.main.body.on(Device::cpu);
   carries_ = std::any_of(body.values().begin(), body.values().end(), [](int32_t b) { return b >= 0; });
   bodies_stand_ = file.metadata.contains("bodies_stand") && count_in(file, "bodies_stand") != 0;
-  // Drawn with as many surfels as there was memory for then.
+  // The radius depends on the number of initial surfels, which depended on the memory at the start.
   const bool tells_radius = file.metadata.contains("environment_radius");
   environment_radius_ = tells_radius ? static_cast<float>(file.number("environment_radius")) : cloud_radius_;
   checkpoint_state_ = divergence_.sound() ? CheckpointState::sound : CheckpointState::unsound;
@@ -187,12 +187,13 @@ void Trainer::resume() {
     if (!other.empty()) warn(other);
   }
   if (note.empty()) return;
-  // Last: a run that is not resumed keeps its files as they are.
+  // Last, so that the files remain unchanged if resuming fails.
   warn(note);
   set_damaged_aside(run_);
 }
 
-// What is free now is no measure for a run that began with more, or it would end in other bytes.
+// Keeps the caps from the start of the run, whatever memory is free now. Otherwise it would end with other
+// bytes.
 void Trainer::keep_caps(const Safetensors& file) {
   const std::optional<SurfelCaps> caps = caps_to_keep(file, options_);
   if (!caps) return;

@@ -14,17 +14,17 @@
 #include "train/initialise.h"
 #include "train/trainer.h"
 
-// The part of the loop that follows bodies from time to time before everything trains.
+// The part of the loop that tracks bodies from key to key before everything trains.
 namespace traceflow {
 
 namespace {
 
-// Of times that are known better now than when they were new.
+// For keys that were solved before: fewer steps and less blur.
 constexpr int few_steps = 3;
 constexpr double little_blur = 0.35;
 
-// Bodies are let go where their silhouettes are off by more, as a share of the area of masks that were found,
-// and their colours too, as a share of what they are off by while the bodies stand still.
+// Bodies are dropped if they exceed both: the silhouette error relative to the area of found masks, and the
+// colour error relative to that of bodies at rest.
 constexpr double most_misfit = 1.0 / 3, most_colour_error = 0.8;
 
 double mean_of(const std::vector<double>& values) {
@@ -32,7 +32,7 @@ double mean_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-// Spread over the film, in the order of time.
+// Spread evenly over the video, in the order of time.
 std::vector<const View*> some_views(const Capture& capture) {
   constexpr size_t most_views = 20;
   std::vector<const View*> all;
@@ -44,7 +44,7 @@ std::vector<const View*> some_views(const Capture& capture) {
   return some;
 }
 
-// The bodies at the view's time, without the field and without reflections.
+// Renders the bodies at the view's time, without field and reflections.
 FrameRequest request_without_field(const View& view) {
   FrameRequest request;
   request.camera = view.camera;
@@ -68,7 +68,7 @@ Motion standing_from(int64_t key, Motion motion) {
 Trainer::Tracking Trainer::tracking(int iteration) const {
   if (!scene_.main_motion) return {};
   const TrackOptions& track = options_.deform.track;
-  constexpr int least_share = 8;  // of a run, for the warm-up
+  constexpr int least_share = 8;  // of a run: limits the warm-up
   const int64_t keys = scene_.main_motion->keys();
   const int since = iteration - std::min(track.warm_up, options_.iterations / least_share);
   if (since < 0) return {.goes_on = true};
@@ -88,7 +88,7 @@ Tracker Trainer::make_tracker() const {
 }
 
 Surfels Trainer::follow_bodies(const Tracking& now) {
-  constexpr int64_t strays_every = 5;  // times
+  constexpr int64_t strays_every = 5;  // keys
   Surfels made;
   if (now.enters && now.key == 1) see_whether_bodies_stand();
   if (now.enters && now.key == 1 && skips_following()) {
@@ -153,7 +153,7 @@ void Trainer::follow_again() {
   std::optional<Nodes> nodes;
   if (scene_.main_nodes) nodes = scene_.main_nodes->on(Device::cpu);
   const bool refines = tracking(iteration_).refines;
-  // What bends may be larger at the first time than at others.
+  // A body that deforms may be larger at the first key than at others.
   if (!nodes) keep_sizes(tracker, refines, main, motion);
   const PoseSteps steps{few_steps, little_blur * track.blur, refines};
   for (int64_t key = 0; key < motion.keys(); ++key)
@@ -195,7 +195,7 @@ void Trainer::follow(int64_t key) {
     }
   }
   tracker.follow(main, motion, key, scene_.extent, texture_trust_);
-  // What is behind stands where this one does until it is reached.
+  // Later keys keep the pose of this key until they are tracked.
   scene_.main_motion = standing_from(key, motion).on(device_);
 }
 
@@ -211,7 +211,7 @@ void Trainer::part_bodies(int64_t key) {
   scene_.main.body = main.body.on(device_);
   scene_.main_motion = motion.on(device_);
   optimiser_.begin(*scene_.main_motion);
-  // What was learned is of the bodies as they were.
+  // The statistics are of the bodies before.
   texture_trust_ = {};
   stream_.emit(events::BodiesParted{iteration_, added, motion.bodies()});
 }
@@ -243,8 +243,8 @@ void Trainer::let_everything_go() {
 }
 
 void Trainer::begin_anew(const Tensor<int32_t>& carried, Surfels main) {
-  // A released point of the capture stands still where it is, and begins as what no body carried. New surface
-  // was never seen to stand still.
+  // A released point of the capture is static at its place and starts like surfels that never belonged to a
+  // body. New surface becomes transparent, because nothing showed it to be static.
   constexpr float unseen = -8;
   Tensor<float> points({std::min(initial_main_count_, main.count()), 3});
   std::copy_n(main.position.data(), points.size(), points.data());
@@ -276,7 +276,7 @@ std::optional<double> Trainer::silhouette_misfit(const View& view) {
 }
 
 void Trainer::share_among_keys() {
-  // Errors of poses last over many keys, and a view tells only that of its own time.
+  // Pose errors extend over many keys, but a view has a gradient only for its own key.
   constexpr float widest = 4;  // keys
   constexpr float share_of_film = 0.05F;
   Motion& gradient = gradient_.main_motion;
@@ -334,7 +334,7 @@ double Trainer::colour_error_over_standing() {
 }
 
 void Trainer::turn_priors() {
-  // Once: the depth follows the priors, so that a second measurement would find what the first one changed.
+  // Only once: the depth follows the priors, so a second measurement would find what the first one changed.
   if (!options_.deform.track.prior_turn || prior_bias_) return;
   constexpr float opaque = 0.95F;
   PriorBias in_masks;
@@ -432,8 +432,8 @@ void Trainer::let_stand() {
 }
 
 const View& Trainer::draw_tracked_view(const Tracking& now) {
-  // Many views are of the first time, at which the points say how large a body is, and of the newest ones,
-  // whose surface is the least known.
+  // Many views are of the first key, whose points determine the size of a body, and of the newest keys, whose
+  // surface is the least known.
   constexpr double first_share = 0.3, newest_share = 0.35;
   constexpr float newest_duration = 0.08F;
   const Tensor<float> times = scene_.main_motion->time.on(Device::cpu);
