@@ -4,7 +4,7 @@
 
 #include "base/device.h"
 
-// The activations of stored values (method §1.1), with their derivatives.
+// The activations of stored values (method §1.1) and their derivatives.
 namespace traceflow {
 
 // σ(x) = 1 / (1 + e^-x), without overflow for any x.
@@ -26,11 +26,11 @@ TRACEFLOW_HD T logit(T y) {
   return std::log(y) - std::log1p(-y);
 }
 
-// A roughness is at most so much. Cones much wider than that show next to nothing that harmonics do not, and
-// cost the tracer dearly.
+// The largest roughness. Much wider cones show hardly more than harmonics do, and are slow to trace.
 inline constexpr double largest_roughness = 0.25;
 
-// largest_roughness · σ(x), its derivative from the value, and its inverse for y in (0, largest_roughness).
+// The activation largest_roughness · σ(x), its derivative from the value, and its inverse for y in (0,
+// largest_roughness).
 template <class T>
 TRACEFLOW_HD T roughness_of(T x) {
   return T(largest_roughness) * sigmoid(x);

@@ -5,8 +5,8 @@
 
 #include "base/device.h"
 
-// bf16, a float's first 16 bits, as memory holds it; and what lets a step be written once for it and for
-// fp32.
+// bf16, the upper 16 bits of a float, as it is stored; and functions that let a step be written once for bf16
+// and fp32.
 namespace traceflow {
 
 struct Bf16 {
@@ -22,7 +22,7 @@ TRACEFLOW_HD inline float to_float(Bf16 v) {
 }
 
 TRACEFLOW_HD inline void store(float v, float& to) { to = v; }
-// To the nearest, ties to even; a NaN stays one.
+// Rounds to nearest, ties to even; a NaN stays NaN.
 TRACEFLOW_HD inline void store(float v, Bf16& to) {
   uint32_t bits = 0;
   memcpy(&bits, &v, sizeof(v));
@@ -30,7 +30,7 @@ TRACEFLOW_HD inline void store(float v, Bf16& to) {
   to.bits = static_cast<uint16_t>(v == v ? rounded : 0x7FC0U);
 }
 
-// The nearest number of type T.
+// Rounds to type T.
 template <class T>
 TRACEFLOW_HD T rounded_to(float v) {
   T to;

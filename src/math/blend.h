@@ -4,18 +4,18 @@
 
 #include "base/device.h"
 
-// How a ray blends its hits front to back (method §3.3, §5.2), the same for the rasteriser and the tracer.
+// Blends a ray's hits front to back (method §3.3, §5.2), for the rasteriser and the tracer.
 namespace traceflow {
 
 // The limits of blending, from the Options of the op that blends.
 template <class T>
 struct BlendRules {
-  T alpha_min;          // a hit of less opacity is skipped
-  T alpha_max;          // a hit of more opacity is clamped to this
+  T alpha_min;          // a hit with less opacity is skipped
+  T alpha_max;          // a hit with more opacity is clamped to this
   T transmittance_min;  // the ray ends before a hit that would leave less than this
 };
 
-// α of one hit and dα/d(o·G). A skipped hit has both zero; a clamped one has slope zero.
+// α of one hit and dα/d(o·G). Both are zero for a skipped hit; the slope is zero for a clamped one.
 template <class T>
 struct BlendAlpha {
   T value;
@@ -30,7 +30,7 @@ TRACEFLOW_HD BlendAlpha<T> blend_alpha(const BlendRules<T>& rules, T opacity, T 
   return {raw, T(1)};
 }
 
-// Whether the ray ends in front of a hit of this α, which is then not blended.
+// Returns whether the ray ends in front of a hit of this α, which is then not blended.
 template <class T>
 TRACEFLOW_HD bool blend_ends(const BlendRules<T>& rules, T transmittance, T alpha) {
   return transmittance * (T(1) - alpha) < rules.transmittance_min;
@@ -42,8 +42,8 @@ TRACEFLOW_HD T blend_alpha_gradient(T transmittance, T alpha, T own, T behind) {
   return transmittance * own - behind / (T(1) - alpha);
 }
 
-// The square of the distance from a surfel's centre, in standard deviations, at which o·G falls to alpha_min;
-// negative for a surfel that is skipped everywhere.
+// The squared distance from a surfel's centre, in standard deviations, at which o·G falls to alpha_min.
+// Negative for a surfel that is skipped everywhere.
 template <class T>
 TRACEFLOW_HD T cutoff_radius2(const BlendRules<T>& rules, T opacity) {
   return opacity > T(0) ? T(2) * std::log(opacity / rules.alpha_min) : T(-1);

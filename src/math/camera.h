@@ -5,8 +5,8 @@
 namespace traceflow {
 
 // A pinhole camera (method §2). Camera axes are OpenCV's: x right, y down, z forward; pixel (i, j) has its
-// centre at (i + 0.5, j + 0.5). Lengths are in the normalised scene's units. Captured distortion and skew are
-// removed on loading.
+// centre at (i + 0.5, j + 0.5). Lengths are in units of the normalised scene. Loading a capture removes
+// distortion and skew.
 template <class T>
 struct Camera {
   int width = 0;
@@ -19,7 +19,7 @@ struct Camera {
   TRACEFLOW_HD Vec3<T> point_in_camera(const Vec3<T>& point_in_world) const {
     return camera_from_world * (point_in_world - position);
   }
-  // The ray through pixel position (x, y), scaled so that its camera z is 1.
+  // The ray through pixel position (x, y), scaled to camera z = 1.
   TRACEFLOW_HD Vec3<T> ray_in_camera(T x, T y) const {
     return {(x - centre_x) / focal_x, (y - centre_y) / focal_y, T(1)};
   }
@@ -28,8 +28,8 @@ struct Camera {
     return {focal_x * point_in_camera.x / point_in_camera.z + centre_x,
             focal_y * point_in_camera.y / point_in_camera.z + centre_y};
   }
-  // Whether a point in world falls into the image, or beside it by at most `margin` pixels, and lies more
-  // than near_plane before the camera. False for one that is not finite.
+  // Returns whether a point in world axes projects into the image, or at most `margin` pixels outside it, and
+  // has a camera z greater than near_plane. False if the point is not finite.
   TRACEFLOW_HD bool sees(const Vec3<T>& point_in_world, T near_plane = 0, T margin = 0) const {
     const Vec3<T> x = point_in_camera(point_in_world);
     if (!(x.z > near_plane)) return false;
@@ -51,8 +51,8 @@ Camera<To> convert(const Camera<From>& c) {
           Vec3<To>(c.position)};
 }
 
-// dL/dcamera pose. The rotation's nine entries are taken as free numbers; whoever updates a pose projects
-// them to the rotation group. Ops add to it.
+// dL/d(camera pose). The nine entries of the rotation are independent; code that updates a pose projects it
+// to the rotation group. Ops add to it.
 template <class T>
 struct CameraGradient {
   Mat3<T> camera_from_world{T(0)};

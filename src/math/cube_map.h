@@ -4,11 +4,11 @@
 
 #include "math/types.h"
 
-// Where a direction meets the faces of a cube (method §9), in the layout that OpenGL has.
+// Where a direction meets the faces of a cube (method §9), in OpenGL's layout.
 namespace traceflow {
 
-// Face 0..5 is +x −x +y −y +z −z; (s, t) in [0,1] across it, t downwards. Only the direction of d matters; d
-// is finite and not zero.
+// Faces 0..5 are +x −x +y −y +z −z; (s, t) in [0,1] are coordinates on the face, t downwards. The length of d
+// does not matter; d is finite and not zero.
 template <class T>
 struct CubeCoordinates {
   int face;
@@ -44,7 +44,7 @@ TRACEFLOW_HD CubeCoordinates<T> cube_coordinates(const Vec3<T>& d) {
   const int major = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
   const int face = 2 * major + (d[major] < T(0) ? 1 : 0);
   const CubeFace f = cube_face(face);
-  // A quotient, not a product with the inverse: that of a tiny number is infinite.
+  // A quotient, because the inverse of a tiny number would be infinite.
   const T length = std::abs(d[major]);
   return {face, T(0.5) + T(0.5) * static_cast<T>(f.sign_s) * (d[f.axis_s] / length),
           T(0.5) + T(0.5) * static_cast<T>(f.sign_t) * (d[f.axis_t] / length)};
@@ -59,7 +59,7 @@ TRACEFLOW_HD Vec3<T> cube_coordinates_backward(const Vec3<T>& d, const CubeCoord
   Vec3<T> grad(T(0));
   grad[f.axis_s] = T(0.5) * static_cast<T>(f.sign_s) * inverse * grad_s;
   grad[f.axis_t] = T(0.5) * static_cast<T>(f.sign_t) * inverse * grad_t;
-  // s and t are the same for every multiple of d, so the gradient has no part along d.
+  // s and t are the same for every multiple of d, so the gradient has no component along d.
   grad[f.major] = -(grad[f.axis_s] * d[f.axis_s] + grad[f.axis_t] * d[f.axis_t]) / d[f.major];
   return grad;
 }

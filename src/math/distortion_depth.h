@@ -2,8 +2,8 @@
 
 #include "base/device.h"
 
-// The depth in which the distortion compares hits (method §3.5): 0 at the near plane, 1 at the far plane, as
-// 2DGS has it.
+// The depth with which the distortion compares hits (method §3.5): 0 at the near plane and 1 at the far
+// plane, as in 2DGS.
 namespace traceflow {
 
 // m = far/(far - near) · (1 - near/z)

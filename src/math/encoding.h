@@ -4,16 +4,16 @@
 
 #include "base/device.h"
 
-// The positional encoding that a residual field sees (method §1.2).
+// The positional encoding of a residual field (method §1.2).
 namespace traceflow {
 
-// Numbers in the encoding of a point with the given number of coordinates.
+// The length of the encoding of a point with `coordinates` coordinates.
 TRACEFLOW_HD constexpr int encoding_size(int coordinates, int octaves) {
   return coordinates * (1 + 2 * octaves);
 }
 
-// γ(x) = (x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x), each for all coordinates; fills encoding_size
-// numbers. 2^k x is exact in any binary floating-point type, so the argument carries no error of its own.
+// γ(x) = (x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x), each for all coordinates; writes encoding_size
+// numbers. 2^k x is exact in binary floating point, so the argument has no error of its own.
 template <class T>
 TRACEFLOW_HD void positional_encoding(const T* x, int coordinates, int octaves, T* encoding) {
   for (int i = 0; i < coordinates; ++i) encoding[i] = x[i];
@@ -27,8 +27,8 @@ TRACEFLOW_HD void positional_encoding(const T* x, int coordinates, int octaves, 
   }
 }
 
-// An angle in turns, x/2π = high + low: powers of two scale both without error, so that taking whole turns
-// off the high part is exact however many there are.
+// An angle in turns, x/2π = high + low. Multiplication by powers of two is exact for both, so removing whole
+// turns from the high part is exact for any number of turns.
 struct Turns {
   float high, low;
 };
@@ -40,8 +40,8 @@ TRACEFLOW_HD inline Turns turns_of(float radians) {
   return {product, std::fma(radians, high, -product) + radians * low};
 }
 
-// sin(2π·(frequency·turns + phase)) for a frequency that is a power of two: a quarter as phase gives the
-// cosine. Folded to a quarter turn, then the series to θ¹¹; error under 1e-7.
+// sin(2π·(frequency·turns + phase)) for a frequency that is a power of two; a phase of a quarter gives the
+// cosine. Folds the angle to a quarter turn, then uses the series to θ¹¹; error under 1e-7.
 TRACEFLOW_HD inline float sin_of_turns(Turns turns, float frequency, float phase) {
   const float whole = turns.high * frequency;
   const float fraction = (whole - std::rint(whole)) + (turns.low * frequency + phase);

@@ -2,8 +2,8 @@
 
 namespace traceflow {
 
-// Bounds of what a camera file says in pixels, and of what multiplies it: numbers that single precision holds
-// after some arithmetic.
+// Bounds of the values in pixels of a camera file, and of factors that they are multiplied by: single
+// precision can still represent them after some arithmetic.
 inline constexpr double largest_pixels = 1e9;
 inline constexpr double smallest_pixels = 1e-6;
 

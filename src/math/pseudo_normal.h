@@ -4,12 +4,11 @@
 
 #include "math/types.h"
 
-// The normal of a surface from its points at neighbouring pixels (method §4.2), with the derivative beside
-// it.
+// The normal of a surface from its points at neighbouring pixels (method §4.2), and its derivative.
 namespace traceflow {
 
 // normalised(down × across), which faces the camera. across: x(right) − x(left); down: x(below) − x(above).
-// Zero where the product vanishes or is not finite.
+// Zero if the product vanishes or is not finite.
 template <class T>
 TRACEFLOW_HD Vec3<T> pseudo_normal(const Vec3<T>& across, const Vec3<T>& down) {
   const Vec3<T> product = cross(down, across);
@@ -24,7 +23,7 @@ struct PseudoNormalGradient {
   Vec3<T> down{T(0)};
 };
 
-// Zero where the normal is.
+// Zero if the normal is zero.
 template <class T>
 TRACEFLOW_HD PseudoNormalGradient<T> pseudo_normal_backward(const Vec3<T>& across, const Vec3<T>& down,
                                                             const Vec3<T>& grad_normal) {

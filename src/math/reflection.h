@@ -4,11 +4,11 @@
 
 #include "math/types.h"
 
-// A ray mirrored at a surface (method §4.3), with the derivative beside it.
+// A ray reflected at a surface (method §4.3), and its derivative.
 namespace traceflow {
 
-// d − 2(d·n̂)n̂ with d the unit direction of `ray` and n̂ that of `normal`. Zero where either has no direction
-// or is not finite.
+// d − 2(d·n̂)n̂ with d and n̂ the unit directions of `ray` and `normal`. Zero if either is zero or not
+// finite.
 template <class T>
 TRACEFLOW_HD Vec3<T> reflect(const Vec3<T>& ray, const Vec3<T>& normal) {
   const T ray2 = dot(ray, ray);
@@ -27,7 +27,7 @@ struct ReflectionGradient {
   Vec3<T> normal{T(0)};
 };
 
-// Derivative by the ray and the normal as they are, neither of unit length. Zero where the reflection is.
+// The derivative by the ray and the normal as given, of any length. Zero if the reflection is zero.
 template <class T>
 TRACEFLOW_HD ReflectionGradient<T> reflect_backward(const Vec3<T>& ray, const Vec3<T>& normal,
                                                     const Vec3<T>& grad_reflected) {

@@ -4,11 +4,11 @@
 
 #include "math/types.h"
 
-// A surfel's frame from its quaternion (method §1.1). Quaternions are stored (w, x, y, z) and need not have
-// unit length.
+// A surfel's frame from its quaternion (method §1.1). Quaternions are stored as (w, x, y, z), with any
+// length.
 namespace traceflow {
 
-// Columns t_u, t_v, n of the rotation of q/|q|. A zero quaternion gives the identity.
+// Columns t_u, t_v, n of the rotation of q/|q|. The identity for a zero quaternion.
 template <class T>
 TRACEFLOW_HD Mat3<T> rotation_from_quaternion(const Vec4<T>& q) {
   const T length2 = dot(q, q);
@@ -20,7 +20,7 @@ TRACEFLOW_HD Mat3<T> rotation_from_quaternion(const Vec4<T>& q) {
                  s * (x * z + w * y), s * (y * z - w * x), T(1) - s * (x * x + y * y));  // n
 }
 
-// dL/dq from dL/dR, both for the unnormalised q. Zero for a zero quaternion.
+// dL/dq from dL/dR, for the unnormalised q. Zero for a zero quaternion.
 template <class T>
 TRACEFLOW_HD Vec4<T> rotation_from_quaternion_backward(const Vec4<T>& q, const Mat3<T>& grad_rotation) {
   const T length2 = dot(q, q);

@@ -4,12 +4,12 @@
 
 #include "math/rotation.h"
 
-// Rotations as a group (Sola et al. 2018, A micro Lie theory): exponential, logarithm and the Jacobians that
-// differentiate them. Vectors of rotation are in radians; a perturbation δ multiplies from the left: R →
-// exp(δ) R.
+// The rotation group (Sola et al. 2018, A micro Lie theory): exponential, logarithm and the Jacobians for
+// their derivatives. Rotation vectors are in radians. A perturbation δ multiplies from the left, as in exp(δ)
+// R.
 namespace traceflow {
 
-// a · b of quaternions (w, x, y, z): first b, then a.
+// The quaternion product a · b, in the order (w, x, y, z): first rotates by b, then by a.
 template <class T>
 TRACEFLOW_HD Vec4<T> quaternion_product(const Vec4<T>& a, const Vec4<T>& b) {
   return {a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -21,14 +21,15 @@ template <class T>
 TRACEFLOW_HD Vec4<T> quaternion_conjugate(const Vec4<T>& q) {
   return {q[0], -q[1], -q[2], -q[3]};
 }
-// q/|q|; the identity for zero.
+// q/|q|; the identity for a zero quaternion.
 template <class T>
 TRACEFLOW_HD Vec4<T> unit_quaternion(const Vec4<T>& q) {
   const T length2 = dot(q, q);
   return length2 > T(0) ? q / std::sqrt(length2) : Vec4<T>(T(1), T(0), T(0), T(0));
 }
 
-// A unit quaternion that turns z to the unit vector n: half-way between both; for n = −z a half turn about x.
+// A unit quaternion that rotates z to the unit vector n by the smallest angle; for n = −z a half turn about
+// x.
 template <class T>
 TRACEFLOW_HD Vec4<T> quaternion_towards(const Vec3<T>& n) {
   if (n.z < T(-0.9999)) return {T(0), T(1), T(0), T(0)};
@@ -61,7 +62,7 @@ TRACEFLOW_HD Vec3<T> left_jacobian(const Vec3<T>& v, const Vec3<T>& x) {
   const Vec3<T> vx = cross(v, x);
   return x + a * vx + b * cross(v, vx);
 }
-// J(v)⁻¹ · x, for |v| < 2π. Its transpose is that of -v.
+// J(v)⁻¹ · x, for |v| < 2π. Its transpose is J(-v)⁻¹.
 template <class T>
 TRACEFLOW_HD Vec3<T> left_jacobian_inverse(const Vec3<T>& v, const Vec3<T>& x) {
   const T angle2 = dot(v, v), angle = std::sqrt(angle2);
@@ -78,7 +79,7 @@ TRACEFLOW_HD Vec4<T> quaternion_gradient(const Vec4<T>& q, const Vec3<T>& grad) 
   if (!(length2 > T(0))) return Vec4<T>(T(0));
   return quaternion_product(Vec4<T>(T(0), grad.x, grad.y, grad.z), q) * (T(2) / length2);
 }
-// dL/dδ of a quaternion's rotation from dL/dq, for a loss that does not depend on its length.
+// dL/dδ of a quaternion's rotation from dL/dq, for a loss that does not depend on the quaternion's length.
 template <class T>
 TRACEFLOW_HD Vec3<T> quaternion_torque(const Vec4<T>& q, const Vec4<T>& grad) {
   const Vec4<T> turned = quaternion_product(grad, quaternion_conjugate(q));

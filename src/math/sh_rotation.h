@@ -4,8 +4,8 @@
 
 #include "math/spherical_harmonics.h"
 
-// How spherical harmonics turn with the thing that they colour: the function f'(d) = f(Rᵀ d) has the
-// coefficients D c of f's c. D keeps degrees apart; D of degree l is (2l + 1)².
+// Rotation of spherical harmonics with the body that they colour: the function f'(d) = f(Rᵀ d) has the
+// coefficients D c, with c those of f. D does not mix degrees; its block for degree l is (2l + 1)×(2l + 1).
 namespace traceflow {
 
 // The blocks of degrees 1 to 3, row by row.
@@ -21,8 +21,8 @@ struct ShRotation {
 
 namespace detail {
 
-// f(direction, weight) for directions on the sphere whose weighted sum is the integral of any polynomial up
-// to degree 7: four Gauss–Legendre heights times eight longitudes.
+// Calls f(direction, weight) for the nodes of a quadrature on the sphere that is exact for polynomials up to
+// degree 7: four Gauss–Legendre heights times eight longitudes.
 template <class F>
 TRACEFLOW_HD void for_each_sphere_node(F&& f) {
   constexpr double height[2] = {0.3399810435848563, 0.8611363115940526};
@@ -38,7 +38,7 @@ TRACEFLOW_HD void for_each_sphere_node(F&& f) {
   }
 }
 
-// D_ij = ∫ Y_i(d) turned_j(d) dd, the basis being orthonormal. turned(d, values): fills 16 numbers.
+// D_ij = ∫ Y_i(d) turned_j(d) dd, since the basis is orthonormal. turned(d, values): writes 16 numbers.
 template <class T, class Turned>
 TRACEFLOW_HD void project_harmonics(Turned&& turned, ShRotation<T>& result) {
   double sums[83] = {};
@@ -71,7 +71,7 @@ TRACEFLOW_HD ShRotation<T> sh_rotation(const Mat3<double>& rotation) {
   return result;
 }
 
-// dD/dω of D(exp(ω)) at ω = 0 about one axis of the world, so that dD(exp(ω) R)/dω = this · D(R).
+// dD/dω of D(exp(ω)) at ω = 0 about one world axis, so that dD(exp(ω) R)/dω = this · D(R).
 template <class T>
 ShRotation<T> sh_generator(const Vec3<double>& axis) {
   ShRotation<T> result;
@@ -87,7 +87,7 @@ ShRotation<T> sh_generator(const Vec3<double>& axis) {
   return result;
 }
 
-// to = D · from, of one surfel's coefficients (rows of 3 numbers) up to a degree. from and to differ.
+// to = D · from, for one surfel's coefficients (rows of 3 numbers) up to a degree. from and to must differ.
 template <class T, class U>
 TRACEFLOW_HD void turn_harmonics(const ShRotation<T>& d, int degree, const U* from, U* to) {
   for (int c = 0; c < 3; ++c) to[c] = from[c];
@@ -104,7 +104,7 @@ TRACEFLOW_HD void turn_harmonics(const ShRotation<T>& d, int degree, const U* fr
   }
 }
 
-// to = Dᵀ · from, which turns back.
+// to = Dᵀ · from, the inverse rotation.
 template <class T, class U>
 TRACEFLOW_HD void turn_harmonics_back(const ShRotation<T>& d, int degree, const U* from, U* to) {
   for (int c = 0; c < 3; ++c) to[c] = from[c];

@@ -11,18 +11,18 @@ namespace traceflow {
 
 // x → scale · rotation · x + shift.
 struct Similarity {
-  Mat3<double> rotation{1};  // proper: never a mirroring
+  Mat3<double> rotation{1};  // proper: without reflection
   double scale = 1;
   Vec3<double> shift{0};
 
   Vec3<double> operator()(const Vec3<double>& x) const { return scale * (rotation * x) + shift; }
 };
 
-// The similarity that takes the points `from` nearest to the points `to`, of which there are as many, by the
-// sum of squared distances (Horn 1987: the rotation's quaternion is the last eigenvector of a symmetric 4×4
-// matrix, so that no set of points, flat or mirrored, gives anything but a rotation). Where the points leave
-// the rotation open, as those of one line do, it is one of those that fit; where they say nothing, as points
-// at one place, it is none, of scale 1.
+// The similarity that maps the points `from` to the points `to`, of the same number, with the least sum of
+// squared distances (Horn 1987). The rotation's quaternion is the last eigenvector of a symmetric 4×4 matrix.
+// So the result is a proper rotation for any points, also coplanar or mirrored ones. If the rotation is
+// ambiguous, as for collinear points, it is one of those that fit. If all points of `from` coincide, the
+// rotation is the identity and the scale 1.
 inline Similarity fit_similarity(std::span<const Vec3<double>> from, std::span<const Vec3<double>> to) {
   const auto count = static_cast<double>(from.size());
   Vec3<double> middle_from(0), middle_to(0);
@@ -38,7 +38,7 @@ inline Similarity fit_similarity(std::span<const Vec3<double>> from, std::span<c
     size += dot(a, a);
   }
 
-  // Of b_row · a_column.
+  // The entry for b_row · a_column.
   const auto m = [&](int row, int column) { return moments[column][row]; };
   // qᵀ n q = Σ b · R(q) a.
   glm::mat<4, 4, double, glm::defaultp> n(0);
@@ -54,7 +54,7 @@ inline Similarity fit_similarity(std::span<const Vec3<double>> from, std::span<c
   return result;
 }
 
-// Of a rotation, in degrees from 0 to 180; exact for small angles too.
+// The angle of a rotation in degrees, 0 to 180; accurate for small angles too.
 inline double rotation_angle_deg(const Mat3<double>& r) {
   const Vec3<double> twice_sine(r[1][2] - r[2][1], r[2][0] - r[0][2], r[0][1] - r[1][0]);
   const double twice_cosine = r[0][0] + r[1][1] + r[2][2] - 1;

@@ -2,17 +2,17 @@
 
 #include "math/types.h"
 
-// Real spherical harmonics of degree 0..3 in the order and with the signs of 3DGS (method §1.1).
+// Real spherical harmonics of degrees 0..3, in the order and with the signs of 3DGS (method §1.1).
 namespace traceflow {
 
 TRACEFLOW_HD constexpr int sh_coefficients(int degree) { return (degree + 1) * (degree + 1); }
-// Inverse of sh_coefficients for 1, 4, 9, 16.
+// The inverse of sh_coefficients, for 1, 4, 9 and 16.
 TRACEFLOW_HD constexpr int sh_degree(int64_t coefficients) {
   return coefficients >= 16 ? 3 : coefficients >= 9 ? 2 : coefficients >= 4 ? 1 : 0;
 }
 inline constexpr double sh_c0 = 0.28209479177387814;
 
-// Basis values for the unit direction d; fills sh_coefficients(degree) numbers.
+// The basis for the unit direction d; writes sh_coefficients(degree) numbers.
 template <class T>
 TRACEFLOW_HD void sh_basis(int degree, const Vec3<T>& d, T* basis) {
   const T x = d.x, y = d.y, z = d.z;
@@ -38,7 +38,7 @@ TRACEFLOW_HD void sh_basis(int degree, const Vec3<T>& d, T* basis) {
   basis[15] = T(-0.5900435899266435) * x * (xx - T(3) * yy);
 }
 
-// Σ_k weight[k] ∂basis[k]/∂d, with d taken as free (not constrained to the sphere).
+// Σ_k weight[k] ∂basis[k]/∂d, with d unconstrained (not restricted to the sphere).
 template <class T>
 TRACEFLOW_HD Vec3<T> sh_basis_backward(int degree, const Vec3<T>& d, const T* weight) {
   const T x = d.x, y = d.y, z = d.z;
@@ -66,7 +66,7 @@ TRACEFLOW_HD Vec3<T> sh_basis_backward(int degree, const Vec3<T>& d, const T* we
   return g;
 }
 
-// c = max(0, Σ_k sh[k] basis[k] + 0.5) per channel; sh holds sh_coefficients(degree) rows of 3.
+// c = max(0, Σ_k sh[k] basis[k] + 0.5) per channel; sh has sh_coefficients(degree) rows of 3.
 template <class T, class U>
 TRACEFLOW_HD Vec3<T> sh_colour(int degree, const U* sh, const Vec3<T>& direction) {
   T basis[16];
@@ -76,8 +76,8 @@ TRACEFLOW_HD Vec3<T> sh_colour(int degree, const U* sh, const Vec3<T>& direction
   return glm::max(c, Vec3<T>(T(0)));
 }
 
-// Adds dL/dsh to grad_sh and returns dL/ddirection (direction as free). A channel clamped at zero passes
-// nothing.
+// Adds dL/dsh to grad_sh and returns dL/ddirection, with an unconstrained direction. A channel clamped at
+// zero has no gradient.
 template <class T, class U>
 TRACEFLOW_HD Vec3<T> sh_colour_backward(int degree, const U* sh, const Vec3<T>& direction,
                                         Vec3<T> grad_colour, U* grad_sh) {

@@ -5,13 +5,13 @@
 
 #include "base/device.h"
 
-// Structural similarity of two pictures at one pixel (method §7.5), with the derivative beside it.
+// Structural similarity of two images at one pixel (method §7.5), and its derivative.
 namespace traceflow {
 
 inline constexpr int ssim_radius = 5;
 
-// The one-dimensional Gaussian window of 11 taps, σ 1.5, sum 1. The two-dimensional window is its product
-// with itself.
+// The one-dimensional Gaussian window: 11 taps, σ 1.5, sum 1. The two-dimensional window is its product with
+// itself.
 inline std::array<double, 2 * ssim_radius + 1> ssim_window() {
   std::array<double, 2 * ssim_radius + 1> window{};
   double sum = 0;
@@ -22,13 +22,13 @@ inline std::array<double, 2 * ssim_radius + 1> ssim_window() {
   return window;
 }
 
-// Windowed sums around a pixel: of x, of y, of x² + y², of x·y. All that SSIM needs.
+// Windowed sums around a pixel, of x, y, x² + y² and x·y: all that SSIM needs.
 template <class T>
 struct SsimMoments {
   T mean_x, mean_y, squares, product;
 };
 
-// SSIM and its derivative by the moments. mean_y's is left out: the target is constant.
+// SSIM and its derivatives by the moments, except mean_y: the target is constant.
 template <class T>
 struct SsimDerivative {
   T value, by_mean_x, by_squares, by_product;

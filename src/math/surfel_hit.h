@@ -4,10 +4,10 @@
 
 #include "math/types.h"
 
-// One ray and one surfel (method §3.1, §5.1), with the derivative beside it.
+// The intersection of a ray and a surfel (method §3.1, §5.1), and its derivative.
 namespace traceflow {
 
-// A surfel in space: centre, frame (columns t_u, t_v, n) and the two standard deviations along t_u and t_v.
+// A surfel in space: centre, axes (columns t_u, t_v, n) and the two standard deviations along t_u and t_v.
 template <class T>
 struct SurfelFrame {
   Vec3<T> position;
@@ -15,8 +15,8 @@ struct SurfelFrame {
   Vec2<T> scale;
 };
 
-// Where the ray origin + t·direction meets the surfel's plane; (u, v) in standard deviations. `valid` is
-// false for a ray parallel to the plane.
+// The intersection of the ray origin + t·direction with the surfel's plane; (u, v) in standard deviations.
+// `valid` is false for a ray parallel to the plane.
 template <class T>
 struct SurfelHit {
   T t, u, v;
@@ -43,7 +43,7 @@ struct SurfelHitGradient {
   Vec3<T> direction{T(0)};
 };
 
-// Derivative of a valid hit by everything that it was made of, from dL/dt, dL/du, dL/dv.
+// The derivatives of a valid hit by all inputs, from dL/dt, dL/du and dL/dv.
 template <class T>
 TRACEFLOW_HD SurfelHitGradient<T> intersect_backward(const SurfelFrame<T>& s, const Vec3<T>& origin,
                                                      const Vec3<T>& direction, const SurfelHit<T>& hit,

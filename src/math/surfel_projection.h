@@ -3,12 +3,13 @@
 #include "math/camera.h"
 #include "math/surfel_hit.h"
 
-// A surfel as the camera's pixels see it (method §3.1): the hit as ratios of linear forms in the pixel's ray,
-// the same numbers as intersect() with the camera's position and ray_in_world(), at a few operations a pixel.
+// A surfel as seen by the camera's pixels (method §3.1): the hit as ratios of linear forms in the pixel's
+// ray. The numbers are the same as those of intersect() with the camera's position and ray_in_world(), with
+// few operations per pixel.
 namespace traceflow {
 
-// For r = ray_in_camera(x, y): u = u·r / w·r, v = v·r / w·r, z = z_plane / w·r. Signs are such that z_plane ≥
-// 0, so that a hit is in front of the camera where w·r > 0.
+// For r = ray_in_camera(x, y): u = u·r / w·r, v = v·r / w·r, z = z_plane / w·r. The signs give z_plane ≥ 0,
+// so that a hit is in front of the camera if w·r > 0.
 template <class T>
 struct SurfelForms {
   Vec3<T> u, v, w;
@@ -36,7 +37,7 @@ struct SurfelFormsGradient {
   Mat3<T> camera_from_world{T(0)};
 };
 
-// From dL/dforms (its `sign` is not read) to everything that they were made of.
+// The derivatives by all inputs, from dL/dforms (without its `sign`).
 template <class T>
 TRACEFLOW_HD SurfelFormsGradient<T> surfel_forms_backward(const SurfelFrame<T>& s, const Camera<T>& camera,
                                                           const SurfelForms<T>& forms,
@@ -68,7 +69,7 @@ TRACEFLOW_HD SurfelFormsGradient<T> surfel_forms_backward(const SurfelFrame<T>& 
   return g;
 }
 
-// dL/dpoint_in_camera from dL/d(its projection).
+// dL/dpoint_in_camera from dL/d(projected point).
 template <class T>
 TRACEFLOW_HD Vec3<T> project_backward(const Camera<T>& camera, const Vec3<T>& point_in_camera,
                                       const Vec2<T>& grad_pixel) {

@@ -7,7 +7,7 @@
 namespace traceflow {
 
 // Eigenvectors (columns) and eigenvalues of a symmetric size×size matrix (size up to 4) by Jacobi rotations,
-// in ascending order of eigenvalue.
+// with ascending eigenvalues.
 template <int size, class T>
 struct SymmetricEigen {
   glm::vec<size, T, glm::defaultp> values;

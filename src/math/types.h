@@ -4,7 +4,7 @@
 
 #include "base/device.h"
 
-// Small vectors. glm matrices are column-major: m[c] is a column, m * v the usual product.
+// Small vectors. glm matrices are column-major: m[c] is a column, and m * v is the usual product.
 namespace traceflow {
 
 template <class T>
@@ -16,7 +16,7 @@ using Vec4 = glm::vec<4, T, glm::defaultp>;
 template <class T>
 using Mat3 = glm::mat<3, 3, T, glm::defaultp>;
 
-// Reads three (four) consecutive numbers as a vector, converting the scalar.
+// Reads three (four) consecutive numbers as a vector, converted to T.
 template <class T, class U>
 TRACEFLOW_HD Vec3<T> load3(const U* p) {
   return {static_cast<T>(p[0]), static_cast<T>(p[1]), static_cast<T>(p[2])};

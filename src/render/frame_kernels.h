@@ -8,7 +8,7 @@
 // The renderer's own element-wise steps, for either device.
 namespace traceflow {
 
-// Row of the stored set that posed row i comes from. stored null: posed are all.
+// The row in the stored set of posed row i. stored: null if all surfels are posed.
 struct StoredRow {
   const int32_t* stored;
   TRACEFLOW_HD int64_t operator()(int64_t i) const { return stored == nullptr ? i : int64_t{stored[i]}; }
@@ -22,7 +22,7 @@ struct LargestSquare {
   }
 };
 
-// The square of the distance between a surfel's stored and posed position; 0 where that is no number.
+// The squared distance between a surfel's stored and posed positions; 0 if that is not finite.
 struct SquareOfMove {
   StoredRow row;
   const float *stored, *posed;
@@ -44,7 +44,7 @@ struct AddNumbers {
   TRACEFLOW_HD void operator()(int64_t i) const { to[i] += from[i]; }
 };
 
-// What lies behind the environment surfels: colour += (1 − α) · behind, of each channel of a ray (method
+// Adds what is behind the environment surfels: colour += (1 − α) · behind, per channel of a ray (method
 // §5.4).
 struct AddBehind {
   const float *alpha, *behind;
@@ -64,14 +64,14 @@ struct AddBehindBackward {
   }
 };
 
-// The width of a traced pixel's cone: the mean roughness of what is blended there (method §4.5).
+// The width of a traced pixel's cone: the mean roughness of the surfels blended there (method §4.5).
 struct ConeWidths {
   const int32_t* pixels;
   const float *roughness, *alpha;
   float* widths;
   TRACEFLOW_HD void operator()(int64_t i) const { widths[i] = roughness[pixels[i]] / alpha[pixels[i]]; }
 };
-// Adds to the gradient of the roughness and, unless it is null, to that of alpha.
+// Adds to the gradient of roughness and, unless it is null, to that of alpha.
 struct ConeWidthsBackward {
   const int32_t* pixels;
   const float *alpha, *widths, *grad_widths;
@@ -83,7 +83,7 @@ struct ConeWidthsBackward {
   }
 };
 
-// Density control's signals of the drawn surfels, at the places of the stored ones.
+// Copies density control's signals of the drawn surfels to the rows of the stored ones.
 struct PlaceSignal {
   StoredRow row;
   const float* posed_signal;
@@ -98,7 +98,7 @@ struct PlaceSignal {
   }
 };
 
-// 1 for a surfel that a body carries, else 0.
+// 1 for a surfel of a body, else 0.
 struct IsCarried {
   StoredRow row;
   const int32_t* body;
@@ -112,7 +112,7 @@ struct FlagNonZero {
   TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = value[i] != 0 ? 1 : 0; }
 };
 
-// The bound follows the field at once when it grows and slowly when it shrinks.
+// The bound grows at once and shrinks slowly.
 struct FollowMaxDisplacement {
   const float* found;
   float* max_displacement;
@@ -122,7 +122,7 @@ struct FollowMaxDisplacement {
   }
 };
 
-// The view's pyramid: inward unit normals of its four sides, in camera axes, through the origin.
+// The view frustum: inward unit normals of its four sides through the origin, in camera axes.
 struct ViewPyramid {
   Vec3<float> left, right, top, bottom;
 
@@ -140,10 +140,10 @@ struct ViewPyramid {
   }
 };
 
-// Whether a stored surfel can show (render/visibility.h).
+// Returns whether a stored surfel may be visible (render/visibility.h).
 struct CanShow {
-  // A disk of full opacity ends at √(2 ln 255) = 3.33 standard deviations; the field may also widen it, by
-  // half as much again. One smaller than a pixel shows as far as √(ln 255) widths of the low-pass (method
+  // A disk of opacity 1 ends at √(2 ln 255) = 3.33 standard deviations; the factor allows the field to make
+  // it 1.5 times as wide. A disk smaller than a pixel ends at √(ln 255) = 2.36 widths of the low-pass (method
   // §3.2).
   static constexpr float disk_radius = 5.0F;
   static constexpr float low_pass_pixels = 2.36F;
@@ -154,7 +154,7 @@ struct CanShow {
   float near_plane;
   float low_pass;                 // width, pixels
   const float* max_displacement;  // null for 0
-  const int32_t* body;            // null: none is carried
+  const int32_t* body;            // null if there are no bodies
 
   TRACEFLOW_HD bool operator()(int64_t i) const {
     if (body != nullptr && body[i] >= 0) return true;

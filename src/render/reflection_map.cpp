@@ -22,8 +22,8 @@ void backward(const EnvironmentMap& map, const Tensor<float>& directions, float 
               EnvironmentMap& gradient, Tensor<float>& grad_directions) {
   grad_directions.place(directions.device()).reset(directions.shape());
   environment_map::backward(map.logit, saved.moved, grad_colour, gradient.logit, grad_directions);
-  // The direction enters the field detached, so what reaches the moved direction reaches both d and F
-  // unchanged.
+  // The field gets the direction detached. So the gradient of the moved direction is also that of both d and
+  // F.
   if (deform && train_field && map.field) {
     field::backward(*map.field, directions, time, saved.field, grad_directions, *gradient.field);
   }

@@ -9,17 +9,17 @@
 
 namespace traceflow {
 
-// Which points the layer `tracks` follows, and how far back their paths go.
+// The points that the layer `tracks` follows, and the length of their paths.
 struct TracksOptions {
-  int frames = 12;           // times of the capture
-  int most = 400;            // points
-  float least_move = 0.01F;  // extents
+  int frames = 12;           // length, in times of the capture
+  int most = 400;            // number of points
+  float least_move = 0.01F;  // in extents
 
   void validate() const;
 };
 
-// How a frame is made of a scene. Lengths are relative to the scene's extent, so that they mean the same in
-// every capture.
+// How a frame is rendered from a scene. Lengths are relative to the scene's extent, so that values fit every
+// capture.
 struct RenderOptions {
   raster::SortOrder sort = raster::SortOrder::centre;
   float near_plane = 0.01F;
@@ -70,7 +70,7 @@ struct RenderOptions {
   }
   void validate() const;
 
-  // The ops' own options for a scene of this extent.
+  // The options of the ops for a scene of this extent.
   raster::Options raster_options(float extent) const;
   trace::Options trace_options(float extent) const;
 };

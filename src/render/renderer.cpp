@@ -24,7 +24,7 @@ StoredRow stored_row(const Frame& frame) { return {frame.subset.empty() ? nullpt
 const Motion* motion_if(const Scene& scene) { return scene.main_motion ? &*scene.main_motion : nullptr; }
 const Nodes* nodes_if(const Scene& scene) { return scene.main_nodes ? &*scene.main_nodes : nullptr; }
 
-// Leaves the largest distance between posed and stored positions in the frame.
+// Sets frame.max_displacement to the largest distance between posed and stored positions.
 void find_reach(const Surfels& stored, Frame& frame) {
   const SquareOfMove move{stored_row(frame), stored.position.data(), frame.main.position.data()};
   ordered_sum<LargestSquare>(stored.device(), "render: largest move", frame.main.count(), move,
@@ -157,14 +157,14 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
     frame_.drawn_with.low_pass *=
         samples::low_pass_for(request.camera, frame_.samples, options_.samples, scene.focal);
 
-  // Choose the surfels that can show, and pose them.
+  // Pose the surfels that may be visible.
   if (!request.reuse_pose) {
     main_pose_.reset();
     environment_pose_.reset();
   }
   pose_main(scene, request, keep_for_backward);
 
-  // Draw them.
+  // Rasterise them.
   const bool draws_silhouette = request.silhouette && !scene.main.body.empty();
   frame_.main.carried.place(device).resize({draws_silhouette ? frame_.main.count() : 0});
   if (draws_silhouette) {
@@ -177,7 +177,7 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
                             frame_.raster.alpha, options_.depth_ratio, frame_.pseudo_normal);
   }
 
-  // Mirror the view at what was drawn.
+  // Reflect and trace.
   frame_.traced.pixel.place(device).resize({0});
   frame_.traced.weight.place(device).resize({0});
   frame_.specular_rays.place(device).resize({0, 3});
@@ -203,7 +203,7 @@ void Renderer::draw(const FrameRequest& request) {
 
 void Renderer::forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward) {
   trace::Rays& rays = frame_.mirrored.rays;
-  // As many probes in a picture whatever the samples.
+  // The number of probes in an image does not depend on the samples.
   surface::SelectOptions select = options_.select;
   select.probe_share /= static_cast<float>(frame_.samples * frame_.samples);
   surface::select_pixels(drawn().alpha, drawn().tint, drawn().normal, select, request.probes,
@@ -269,7 +269,7 @@ void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGra
   grad.tint.place(device).reset(drawn().tint.shape());
   grad.roughness.place(device).reset(drawn().roughness.shape());
   if (!with_geometry || frame_.traced.pixel.empty()) return;
-  // Mirrored rays will add to these.
+  // The gradients of reflected rays are added to these.
   if (frame_.main.has_roughness() && grad.alpha.empty())
     grad.alpha.place(device).reset(drawn().alpha.shape());
   if (grad.normal.empty()) grad.normal.place(device).reset(drawn().normal.shape());
@@ -294,7 +294,7 @@ void Renderer::backward(const Scene& scene, const FrameRequest& request, const T
                                     trainable.main_motion || trainable.main_nodes))
     return;
 
-  // Rasterise. With the geometry frozen only the tint's gradient is wanted (method §7.2).
+  // Rasterise. With frozen geometry only the tint's gradient is needed (method §7.2).
   if (!trainable.main) grad.colour.resize({0});
   if (options_.depth_ratio == 0) grad.median_depth.resize({0});
   grad_raster_input_.wants_camera = trainable.camera;

@@ -11,14 +11,14 @@
 
 namespace traceflow {
 
-// Bytes that ops may take for what they keep for backward. What does not fit is computed again there.
+// Limits, in bytes, for what ops save for backward. What does not fit is computed again.
 struct KeptMemory {
-  int64_t field_bytes = int64_t{1} << 29;  // activations of either field
-  int64_t hit_bytes = int64_t{1} << 30;    // the tracer's hits, where they are limited: on the CUDA device
+  int64_t field_bytes = int64_t{1} << 29;  // activations of each field
+  int64_t hit_bytes = int64_t{1} << 30;    // the tracer's hits; limited on the CUDA device only
 };
 
-// Strings the ops into a frame (method §1.3 … §6), and its derivative in the mirror order. Holds the memory
-// that frames need, so that one renderer used for many frames stops allocating. Works where the scene is.
+// Runs the ops for a frame (method §1.3 … §6) and, in reverse order, their derivatives. Keeps its memory, so
+// that a renderer used for many frames stops allocating. Runs on the device of the scene.
 class Renderer {
  public:
   explicit Renderer(const RenderOptions& options, const KeptMemory& kept = {});
@@ -30,17 +30,17 @@ class Renderer {
   // keep_for_backward: false saves the work and memory that only backward() needs.
   const Frame& forward(const Scene& scene, const FrameRequest& request, bool keep_for_backward = false);
 
-  // Adds dL/dscene to `gradient` (reset by the caller to the scene's shapes), of the last forward() with
-  // keep_for_backward, whose scene and request these are.
+  // Adds dL/dscene to `gradient`, which the caller has reset to the scene's shapes. Differentiates the last
+  // forward() with keep_for_backward, for the same scene and request.
   void backward(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
                 const FrameGradient& grad_frame, SceneGradient& gradient);
 
-  // What the environment's field added to its surfels in the last forward() with keep_for_backward that
-  // traced, N×outputs; empty where no field moves them.
+  // What the environment's field added to its surfels, N×outputs, in the last forward() that traced with
+  // keep_for_backward. Empty if there is no field.
   const Tensor<float>& environment_residuals() const { return environment_saved_.residuals; }
 
  private:
-  // How a set was posed.
+  // The parameters with which a set was posed.
   struct Pose {
     float time;
     int sh_degree;
@@ -49,20 +49,20 @@ class Renderer {
   };
 
   void pose_main(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
-  // With the tracer's BVH.
+  // Also builds the tracer's BVH.
   void pose_environment(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
-  // The rasterised layers, at the samples and averaged over a pixel's.
+  // Rasterises the layers of the samples and averages them per pixel.
   void draw(const FrameRequest& request);
-  bool has_several() const { return frame_.samples > 1; }  // samples in a pixel
+  bool has_several() const { return frame_.samples > 1; }  // samples per pixel
   Camera<float> camera_of_samples(const FrameRequest& request) const {
     return samples::camera_of(request.camera, frame_.samples);
   }
-  // The layers at the samples, which are the pixels where each has one, and their gradient.
+  // The layers of the samples, which are those of the pixels if each has one sample; and their gradient.
   const raster::Output& drawn() const { return has_several() ? samples_ : frame_.raster; }
   raster::OutputGradient& grad_drawn() { return has_several() ? grad_samples_ : grad_raster_; }
   void forward_specular(const Scene& scene, const FrameRequest& request, bool keep_for_backward);
-  // Starts the gradient of the rasterised layers at the samples with those of the frame's layers, but for its
-  // colour. Where geometry does not train, that of the tint alone, and others stay empty.
+  // Starts the gradient of the samples' layers from those of the frame's layers, except colour. Without
+  // geometry it has only the tint's gradient, and others stay empty.
   void begin_raster_gradient(const FrameRequest& request, const FrameGradient& grad_frame, bool with_geometry,
                              CameraGradient<float>* grad_camera);
   void backward_specular(const Scene& scene, const FrameRequest& request, const Trainable& trainable,
@@ -72,7 +72,7 @@ class Renderer {
 
   RenderOptions options_;
   Frame frame_;
-  std::optional<Pose> main_pose_, environment_pose_;  // of all of the last scene's surfels, in frame_
+  std::optional<Pose> main_pose_, environment_pose_;  // of all surfels of the last scene, in frame_
   deform::Saved main_saved_, environment_saved_;
   motion::SavedPtr motion_saved_ = motion::make_saved();
   nodes::SavedPtr nodes_saved_ = nodes::make_saved();
@@ -82,12 +82,12 @@ class Renderer {
   trace::SavedPtr trace_saved_ = trace::make_saved();
   trace::Output trace_output_;
   reflection_map::Saved map_saved_;
-  Tensor<float> behind_;  // P×3, what lies behind the environment surfels, and its gradients
+  Tensor<float> behind_;  // P×3, what is behind the environment surfels; then its gradients
   Tensor<float> grad_behind_, grad_behind_directions_;
-  raster::Output samples_;       // where a pixel has several
-  Tensor<float> sample_colour_;  // these shaded, and its gradient
+  raster::Output samples_;       // the layers of the samples, if a pixel has several
+  Tensor<float> sample_colour_;  // their shaded colours; then the gradient
   Tensor<float> grad_sample_colour_;
-  Tensor<uint8_t> drawn_;  // which posed surfels were drawn
+  Tensor<uint8_t> drawn_;  // by posed surfel: whether it was drawn
 
   raster::OutputGradient grad_raster_, grad_samples_;
   raster::InputGradient grad_raster_input_;

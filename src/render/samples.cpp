@@ -28,7 +28,7 @@ Shape shape_of_picture(const Shape& samples, int per_side) {
 int64_t channels(const Tensor<float>& layer) { return layer.shape().rank() == 3 ? layer.dim(2) : 1; }
 int64_t pixels(const Tensor<float>& layer) { return layer.dim(0) * layer.dim(1); }
 
-// device: where the samples are, since a gradient that is empty may be anywhere.
+// device: that of the samples, since an empty gradient may be on any device.
 void spread_layer(Device device, const Tensor<float>& picture, int per_side, Tensor<float>& samples) {
   if (picture.empty()) {
     samples.place(device).resize({0});

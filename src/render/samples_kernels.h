@@ -4,11 +4,11 @@
 
 #include "math/types.h"
 
-// One pixel and its n×n samples, which are pixels of a picture n times as wide and as high.
+// One pixel and its n×n samples, which are pixels of an image n times as wide and as high.
 namespace traceflow {
 
 struct SamplesOf {
-  int64_t width;  // of the picture, in pixels
+  int64_t width;  // of the image, in pixels
   int64_t per_side;
 
   template <class Each>
@@ -51,7 +51,7 @@ struct AverageSamplesBackward {
   }
 };
 
-// Depths count by their weights.
+// Mean depths, weighted.
 struct AverageDepths {
   SamplesOf samples;
   const float *depth, *weight;
@@ -84,7 +84,7 @@ struct AverageDepthsBackward {
   }
 };
 
-// Of the samples that have a median depth, the mean.
+// The mean over the samples that have a median depth.
 struct AverageMedianDepths {
   SamplesOf samples;
   const float* depth;

@@ -5,11 +5,11 @@
 
 namespace traceflow {
 
-// Lists, ascending, the stored surfels that can show in the camera's image when the field moves each by at
-// most *max_displacement (null: no field moves them; an address where the surfels are): the sphere around the
-// stored centre, wide enough for the surfel's disk and for a low-pass of so many pixels, meets the view's
-// pyramid in front of near_plane. A surfel whose stored values are not finite is left out; one that a body
-// carries is listed. Runs where the surfels are; `in_view` is put there.
+// Lists, in ascending order, the stored surfels that may be visible to the camera if the field moves each by
+// at most *max_displacement (on the device of the surfels; null: no field). A surfel is visible if the sphere
+// around its stored centre meets the view frustum beyond near_plane. The sphere contains the surfel's disk
+// and a low-pass of `low_pass` pixels. Leaves out surfels with stored values that are not finite; always
+// lists surfels of bodies. Runs on the device of the surfels, where it puts `in_view`.
 void surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane, float low_pass,
                      const float* max_displacement, Tensor<int32_t>& in_view);
 inline Tensor<int32_t> surfels_in_view(const Surfels& surfels, const Camera<float>& camera, float near_plane,

@@ -7,8 +7,9 @@
 #include "ops/environment_map/environment_map_cuda.h"
 #include "ops/environment_map/environment_map_kernels.h"
 
-// Backward, rays are sorted by the row of texels that they look at, and each row of the map collects its own
-// rays in their order: no two threads write to one texel, and the sum does not depend on their number.
+// The backward pass sorts rays by the row of texels that they use. Each row of the map then sums over its
+// rays in order. So no two threads write to the same texel, and the sum does not depend on the number of
+// threads.
 namespace traceflow::environment_map {
 
 namespace {
@@ -22,7 +23,7 @@ void check_shapes(const Tensor<T>& logit, const Tensor<T>& directions) {
           directions.shape().to_string());
 }
 
-// Rays in the order of the map's rows that they look at, and in their own order within a row.
+// Rays ordered by the row of the map that they use, then by their index.
 class RaysByRow {
  public:
   // row_of_ray: −1 for a ray that is left out.
@@ -49,8 +50,8 @@ class RaysByRow {
   std::vector<int32_t> first_, rays_;
 };
 
-// Adds to one row of the map what the rays between it and the row before it, and between it and the next,
-// send back.
+// Adds to one row of the map the gradients of the rays between it and the previous row, and of those between
+// it and the next row.
 template <class T>
 void collect_row(int64_t row, const RaysByRow& rays, const Tensor<T>& directions,
                  const Tensor<T>& grad_interpolated, Tensor<T>& grad_logit) {

@@ -5,15 +5,15 @@
 #include "ops/environment_map/environment_map_kernels.h"
 #include "primitives/sort.h"
 
-// Rays are sorted by the first texel that they look at, and each texel collects from its own and its
-// neighbours' rays in their order: the same bytes every run.
+// Sorts rays by the first texel that they use. Each texel sums over its own rays and its neighbours' in
+// order, so the result is bitwise reproducible.
 namespace traceflow {
 namespace environment_map::cuda {
 
 namespace {
 
-// Room that is kept between calls; all work is on one stream. Never given back, since what would take it may
-// be gone before.
+// Memory kept between calls; all work is on one stream. Never freed, because the allocator may be destroyed
+// first at exit.
 struct Room {
   Tensor<float> grad_interpolated;
   Tensor<uint32_t> texels, sorted_texels, rays, sorted_rays, first;

@@ -2,7 +2,7 @@
 
 #include "base/tensor.h"
 
-// The backward pass on the CUDA device; the contract is that of environment_map.h.
+// The backward pass on the CUDA device. The contract is that of environment_map.h.
 namespace traceflow::environment_map::cuda {
 
 TRACEFLOW_WITH_CUDA void backward(const Tensor<float>& logit, const Tensor<float>& directions,

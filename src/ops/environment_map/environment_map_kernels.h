@@ -6,17 +6,17 @@
 
 #include "math/cube_map.h"
 
-// The steps of looking up the map, one ray or one texel each.
+// The steps of the lookup, for one ray or one texel.
 namespace traceflow::environment_map {
 
-// The four texels around a direction: rows row, next_row of the map (all faces stacked), columns column,
-// next_column. At a clamped edge both are the same and the fraction is 0.
+// The four texels around a direction: rows row and next_row of the map (all faces stacked), columns column
+// and next_column. At a clamped edge both are the same and the fraction is 0.
 template <class T>
 struct Lookup {
   CubeCoordinates<T> at;
   int64_t row, next_row, column, next_column;
   T fraction_x, fraction_y;
-  bool inside_x, inside_y;  // false where the clamped edge holds the position still
+  bool inside_x, inside_y;  // false where the position is clamped at an edge
 };
 
 template <class T>
@@ -50,7 +50,7 @@ TRACEFLOW_HD bool usable(const Vec3<T>& direction) {
   return is_finite(direction) && direction != Vec3<T>(T(0));
 }
 
-// The logits' address, on any device.
+// The address of the logits, on either device.
 template <class T>
 struct MapView {
   const T* logit;
@@ -90,7 +90,7 @@ TRACEFLOW_HD Vec3<T> logistic(const Vec3<T>& x) {
   return T(1) / (T(1) + exp(-x));
 }
 
-// What a ray sends back: dL/d(interpolated logit) and dL/d(direction).
+// The gradients of a ray: dL/d(interpolated logit) and dL/d(direction).
 template <class T>
 struct RayGradient {
   Vec3<T> logit, direction;
@@ -126,8 +126,8 @@ struct LookUpColour {
   }
 };
 
-// What a ray sends back, and the first of the texels that it looks at: one behind the last where nothing is
-// sent.
+// Sets the gradients of a ray and the first of its texels. That is one past the last texel of the map if the
+// ray has no gradient.
 template <class T>
 struct RayStep {
   MapView<T> map;
@@ -149,7 +149,7 @@ struct RayStep {
   }
 };
 
-// Where the rays of texel i begin in the sorted list.
+// Finds where the rays of texel i begin in the sorted list.
 struct FindFirst {
   const uint32_t* texels;  // sorted
   int64_t rays;
@@ -167,7 +167,8 @@ struct FindFirst {
   }
 };
 
-// Adds to texel i what the rays send back that look at it and at its neighbours on either side.
+// Adds to texel i the gradients of the rays that use it: its own rays, and those of the three texels above
+// and to the left.
 template <class T>
 struct CollectTexel {
   int64_t size;

@@ -13,11 +13,11 @@
 #include "ops/raster/raster_kernels.h"
 #include "scene/surfel_views.h"
 
-// Surfels to splats (method §3.1), in double precision up to the last store. Bounds are conservative: what
-// blending would have kept lies inside.
+// Projects surfels to splats (method §3.1). Computes in double precision up to the final store. Bounds are
+// conservative: they contain everything that blending would keep.
 namespace traceflow::raster {
 
-// Added to every bound, in pixels, for what single precision moves.
+// Added to every bound, in pixels, for rounding errors of single precision.
 inline constexpr double bounds_slack = 0.02;
 
 struct Rectangle {
@@ -35,8 +35,7 @@ struct Rectangle {
   }
 };
 
-// The disk within which a surfel blends, in camera axes: the points centre + a·half_u + b·half_v with a² + b²
-// ≤ 1.
+// The disk in which a surfel blends, in camera axes: points centre + a·half_u + b·half_v with a² + b² ≤ 1.
 struct Disk {
   Vec3<double> centre, half_u, half_v;
 
@@ -45,7 +44,8 @@ struct Disk {
   }
 };
 
-// The projection of a disk that lies well in front of the camera is an ellipse; its bounding box is exact.
+// Returns the exact bounding box of the projected disk, which must lie well in front of the camera. Its
+// projection is then an ellipse.
 TRACEFLOW_HD inline Rectangle ellipse_box(const Disk& disk, const Camera<double>& camera,
                                           const Vec2<double>& pixel, Vec2<double>& ellipse_centre) {
   const Vec3<double>& c = disk.centre;
@@ -62,7 +62,8 @@ TRACEFLOW_HD inline Rectangle ellipse_box(const Disk& disk, const Camera<double>
           ellipse_centre.y + half.y};
 }
 
-// The bounding box of the square around a disk, cut at the near plane. Empty when all of it lies behind.
+// Returns the bounding box of the square around a disk, clipped at the near plane. Empty if the whole square
+// is behind that plane.
 TRACEFLOW_HD inline Rectangle clipped_box(const Disk& disk, const Camera<double>& camera, double near_plane) {
   const Vec3<double> corners[4] = {
       disk.centre + disk.half_u + disk.half_v, disk.centre - disk.half_u + disk.half_v,
@@ -83,7 +84,7 @@ TRACEFLOW_HD inline Rectangle clipped_box(const Disk& disk, const Camera<double>
   return box;
 }
 
-// The tiles of the pixels whose centres lie in [low, high].
+// The range of tiles that contain a pixel with its centre in [low, high].
 TRACEFLOW_HD inline void tile_range(double low, double high, int pixels, int32_t& begin, int32_t& end) {
   const double first = std::ceil(std::max(low - bounds_slack - 0.5, 0.0));
   const double last = std::floor(std::min(high + bounds_slack - 0.5, pixels - 1.0));
@@ -103,7 +104,7 @@ TRACEFLOW_HD inline bool all_finite(const float* values, int64_t count) {
   return bad == 0;
 }
 
-// One surfel to its splat and bounds; on either device.
+// Projects one surfel to its splat and bounds, on either device.
 class ProjectSurfel {
  public:
   // splats, bounds: N each.
@@ -138,15 +139,15 @@ class ProjectSurfel {
            (s.roughness == nullptr || std::isfinite(s.roughness[i]));
   }
 
-  // Where a surfel stands and how far it reaches.
+  // A surfel's position and extent.
   struct Placement {
     Vec3<double> from_camera;  // world axes
     Vec3<double> centre;       // camera axes
-    bool in_front;             // of the near plane, by its centre
+    bool in_front;             // its centre is beyond the near plane
     bool has_low_pass;
     double log_opacity;
     double rho_max, radius;  // radius² = rho_max
-    Vec2<double> pixel;      // the projected centre, where in front
+    Vec2<double> pixel;      // the projected centre, if in_front
   };
 
   TRACEFLOW_HD void place(int64_t i, Bounds& bounds) const {
@@ -181,8 +182,8 @@ class ProjectSurfel {
     if (!store(i, p, frame, ellipse_centre)) bounds = {};
   }
 
-  // Whether the ball around a surfel and its low-pass disk lie beyond one side of the image. Quick, and
-  // misses some.
+  // Returns true if the sphere around a surfel and its low-pass disk are beyond one side of the image. The
+  // test is fast but does not find all such surfels.
   TRACEFLOW_HD bool is_outside(const Placement& p, double scale) const {
     const double ball = p.radius * scale;
     const double disk = p.in_front ? (p.radius * std::max(low_pass_, 1.0) + 1) * p.centre.z : 0;
@@ -192,7 +193,7 @@ class ProjectSurfel {
     return false;
   }
 
-  // False for a surfel that single precision cannot hold.
+  // Returns false if single precision cannot represent the splat.
   TRACEFLOW_HD bool store(int64_t i, const Placement& p, const SurfelFrame<double>& frame,
                           const Vec2<double>& ellipse_centre) const {
     Splat& splat = splats_[i];
@@ -212,7 +213,7 @@ class ProjectSurfel {
     return true;
   }
 
-  // A whole pixel near the point, not far outside the image.
+  // A whole pixel near the point, at most 64 pixels outside the image.
   TRACEFLOW_HD Vec2<double> anchor_near(const Vec2<double>& pixel) const {
     return {std::floor(std::clamp(pixel.x, -64.0, camera_.width + 64.0)),
             std::floor(std::clamp(pixel.y, -64.0, camera_.height + 64.0))};
@@ -247,7 +248,7 @@ class ProjectSurfel {
     splat.tint = surfels_.tint != nullptr ? surfels_.tint[i] : 0;
     const float carried = surfels_.carried != nullptr ? surfels_.carried[i] : 0;
     const float roughness = surfels_.roughness != nullptr ? surfels_.roughness[i] : 0;
-    // What is not finite stays so.
+    // The product keeps a value that is not finite.
     splat.signed_roughness = std::copysign(roughness + 0 * carried, carried != 0 ? -1.0F : 1.0F);
   }
 
@@ -264,7 +265,7 @@ class ProjectSurfel {
     if (!is_sound) s.ellipse_x = std::numeric_limits<float>::quiet_NaN();
   }
 
-  // A side of the image as a plane through the camera: what may be seen has plane · point ≥ 0.
+  // A side of the image as a plane through the camera: visible points have plane · point ≥ 0.
   struct Side {
     Vec3<double> plane;
     double norm;
@@ -285,7 +286,7 @@ class ProjectSurfel {
   double near_plane_;
   float alpha_min_;
   double log_alpha_min_;
-  int64_t by_centre_;  // yes or no, as a whole word: no padding that holds an old address
+  int64_t by_centre_;  // a bool; 64 bits avoid padding, which could hold a stale address
   double low_pass_;
   Splat* splats_;
   Bounds* bounds_;

@@ -14,7 +14,7 @@ constexpr int64_t surfels_per_block = 256;
 
 using CameraShare = CameraGradient<double>;
 
-// Per block of surfels first, then over the blocks.
+// Sums each block of surfels first, then the blocks.
 CameraShare run_on_cpu(const ProjectBackward& op, int64_t n) {
   std::vector<CameraShare> partial(static_cast<size_t>((n + surfels_per_block - 1) / surfels_per_block));
   parallel_blocks("raster: project backward", n, surfels_per_block, [&](int64_t begin, int64_t end) {
@@ -28,7 +28,7 @@ CameraShare run_on_cpu(const ProjectBackward& op, int64_t n) {
 
 CameraShare run_on_device(const ProjectBackward& op, int64_t n, bool wants_camera, const Saved& saved) {
   Tensor<CameraShare>& shares = saved.scratch.camera;
-  shares.place(Device::cuda).resize({wants_camera ? n + 1 : 0});  // the last is their sum
+  shares.place(Device::cuda).resize({wants_camera ? n + 1 : 0});  // the last element is their sum
   cuda_stage::add_tiles(saved);
   parallel_for(Device::cuda, "raster: project backward", n,
                ProjectBackwardStep{op, wants_camera ? shares.data() : nullptr});
@@ -36,7 +36,7 @@ CameraShare run_on_device(const ProjectBackward& op, int64_t n, bool wants_camer
   if (wants_camera) {
     ordered_sum<CameraShare>(Device::cuda, "raster: camera", n, CameraShareOf{shares.data()},
                              KeepCamera{shares.data() + n}, 1);
-    // The host waits: the pose is its own.
+    // The host waits for this copy because poses are stored on the host.
     memory::copy(Device::cpu, &total, Device::cuda, shares.data() + n, sizeof(total));
   }
   return total;

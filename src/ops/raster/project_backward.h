@@ -8,11 +8,11 @@
 #include "ops/raster/raster_kernels.h"
 #include "scene/surfel_views.h"
 
-// Backward pass of ProjectSurfel: from the sums over pixels to the gradients of the surfels and the camera's
-// pose.
+// Backward pass of ProjectSurfel: from the sums over pixels to the gradients of the surfels and of the
+// camera's pose.
 namespace traceflow::raster {
 
-// One surfel; on either device.
+// Processes one surfel, on either device.
 struct ProjectBackward {
   PosedSurfelsView surfels;
   Camera<double> camera;
@@ -21,11 +21,11 @@ struct ProjectBackward {
   const uint32_t* entry_begin;
   const uint16_t* touched;
   const SplatGradient* gradients;  // by entry
-  uint32_t max_tiles;              // a surfel of more entries has the sum of all in its first
+  uint32_t max_tiles;              // if a surfel has more entries, its first entry holds the sum of all
   MutablePosedSurfelsView to;
   float* screen_gradient;
 
-  // Sets the surfel's gradients and returns the camera's share.
+  // Sets the surfel's gradients and returns its contribution to the camera's gradient.
   TRACEFLOW_HD CameraGradient<double> run(int64_t i) const {
     prefetch_ahead(i + 8);
     clear(i);
@@ -58,7 +58,7 @@ struct ProjectBackward {
     screen_gradient[i] = 0;
   }
 
-  // Adds the tiles that blended the surfel, in their order; false if there is nothing to propagate.
+  // Adds up the tiles that blended the surfel, in order. Returns false if there is nothing to propagate.
   TRACEFLOW_HD bool add_tiles(int64_t i, SplatGradient& sums) const {
     const uint32_t begin = entry_begin[i];
     const uint32_t end = entry_begin[i + 1];
@@ -126,7 +126,7 @@ struct ProjectBackward {
             form(sums.w_x, sums.w_y, sums.w_1), sums.z_plane, 0};
   }
 
-  // Moving the projected centre by one pixel at constant depth moves the surfel by z/focal.
+  // A shift of the projected centre by one pixel at constant depth moves the surfel by z/focal.
   TRACEFLOW_HD float screen_gradient_of(const Vec3<double>& grad_position, double z) const {
     const Vec3<double> g = camera.camera_from_world * grad_position;
     const double x = g.x * z / camera.focal_x * camera.width / 2;
@@ -134,7 +134,7 @@ struct ProjectBackward {
     return static_cast<float>(std::sqrt(x * x + y * y));
   }
 
-  // Fills the gradient of the harmonics and returns that of the vector from the camera to the surfel.
+  // Sets the gradient of the harmonics. Returns the gradient of the vector from the camera to the surfel.
   TRACEFLOW_HD Vec3<double> colour_gradient(int64_t i, const Vec3<double>& from_camera,
                                             const SplatGradient& sums) const {
     const double distance = length(from_camera);
@@ -146,8 +146,8 @@ struct ProjectBackward {
   }
 };
 
-// Runs ProjectBackward for each surfel and keeps the surfel's share of the camera gradient where it is
-// wanted.
+// Runs ProjectBackward for each surfel. Stores the surfel's contribution to the camera's gradient if `camera`
+// is not null.
 struct ProjectBackwardStep {
   ProjectBackward op;
   CameraGradient<double>* camera;  // N, may be null
@@ -158,7 +158,7 @@ struct ProjectBackwardStep {
   }
 };
 
-// The sum of those.
+// Terms of the sum over the surfels' contributions.
 struct CameraShareOf {
   const CameraGradient<double>* camera;
   TRACEFLOW_HD CameraGradient<double> operator()(int64_t i) const { return camera[i]; }

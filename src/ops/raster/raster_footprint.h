@@ -4,24 +4,24 @@
 
 #include "ops/raster/raster_kernels.h"
 
-// A splat at one pixel: what the vector kernels of the CPU do for many (cpu/simd-inl.h), for devices with
-// a thread a pixel. Several kernels must come to the same decisions here: which tiles a splat is listed in,
-// which hits a pixel has. So every fused operation is written out; a compiler could else fuse differently
-// where it inlines.
+// Evaluates a splat at one pixel, for devices with one thread per pixel. The CPU's vector kernels do the same
+// for many pixels (cpu/simd-inl.h). Several kernels must make the same decisions here: which tiles list a
+// splat and which hits a pixel has. So every fused operation is explicit; otherwise the compiler could fuse
+// differently at each place of inlining.
 namespace traceflow::raster {
 
-// The smaller (larger) of two; the second where one is not a number.
+// The smaller (larger) of two numbers; the second if either is not a number.
 TRACEFLOW_HD inline float lower(float a, float b) { return a < b ? a : b; }
 TRACEFLOW_HD inline float higher(float a, float b) { return a > b ? a : b; }
 
-// Method §3.1, §3.2. Outside, z is still finite, u and v may be anything.
+// Method §3.1, §3.2. If `inside` is false, z is still finite, but u and v may be anything.
 struct PixelFootprint {
   float x, y;       // pixels from the anchor
   float dx, dy;     // pixels from the projected centre
   float nu, nv, w;  // u = nu/w, v = nv/w
   float inverse_w;
-  float opacity;  // o·G, before the clamp
-  bool on_plane;  // the plane's hit wins; elsewhere the low-pass
+  float opacity;  // o·G before the clamp
+  bool on_plane;  // the hit in the plane wins over the low-pass
   bool inside;    // o·G ≥ alpha_min
 
   TRACEFLOW_HD float z(const Splat& s) const { return on_plane ? s.z_plane * inverse_w : s.z_centre; }
@@ -30,7 +30,7 @@ struct PixelFootprint {
   }
 };
 
-// x, y: the pixel's centre. rho_per_pixel2: as in Saved.
+// x, y: centre of the pixel. rho_per_pixel2: as in Saved.
 TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y, float rho_per_pixel2) {
   PixelFootprint f;
   f.x = x - s.anchor_x;
@@ -50,8 +50,8 @@ TRACEFLOW_HD inline PixelFootprint footprint(const Splat& s, float x, float y, f
   return f;
 }
 
-// Whether a splat may reach the centre of a pixel in the rectangle of centres [low_x, high_x] × [low_y,
-// high_y]. Exact for the ellipse and the low-pass disk, up to a margin for rounding.
+// Returns whether a splat may cover a pixel centre in the rectangle [low_x, high_x] × [low_y, high_y]. Exact
+// for the ellipse and the low-pass disk, up to a margin for rounding.
 TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float high_x, float high_y,
                                  float rho_per_pixel2) {
   if (s.ellipse_x != s.ellipse_x) return true;
@@ -68,7 +68,7 @@ TRACEFLOW_HD inline bool reaches(const Splat& s, float low_x, float low_y, float
     const float w = std::fma(s.w_x, x, std::fma(s.w_y, y, s.w_1));
     return std::fma(nu, nu, nv * nv) <= rho * (w * w);
   };
-  // The convex form is lowest in a rectangle on the sides that face its centre.
+  // In a rectangle, the minimum of the convex form is on the sides that face its centre.
   const float side_x = clamp(s.ellipse_x, low_x, high_x);
   const float side_y = clamp(s.ellipse_y, low_y, high_y);
   const float on_side_x = std::fma(s.slope_y, side_x - s.ellipse_x, s.ellipse_y);

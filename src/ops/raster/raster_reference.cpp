@@ -12,7 +12,7 @@
 #include "math/surfel_projection.h"
 #include "ops/raster/raster.h"
 
-// The plain truth of method §3: double precision, every pixel against every surfel.
+// Reference implementation of method §3: double precision, every pixel against every surfel.
 namespace traceflow::raster {
 namespace {
 
@@ -20,41 +20,41 @@ using Surfels = BasicPosedSurfels<double>;
 using Vector2 = Vec2<double>;
 using Vector3 = Vec3<double>;
 
-// What of a surfel does not depend on the pixel.
+// The values of a surfel that do not depend on the pixel.
 struct Projected {
   bool drawn = false;
   SurfelFrame<double> frame;
-  Vector3 normal;  // turned to the camera
+  Vector3 normal;  // facing the camera
   double facing;   // +1 or -1: normal = facing · frame.rotation[2]
-  Vector3 centre;  // in camera axes
+  Vector3 centre;  // camera axes
   bool has_low_pass;
-  Vector2 pixel;      // the projected centre, where has_low_pass
+  Vector2 pixel;      // the projected centre, if has_low_pass
   Vector3 direction;  // unit, from the camera to the centre
   Vector3 colour;
   double opacity, tint, carried, roughness;
 };
 
-// A surfel met by a pixel's ray.
+// A hit of a pixel's ray with a surfel.
 struct Hit {
   int64_t surfel;
   double z;
-  bool on_plane;  // false where the low-pass wins
+  bool on_plane;  // false if the low-pass wins
   SurfelHit<double> plane;
   double gaussian;
   BlendAlpha<double> alpha;
 };
 
-// A hit as it was blended.
+// A blended hit.
 struct Blended {
   Hit hit;
-  double transmittance;  // before it
+  double transmittance;  // in front of it
   double weight;
-  double m;  // its depth in the distortion's measure
+  double m;  // its depth in the distortion
 };
 
 struct Pixel {
   std::vector<Blended> blended;  // front to back
-  double transmittance = 1;      // what remains
+  double transmittance = 1;      // remaining
   std::optional<size_t> median;
   double depth_sum = 0, m_sum = 0, m2_sum = 0;
 
@@ -76,7 +76,7 @@ class Scene {
 
   const Projected& projected(int64_t i) const { return projected_[static_cast<size_t>(i)]; }
   int sh_degree() const { return traceflow::sh_degree(surfels_.sh.dim(1)); }
-  // Of the low-pass, over the squared distance in pixels.
+  // ρ of the low-pass divided by the squared distance in pixels.
   double rho_per_pixel2() const { return 2 / (double{options_.low_pass} * options_.low_pass); }
 
   Pixel blend(const Vector2& pixel) const {
@@ -132,8 +132,9 @@ class Scene {
     return p;
   }
 
-  // Method §3.1 and §3.2. A plane hit in front of the near plane counts by its distance in the surfel; the
-  // projected centre by its distance on the screen; the nearer wins.
+  // Method §3.1 and §3.2. The candidates are the hit in the plane, if it is beyond the near plane, and the
+  // projected centre. The one with the smaller ρ wins: the distance in the surfel or the distance on the
+  // screen.
   std::optional<Hit> hit_at(const Vector2& pixel, int64_t i) const {
     const Projected& p = projected(i);
     if (!p.drawn) return std::nullopt;
@@ -216,7 +217,7 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
   output.median_depth[index] = pixel.median ? pixel.blended[*pixel.median].hit.z : 0;
 }
 
-// dL/doutput at one pixel; an absent tensor means zero.
+// dL/doutput at one pixel. An empty tensor means zero.
 struct PixelGradient {
   Vector3 colour{0.0}, normal{0.0};
   double alpha = 0, tint = 0, silhouette = 0, roughness = 0, depth = 0, median_depth = 0, distortion = 0;
@@ -234,7 +235,7 @@ struct PixelGradient {
   }
 };
 
-// dL/d what of a surfel does not depend on the pixel.
+// dL/d(values of a surfel that do not depend on the pixel).
 struct ProjectedGradient {
   SurfelHitGradient<double> frame;
   Vector3 normal{0.0}, colour{0.0}, centre{0.0};
@@ -255,7 +256,7 @@ class Backward {
 
   void add_pixel(const Vector2& position, const PixelGradient& g) {
     const Pixel pixel = scene_.blend(position);
-    double behind = 0;  // Σ over the hits behind of w · dL/dw
+    double behind = 0;  // Σ w · dL/dw over the hits behind
     for (size_t i = pixel.blended.size(); i-- > 0;) {
       const Blended& b = pixel.blended[i];
       const double own = weight_gradient(pixel, b, g);
@@ -298,7 +299,7 @@ class Backward {
     to.roughness += b.weight * g.roughness;
   }
 
-  // From dL/d(o·G) and dL/dz of one hit.
+  // Propagates dL/d(o·G) and dL/dz of one hit.
   void add_hit(const Vector2& position, const Hit& hit, double grad_raw, double grad_z) {
     const Projected& p = scene_.projected(hit.surfel);
     ProjectedGradient& to = projected_[static_cast<size_t>(hit.surfel)];
@@ -316,7 +317,7 @@ class Backward {
     to.frame.rotation += g.rotation;
     to.frame.scale += g.scale;
     gradient_.camera.position += g.origin;
-    // direction = ray · camera_from_world, a row vector
+    // direction = ray · camera_from_world, with ray as a row vector
     gradient_.camera.camera_from_world +=
         outerProduct(camera_.ray_in_camera(position.x, position.y), g.direction);
   }

@@ -4,7 +4,7 @@
 
 #include "math/types.h"
 
-// The steps of shading, one traced pixel each.
+// The steps of shading, for one traced pixel.
 namespace traceflow::shade {
 
 template <class T>

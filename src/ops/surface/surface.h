@@ -4,27 +4,27 @@
 #include "base/tensor.h"
 #include "math/camera.h"
 
-// From depth and normals to the surface that light is reflected at (method §4). Every step runs where its
-// pictures are.
+// From depths and normals to the surface that reflects light (method §4). Every step runs on the device of
+// its images.
 namespace traceflow::surface {
 
 // Pseudo-normals (method §4.1, §4.2): surface depth z = (1−ρ)·expected + ρ·median, points x = eye + z·ray,
-// normal = normalised(∂x/∂v × ∂x/∂u) by central differences, which faces the camera. Zero on the one-pixel
-// border, where alpha is 0 at the pixel or one of its four neighbours, and where the cross product vanishes
-// or is not finite. depth, median_depth, alpha: H×W. normal: H×W×3, world axes, resized. Differentiable: both
-// depths, the camera pose.
+// normal = normalised(∂x/∂v × ∂x/∂u) by central differences. The normal faces the camera. It is zero on the
+// one-pixel border, where alpha is 0 at the pixel or at one of its four neighbours, and where the cross
+// product vanishes or is not finite. depth, median_depth, alpha: H×W. normal: H×W×3, world axes, resized.
+// Differentiable by both depths and by the camera's pose.
 template <class T>
 void pseudo_normals(const Camera<T>& camera, const Tensor<T>& depth, const Tensor<T>& median_depth,
                     const Tensor<T>& alpha, T depth_ratio, Tensor<T>& normal);
-// Adds to grad_depth, grad_median_depth (H×W) and, unless it is null, grad_camera. A pixel whose own gradient
-// is not finite passes none on.
+// Adds to grad_depth, grad_median_depth (H×W) and, unless it is null, grad_camera. A pixel whose gradient is
+// not finite adds nothing.
 template <class T>
 void pseudo_normals_backward(const Camera<T>& camera, const Tensor<T>& depth, const Tensor<T>& median_depth,
                              const Tensor<T>& alpha, T depth_ratio, const Tensor<T>& grad_normal,
                              Tensor<T>& grad_depth, Tensor<T>& grad_median_depth,
                              CameraGradient<T>* grad_camera);
 
-// Which pixels are traced (method §4.4), ascending, and the weight of each one's gradient.
+// The pixels to trace (method §4.4), ascending, and the weight of each pixel's gradient.
 struct TracedPixels {
   Tensor<int32_t> pixel;  // row-major index
   Tensor<float> weight;   // 1, or 1/share for pixels drawn at random
@@ -45,9 +45,9 @@ struct SelectOptions {
   void validate() const;
 };
 
-// Pixels that matter, and of the rest (with alpha above the threshold and a non-zero normal) a share drawn by
-// a hash of (seed, pixel). probes false: rendering, no random pixels. A pixel whose normal is zero or not
-// finite is never traced. The lists lie where alpha does; their memory is kept.
+// Selects the pixels above both thresholds, and a random share of those that fail the tint alone, by a hash
+// of (seed, pixel). probes: false when rendering, which selects no random pixels. Pixels whose normal is zero
+// or not finite are never selected. The lists are on the device of alpha; their memory is reused.
 void select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint, const Tensor<float>& normal,
                    const SelectOptions& options, bool probes, uint64_t seed, TracedPixels& traced);
 inline TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint,
@@ -58,16 +58,16 @@ inline TracedPixels select_pixels(const Tensor<float>& alpha, const Tensor<float
   return traced;
 }
 
-// Mirrored rays (method §4.3) of the listed pixels: origin = surface point, direction = d − 2(d·n̂)n̂ of unit
-// length, n̂ the blended normal normalised. origins, directions: P×3, world, resized. Differentiable: both
-// depths, normal, camera pose. Where the normal is zero or something is not finite the direction is zero,
-// which every tracer answers with its background.
+// Reflected rays (method §4.3) of the listed pixels: origin = surface point, direction = d − 2(d·n̂)n̂ of
+// unit length, with n̂ the normalised blended normal. origins, directions: P×3, world, resized.
+// Differentiable by both depths, the normal and the camera's pose. The direction is zero if the normal is
+// zero or a value is not finite; every tracer returns its background for it.
 template <class T>
 void reflection_rays(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
                      const Tensor<T>& median_depth, const Tensor<T>& normal, T depth_ratio,
                      Tensor<T>& origins, Tensor<T>& directions);
 // Adds to grad_depth, grad_median_depth, grad_normal and, unless it is null, grad_camera. A ray whose
-// gradient is not finite passes none on.
+// gradient is not finite adds nothing.
 template <class T>
 void reflection_rays_backward(const Camera<T>& camera, const Tensor<int32_t>& pixels, const Tensor<T>& depth,
                               const Tensor<T>& median_depth, const Tensor<T>& normal, T depth_ratio,

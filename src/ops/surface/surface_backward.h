@@ -6,8 +6,8 @@
 
 namespace traceflow::surface {
 
-// step(i) for every i in [0, n) on the CUDA device, where the camera's gradient is summed up only for those
-// who want it. The host waits for it: poses live there.
+// Runs step(i) for every i in [0, n) on the CUDA device. Sums the camera's gradient only if it is wanted. The
+// host waits for that sum, because poses are stored on the host.
 template <class T, class Step>
 void backward_on_device(const char* description, int64_t n, const Step& step,
                         CameraGradient<T>* grad_camera) {

@@ -2,9 +2,9 @@
 #include "ops/surface/surface.h"
 #include "ops/surface/surface_backward.h"
 
-// Pseudo-normals. On the CPU both passes go by bands of rows. A band back-projects its own rows and the
-// neighbours that it needs into memory of its own, so bands are independent. The backward pass gathers: a
-// pixel collects from the four normals that it took part in, and no two threads write to one place.
+// Pseudo-normals. On the CPU both passes process bands of rows. A band back-projects its own rows and the
+// neighbouring rows that it needs to its own memory, so bands are independent. The backward pass gathers: a
+// pixel sums over the four normals that it contributes to, so no two threads write to the same address.
 namespace traceflow::surface {
 
 namespace {
@@ -20,7 +20,7 @@ DepthImage<T> checked(const Camera<T>& camera, const Tensor<T>& depth, const Ten
   return {camera, depth.data(), median_depth.data(), alpha.data(), depth_ratio};
 }
 
-// Rows [first, last) of a picture of vectors, addressed by their row in the whole picture.
+// Rows [first, last) of an image of vectors, addressed by their row in the whole image.
 template <class T>
 class RowBand {
  public:

@@ -9,11 +9,11 @@
 #include "math/pseudo_normal.h"
 #include "math/reflection.h"
 
-// What the surface ops share, and their steps for one pixel or ray. Cameras travel by value.
+// Shared definitions of the surface ops, and their steps for one pixel or ray. Cameras are passed by value.
 namespace traceflow::surface {
 
-// The median's share of the depth. There is none (0) where the transmittance never falls to a half: what was
-// drawn there has the expected depth alone.
+// The weight of the median depth. It is 0 where there is no median depth, because the transmittance does not
+// fall to one half; only the expected depth counts there.
 template <class T>
 TRACEFLOW_HD T median_share(T median, T depth_ratio) {
   return median > T(0) ? depth_ratio : T(0);
@@ -46,7 +46,7 @@ struct CameraSum : CameraGradient<T> {
   }
 };
 
-// The camera's share of dL/d(ray) of one pixel.
+// Adds one pixel's dL/d(ray) to the camera's gradient.
 template <class T>
 TRACEFLOW_HD void add_ray_gradient(const Camera<T>& camera, int64_t row, int64_t column,
                                    const Vec3<T>& grad_ray, CameraSum<T>& gradient) {
@@ -54,7 +54,7 @@ TRACEFLOW_HD void add_ray_gradient(const Camera<T>& camera, int64_t row, int64_t
   gradient.camera_from_world += glm::outerProduct(ray, grad_ray);
 }
 
-// The camera's share of dL/dx for the point x = eye + z·ray of one pixel.
+// Adds one pixel's dL/dx, for the point x = eye + z·ray, to the camera's gradient.
 template <class T>
 TRACEFLOW_HD void add_point_gradient(const Camera<T>& camera, int64_t row, int64_t column, T z,
                                      const Vec3<T>& grad_point, CameraSum<T>& gradient) {
@@ -62,7 +62,7 @@ TRACEFLOW_HD void add_point_gradient(const Camera<T>& camera, int64_t row, int64
   gradient.position += grad_point;
 }
 
-// Partial gradients of blocks, added in block order.
+// Adds the partial gradients of blocks, in block order.
 template <class T>
 void add_in_order(const std::vector<CameraSum<T>>& partial, CameraGradient<T>& gradient) {
   CameraSum<T> total;
@@ -71,7 +71,7 @@ void add_in_order(const std::vector<CameraSum<T>>& partial, CameraGradient<T>& g
   gradient.position += total.position;
 }
 
-// H×W inputs seen as one picture of points.
+// H×W inputs as one image of points.
 template <class T>
 struct DepthImage {
   Camera<T> camera;
@@ -84,13 +84,13 @@ struct DepthImage {
     const int64_t i = row * camera.width + column;
     return surface_depth(depth[i], median_depth[i], depth_ratio);
   }
-  // Not a number where nothing was drawn: every normal that touches such a point then vanishes by itself.
-  // Relative to the eye, which differences do not see.
+  // Relative to the eye, since normals depend only on differences. NaN where nothing was drawn, so that every
+  // normal that uses the point becomes zero.
   TRACEFLOW_HD Vec3<T> point(int64_t row, int64_t column) const {
     return alpha[row * camera.width + column] > T(0) ? z(row, column) * pixel_ray(camera, row, column)
                                                      : Vec3<T>(std::numeric_limits<T>::quiet_NaN());
   }
-  // Whether a pixel has all its neighbours and something was drawn at it.
+  // Returns whether a pixel is off the border and something was drawn at it.
   TRACEFLOW_HD bool may_have_normal(int64_t row, int64_t column) const {
     return row > 0 && row < height() - 1 && column > 0 && column < width() - 1 &&
            is_finite(point(row, column));
@@ -117,7 +117,7 @@ struct PseudoNormals {
   }
 };
 
-// A pixel collects from the four normals that it took part in.
+// A pixel sums over the four normals that it contributes to.
 template <class T>
 struct PseudoNormalsBackward {
   DepthImage<T> image;
@@ -142,7 +142,7 @@ struct PseudoNormalsBackward {
     return camera;
   }
 
-  // Zero on the border and beyond it, and where there is no normal.
+  // Zero on the border and outside the image, and where there is no normal.
   TRACEFLOW_HD PseudoNormalGradient<T> of_normal(int64_t row, int64_t column) const {
     if (!image.may_have_normal(row, column)) return {};
     const auto gradient =
@@ -153,7 +153,7 @@ struct PseudoNormalsBackward {
   }
 };
 
-// What mirrored rays are made of.
+// The input of reflected rays.
 template <class T>
 struct Mirror {
   Camera<T> camera;
@@ -216,7 +216,7 @@ struct ReflectionRaysBackward {
   }
 };
 
-// A number in [0, 1) that depends on nothing but the seed and the pixel (the finaliser of splitmix64).
+// A pseudo-random number in [0, 1) that depends only on the seed and the pixel (the finaliser of splitmix64).
 TRACEFLOW_HD inline double hashed_uniform(uint64_t seed, int64_t pixel) {
   uint64_t z = seed + 0x9E3779B97F4A7C15ULL * (static_cast<uint64_t>(pixel) + 1);
   z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
@@ -246,7 +246,7 @@ struct IsTraced {
   TRACEFLOW_HD bool operator()(int64_t pixel) const { return weight(pixel) != 0; }
 };
 
-// The weights of the pixels that are listed.
+// The weights of the listed pixels.
 struct ListedWeight {
   TraceWeight weight;
   const int32_t* pixel;
@@ -254,7 +254,7 @@ struct ListedWeight {
   TRACEFLOW_HD void operator()(int64_t k) const { listed[k] = weight(pixel[k]); }
 };
 
-// Puts a camera's gradient where the host fetches it.
+// Stores a camera's gradient for the host to read.
 template <class T>
 struct KeepCamera {
   CameraSum<T>* kept;

@@ -19,7 +19,7 @@ void select_pixels(const Tensor<float>& alpha, const Tensor<float>& tint, const 
   const Device device = alpha.device();
   list_where(device, "surface: traced pixels", alpha.size(), IsTraced{weight}, traced.pixel);
   const int64_t count = traced.pixel.size();
-  if (device != Device::cpu) traced.weight.place(device).resize({alpha.size()});  // room for all, as the list
+  if (device != Device::cpu) traced.weight.place(device).resize({alpha.size()});  // same capacity as the list
   traced.weight.place(device).resize({count});
   parallel_for(device, "surface: weights of traced pixels", count,
                ListedWeight{weight, traced.pixel.data(), traced.weight.data()});

@@ -9,7 +9,7 @@ namespace traceflow::trace {
 
 namespace {
 
-// Those that the blocks' hits name, ascending.
+// The surfels that the blocks' hits refer to, ascending.
 std::vector<uint32_t> list_surfels(std::span<const SavedBlock> blocks, int64_t surfels) {
   constexpr size_t word_bits = 64;
   std::vector<uint64_t> hit(static_cast<size_t>(surfels) / word_bits + 1, 0);

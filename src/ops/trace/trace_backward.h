@@ -6,15 +6,15 @@
 
 #include "ops/trace/trace_kernels.h"
 
-// The backward pass takes blocks of rays in groups. Each hit of a group adds what it does to its surfel to
-// the group's own sums, few enough to stay in the cache; then a surfel's sums are added up in the order of
-// the groups.
+// The backward pass processes blocks of rays in groups. Each hit adds its contribution to its surfel's sums
+// of the group, which are few enough to stay in the cache. Then each surfel's sums are added over the groups,
+// in order.
 namespace traceflow::trace {
 
 inline constexpr size_t blocks_per_group = 4;
-inline constexpr size_t floats_per_chunk = 1 << 24;  // of sums that are held at a time
+inline constexpr size_t floats_per_chunk = 1 << 24;  // sums kept in memory at once
 
-// A surfel as the backward pass needs it.
+// The data of a surfel that the backward pass reads.
 struct alignas(64) BackwardFrame {
   Vec3<float> position, t_u, t_v, normal;
   Vec2<float> inverse_scale;
@@ -22,7 +22,7 @@ struct alignas(64) BackwardFrame {
   float unused;
 };
 
-// Surfel i of a set.
+// Sets the frame of surfel i.
 struct MakeFrame {
   SurfelView<float> surfels;
   BackwardFrame* frames;
@@ -39,8 +39,8 @@ struct MakeFrame {
   }
 };
 
-// What hits do to their surfel, geometry in the surfel's own frame: the sums of these turn into the surfel's
-// gradients once, at the end.
+// Indices of the contributions of hits to a surfel. Geometry is in the surfel's own frame, so that the sums
+// are converted to the surfel's gradients only once, at the end.
 namespace part {
 inline constexpr size_t position = 0;  // along t_u, t_v, n
 inline constexpr size_t turn = 3;      // by a small rotation about t_u, t_v, n
@@ -55,7 +55,7 @@ struct alignas(64) SurfelSums {
   float value[part::padded];
 };
 
-// Turns the sums of all hits of surfel i into gradients: sets all but dL/dsh, which is a sum itself.
+// Converts the sums over all hits of surfel i to gradients. Sets all but dL/dsh, which is summed directly.
 struct FinishSurfel {
   SurfelView<float> surfels;
   const BackwardFrame* frames;
@@ -79,10 +79,11 @@ struct FinishSurfel {
     const float* turned = sum + part::turn;
     Vec3<float> moved(0);
     Vec4<float> q(0);
-    // What has no hits may have a frame that is not finite.
+    // A surfel without hits may have a frame that is not finite.
     if (p[0] != 0 || p[1] != 0 || p[2] != 0) {
       moved = p[0] * f.t_u + p[1] * f.t_v + p[2] * f.normal;
-      // A rotation's gradient that has these turns: its other components do not matter to a unit quaternion.
+      // A gradient of the rotation matrix with these derivatives by small rotations. Its other components do
+      // not affect a unit quaternion.
       const Mat3<float> turn(turned[2] * f.t_v - turned[1] * f.normal, turned[0] * f.normal, Vec3<float>(0));
       q = rotation_from_quaternion_backward(load4<float>(surfels.rotation + 4 * i), turn);
     }
@@ -90,25 +91,27 @@ struct FinishSurfel {
     for (int k = 0; k < 4; ++k) rotation[4 * i + k] = q[k];
     for (int k = 0; k < 2; ++k) scale[2 * i + k] = sum[part::scale + static_cast<size_t>(k)];
     opacity[i] = sum[part::opacity];
-    // The frame's axes are unit and upright on each other.
+    // The frame's axes are orthonormal, so the norm is that in world axes.
     signal[i] = glm::length(load3<float>(sum + part::signal));
   }
 };
 
-// dL/d of a ray by the places of its hits; that to the direction as a change of a unit vector.
+// dL/d(ray) through the geometry of its hits. `direction` is the derivative by a unit vector.
 struct RayPull {
   Vec3<float> origin{0}, direction{0};
   float width = 0;
 };
 
-// dL/d(caller's direction) = from the unit direction, and from the distance, which is in units of its length.
+// dL/d(caller's direction), from the gradient by the unit direction and from that by the distance, which is
+// in units of the direction's length.
 TRACEFLOW_HD inline Vec3<float> direction_backward(const UnitRay& ray, const Vec3<float>& grad_unit,
                                                    float grad_distance, float distance) {
   const Vec3<float> tangential = grad_unit - dot(grad_unit, ray.direction) * ray.direction;
   return (tangential - grad_distance * distance * ray.direction) / ray.length;
 }
 
-// In a group a surfel's row of sums: the parts, then dL/dsh in vectors, each of whole coefficients.
+// The length of a surfel's row of sums in a group: the contributions, then dL/dsh padded to vectors, each of
+// whole coefficients.
 inline constexpr size_t row_floats(int64_t coefficients) {
   return part::padded + 16 * static_cast<size_t>((coefficients + 3) / 4);
 }
@@ -116,7 +119,7 @@ inline constexpr size_t row_floats(int64_t coefficients) {
 // The blocks of rays [first_block, last_block).
 struct Group {
   size_t first_block = 0, last_block = 0;
-  std::vector<uint32_t> surfels;  // those hit, ascending
+  std::vector<uint32_t> surfels;  // surfels that were hit, ascending
 };
 
 std::vector<Group> make_groups(const Saved& saved, int64_t surfels);
@@ -130,7 +133,7 @@ struct BackwardInput {
   const Saved& saved;
 };
 
-// One group: sets its rows, one for each of its surfels, and its rays' gradients.
+// Processes one group: sets its rows, one per surfel, and the gradients of its rays.
 struct BackwardGroup {
   const BackwardInput& input;
   const Group& group;
@@ -138,17 +141,17 @@ struct BackwardGroup {
   InputGradient& gradient;
 };
 
-// Adds the rows of a surfel in some groups to its sums and to dL/dsh, for surfels [begin, end).
+// Adds the rows of surfels [begin, end) in some groups to their sums and to dL/dsh.
 struct BackwardSums {
   std::span<const Group> groups;
-  const float* rows;  // of the first group; those of the others follow
+  const float* rows;  // of the first group; rows of the others follow
   int64_t begin, end;
   std::vector<SurfelSums>& sums;
   Tensor<float>& sh;
 };
 
 std::vector<BackwardFrame> make_backward_frames(const PosedSurfels& surfels);
-// Turns the sums of all hits into gradients of the surfels.
+// Converts the sums over all hits to gradients of the surfels.
 void finish_surfels(const PosedSurfels& surfels, const std::vector<BackwardFrame>& frames,
                     const std::vector<SurfelSums>& sums, InputGradient& gradient);
 

@@ -7,16 +7,16 @@
 
 #include "ops/trace/trace.h"
 
-// What the tracer walks: nodes of 16 boxes above leaves of 16 disks, each held coordinate by coordinate, so
-// that a ray meets 16 boxes or 16 disks at once.
+// The tree that the tracer traverses: nodes of 16 boxes above leaves of 16 disks. Each coordinate is a
+// separate array, so that a ray is tested against 16 boxes or 16 disks at once.
 namespace traceflow::trace {
 
 inline constexpr int bvh_width = 16;
 
-// No hit lies farther. Less than infinity, where the boxes of unused children are.
+// Hits beyond this distance are ignored. Less than infinity, where the boxes of unused children are.
 inline constexpr float farthest_distance = 1e30F;
 
-// A child is a node or a leaf, told apart by the top bit.
+// A child is a node or a leaf; the top bit is set for a leaf.
 inline constexpr uint32_t leaf_bit = 0x80000000U;
 
 struct alignas(64) BvhNode {
@@ -31,12 +31,13 @@ struct alignas(64) BvhLeaf {
   float v[3][bvh_width];  // t_v / scale
   float normal[3][bvh_width];
   float log_opacity[bvh_width];  // -inf in an unused slot
-  float radius[bvh_width];       // of a sphere around the disk; scene units
+  float radius[bvh_width];       // of a bounding sphere; scene units
   uint32_t surfel[bvh_width];
-  float lower[3], upper[3];  // the box of all
+  float lower[3], upper[3];  // the bounding box of all disks
 };
 
-// Depth at which the builder turns to halving, and the most entries that a walk then has waiting.
+// The depth at which the builder starts to halve, the largest depth, and the largest number of entries on the
+// stack of a traversal.
 inline constexpr int bvh_max_free_depth = 40;
 inline constexpr int bvh_max_depth = bvh_max_free_depth + 28;
 inline constexpr int bvh_stack = bvh_max_depth * (bvh_width - 1) + 1;
@@ -47,12 +48,12 @@ struct Tree;
 
 class Bvh {
  public:
-  // Empty where no surfel can be hit; node 0 is the root.
+  // Empty if no surfel can be hit. Node 0 is the root.
   std::vector<BvhNode> nodes;
   std::vector<BvhLeaf> leaves;
-  int64_t surfels = 0;  // of the set that it was built from
-  float leaf_size = 0;  // of a typical leaf: half its box's diagonal; scene units
-  // In the place of all that where it was built on the CUDA device. Shared with what backward traces again.
+  int64_t surfels = 0;  // size of the set that it was built from
+  float leaf_size = 0;  // of a typical leaf: half the diagonal of its box; scene units
+  // Replaces all of the above if built on the CUDA device. Shared with backward(), which may trace again.
   std::shared_ptr<cuda::Tree> on_device;
 };
 

@@ -6,11 +6,11 @@
 
 namespace traceflow::trace {
 
-// The box around a disk.
+// The bounding box of a disk.
 struct DiskBox {
   Vec3<float> lower, upper;
 
-  // Larger boxes would overflow where areas and centres are computed.
+  // Larger boxes would overflow when areas and centres are computed.
   TRACEFLOW_HD bool is_bounded() const {
     constexpr float limit = 1e15F;
     for (int axis = 0; axis < 3; ++axis) {
@@ -20,13 +20,13 @@ struct DiskBox {
   }
 };
 
-// Of an ellipse with half axes a t_u and b t_v, `radius` standard deviations each. Wider by what rounding may
-// move a hit.
+// The box of an ellipse with half axes along t_u and t_v of `radius` standard deviations each. Enlarged by
+// the rounding error of a hit.
 TRACEFLOW_HD inline DiskBox disk_box(const SurfelFrame<float>& surfel, float radius) {
   const Vec3<float> a = radius * surfel.scale.x * surfel.rotation[0];
   const Vec3<float> b = radius * surfel.scale.y * surfel.rotation[1];
   const float extent = std::fmax(glm::length(a), glm::length(b));
-  constexpr float vanishing = 1e-18F;  // lengths under this have squares of 0
+  constexpr float vanishing = 1e-18F;  // shorter lengths have squares of 0
   DiskBox box;
   for (int axis = 0; axis < 3; ++axis) {
     const float centre = surfel.position[axis];

@@ -23,7 +23,7 @@ uint32_t name(const Hits& hits, size_t i, const uint32_t* names) {
 }  // namespace
 
 void Hits::grow(size_t wanted) {
-  // All is made before anything is replaced: hits outlive a ray for which there was no memory.
+  // Allocates everything before it replaces anything, so that hits survive if memory runs out.
   const size_t capacity = std::max(wanted, 2 * capacity_);
   Tensor<float> larger_distances = larger(distances_, capacity, count),
                 larger_alphas = larger(alphas_, capacity, count);
@@ -47,7 +47,7 @@ void swap(Hits& a, Hits& b) noexcept {
   std::swap(a.capacity_, b.capacity_);
 }
 
-// Ranks add up to what 0, 1, 2, … do where they all differ, else to less.
+// The ranks sum to 0 + 1 + 2 + … if they all differ, and to less otherwise.
 bool HitSorter::place(const uint32_t* rank, Hits& hits) {
   const size_t n = hits.count;
   sorted_.count = 0;
@@ -67,7 +67,7 @@ bool HitSorter::place(const uint32_t* rank, Hits& hits) {
   return true;
 }
 
-// Distances are not negative, so their bits order as they do.
+// Distances are not negative, so their bits have the same order.
 void HitSorter::sort_many(Hits& hits, const uint32_t* names) {
   const size_t n = hits.count;
   keys_.resize({static_cast<int64_t>(2 * n)});

@@ -6,11 +6,11 @@
 
 namespace traceflow::trace {
 
-// The hits of one ray while it is traced. Arrays apart, with room for a vector beyond the last.
+// The hits of one ray while it is traced. Separate arrays, with room for one vector past the end.
 struct Hits {
   float* distance = nullptr;
   float* alpha = nullptr;
-  uint32_t* surfel = nullptr;  // or whatever stands for one
+  uint32_t* surfel = nullptr;  // or another index of a surfel
   size_t count = 0;
 
   void push(float t, float a, uint32_t s) {
@@ -33,16 +33,16 @@ struct Hits {
   size_t capacity_ = 0;
 };
 
-// Puts hits in order of distance, those of equal distance in order of surfel.
+// Sorts hits by distance, ties by surfel.
 class HitSorter {
  public:
-  // Up to so many hits each is placed by counting the ones before it.
+  // Up to this many hits are sorted by rank: each is placed by counting the hits before it.
   static constexpr size_t most_ranked = 192;
 
-  // Puts each hit at its rank, which is the number of nearer ones. False, and nothing is done, where two hits
-  // have one distance and so one rank.
+  // Moves each hit to its rank, the number of nearer hits. Returns false and changes nothing if two hits have
+  // the same distance and thus the same rank.
   bool place(const uint32_t* rank, Hits& hits);
-  // `names`: the surfel of what each hit names, null where hits name surfels.
+  // `names` maps the `surfel` of a hit to a surfel; null if hits store surfels.
   void sort_many(Hits& hits, const uint32_t* names);
 
  private:

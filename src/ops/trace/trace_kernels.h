@@ -12,19 +12,19 @@
 #include "ops/trace/trace_order.h"
 #include "ops/trace/trace_usable.h"
 
-// What the tracer's forward and backward passes share.
+// Shared definitions of the tracer's forward and backward passes.
 namespace traceflow::trace {
 
 inline constexpr int64_t rays_per_block = 256;
 
-// The hits of a block of rays as they were blended, ray after ray in the tracer's order, front to back.
+// The blended hits of a block of rays: ray after ray in the tracer's order, front to back in each ray.
 struct SavedBlock {
   std::vector<uint32_t> surfel;
   std::vector<float> distance;  // scene units
   std::vector<float> alpha;
-  std::vector<uint32_t> ray_end;  // of each ray of the block, where its hits end
+  std::vector<uint32_t> ray_end;  // the end of each ray's hits
 
-  // `names` as in HitSorter.
+  // `names`: as in HitSorter.
   void append(const Hits& hits, size_t count, const uint32_t* names) {
     const size_t before = surfel.size();
     surfel.insert(surfel.end(), hits.surfel, hits.surfel + count);
@@ -50,7 +50,7 @@ struct Saved {
   RayOrder order;
   std::vector<SavedBlock> blocks;
   std::shared_ptr<cuda::SavedHits> on_device;
-  int64_t device_bytes = int64_t{1} << 30;  // that the lists on the device may take
+  int64_t device_bytes = int64_t{1} << 30;  // limit for the lists on the device
 };
 
 // One block of rays of a forward pass.
@@ -60,12 +60,12 @@ struct BlockTask {
   const Rays& rays;
   const Options& options;
   const RayOrder& order;
-  int64_t begin, end;  // in that order
+  int64_t begin, end;  // range in that order
   Output& output;
   SavedBlock* saved;  // may be null
 };
 
-// A ray as it is traced: its direction of unit length, so that t is a distance.
+// A ray with a unit direction, so that t is a distance.
 struct UnitRay {
   Vec3<float> origin{0};
   Vec3<float> direction{0};
@@ -73,14 +73,14 @@ struct UnitRay {
   float width = 0;   // of its cone, at distance 1
 };
 
-// Standard deviations at which a Gaussian of opacity 1 falls to alpha_min, with a margin for rounding. A cone
-// can only hit a surfel that its axis passes within this many of the surfel's standard deviation plus its
-// own.
+// The number of standard deviations at which a Gaussian of opacity 1 falls to alpha_min, with a margin for
+// rounding. A cone can hit a surfel only if its axis passes within this multiple of the surfel's standard
+// deviation plus the cone's.
 inline float cone_deviations(const Options& o) {
   return 1.001F * std::sqrt(std::fmax(0.0F, -2 * std::log(o.alpha_min)));
 }
 
-// Addresses of rays, on any device. widths: null where all are 0.
+// Addresses of rays, on either device. widths: null if all are 0.
 struct RayView {
   const float *origins = nullptr, *directions = nullptr, *widths = nullptr;
 
@@ -91,7 +91,8 @@ struct RayView {
         widths(rays.widths.empty() ? nullptr : rays.widths.data()) {}
 };
 
-// False for a ray that sees the background only. Scales first, so that no square over- or underflows.
+// Returns false for a ray that gets only the background. Scales first, so that no square overflows or
+// underflows.
 TRACEFLOW_HD inline bool make_unit_ray(const RayView& rays, int64_t i, UnitRay& ray) {
   const float *origin = rays.origins + 3 * i, *direction = rays.directions + 3 * i;
   const float width = rays.widths != nullptr ? rays.widths[i] : 0;
@@ -104,7 +105,7 @@ TRACEFLOW_HD inline bool make_unit_ray(const RayView& rays, int64_t i, UnitRay& 
   return std::isfinite(ray.length);
 }
 
-// The SH basis of a direction, padded with zeros so that vectors may be loaded from any coefficient on.
+// The SH basis of a direction, padded with zeros so that a vector can be loaded from any coefficient on.
 inline constexpr int padded_basis = 32;
 inline void padded_sh_basis(int degree, const Vec3<float>& direction, float* basis) {
   std::fill_n(basis, padded_basis, 0.0F);

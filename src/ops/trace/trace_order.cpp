@@ -24,7 +24,7 @@ Vec3<float> median(std::vector<Vec3<float>> points) {
   return result;
 }
 
-// Medians of samples: neither stray rays nor stray surfels move them.
+// Medians of samples, which outliers among rays and surfels do not affect.
 Vec3<float> typical_origin(const Rays& rays) {
   constexpr int64_t samples = 1000;
   std::vector<Vec3<float>> points;
@@ -71,17 +71,18 @@ void radix_sort(std::vector<Keyed>& items) {
   }
 }
 
-// The curve leaps: within a section rays are grouped anew, so that those of a packet lie close together.
+// The curve has jumps. So the rays of a section are grouped again, to keep the rays of a packet close
+// together.
 constexpr int64_t section_rays = 1024;
-constexpr int64_t group_rays = 16;  // a multiple of every packet's size
+constexpr int64_t group_rays = 16;  // a multiple of the size of every packet
 
-// Where a ray starts and where it is at the surfels.
+// The position of a ray at its origin and at the typical distance of the surfels.
 struct Way {
   float at[6];
   uint32_t ray;
 };
 
-// Cuts at the median of the widest coordinate until a group is left.
+// Cuts at the median of the widest coordinate until one group remains.
 void group_ways(Way* begin, Way* end) {
   const int64_t groups = (end - begin + group_rays - 1) / group_rays;
   if (groups <= 1) return;
@@ -107,7 +108,7 @@ void group_ways(Way* begin, Way* end) {
 }
 
 void group_section(const RayView& rays, float sample_distance, uint32_t* begin, uint32_t* end) {
-  constexpr float origin_weight = 0.3F;  // the beam is thick at one end only
+  constexpr float origin_weight = 0.3F;  // a beam is wide at one end only
   std::array<Way, section_rays> ways;
   Way* last = ways.data();
   for (const uint32_t* ray = begin; ray != end; ++ray) {

@@ -7,13 +7,13 @@
 
 namespace traceflow::trace {
 
-// Rays in an order in which neighbours go the same way, whatever order they came in.
+// An order of rays in which neighbours have similar paths, whatever the caller's order.
 struct RayOrder {
-  std::vector<uint32_t> ray;  // those that cannot be traced last
-  float sample_distance = 0;  // how far from the rays the surfels typically are; scene units
+  std::vector<uint32_t> ray;  // untraceable rays are last
+  float sample_distance = 0;  // typical distance from the rays to the surfels; scene units
 };
 
-// Sorts along a space-filling curve by the points at that distance. Equal ones stay in the caller's order.
+// Sorts along a space-filling curve by the points at that distance. Equal keys keep the caller's order.
 void order_rays(const Bvh& bvh, const Rays& rays, RayOrder& order);
 
 }  // namespace traceflow::trace

@@ -4,15 +4,16 @@
 
 namespace traceflow::trace {
 
-// What is known of a hit before its place is looked at.
+// The gradients of a hit that do not depend on its position in the surfel.
 struct HitGradient {
   float distance;
   float grad_exponent;  // dL/d(log of the opacity at the hit)
   float grad_distance;
 };
 
-// -dL/d(along t_u or t_v) of a hit so far along that axis, and dL/d(scale), where a cone widens the disk by a
-// Gaussian of variance spread2. Adds to -2 dL/d(spread2).
+// The derivatives of a hit by one axis (t_u or t_v). along: -dL/d(position along the axis). scale:
+// dL/d(scale). A cone widens the disk by a Gaussian of variance spread2; adds to by_spread2, which is -2
+// dL/d(spread2).
 struct AxisGradient {
   float along, scale;
 };
@@ -21,15 +22,15 @@ TRACEFLOW_HD inline AxisGradient axis_backward(float grad_exponent, float along,
   const float scale = 1 / inverse_scale;
   const float precision = 1 / (scale * scale + spread2);
   const float u = along * precision;
-  // What widening takes from the exponent, twice: it lowers the peak and flattens the slope.
+  // Twice the loss of the exponent by widening, which lowers the peak and flattens the slope.
   const float lost = grad_exponent * (precision - u * u);
   by_spread2 += lost;
-  // The peak is as high as scale · √precision.
+  // The height of the peak is scale · √precision.
   return {grad_exponent * u, grad_exponent * inverse_scale - scale * lost};
 }
 
-// Sets the parts of one hit, and adds what its place does to the ray. The CPU does 16 hits at once
-// (cpu/geometry-inl.h).
+// Sets the contributions of one hit and adds the effect of its position to the ray. The CPU processes several
+// hits at once (cpu/geometry-inl.h).
 TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& ray, const HitGradient& hit,
                                         float* parts, RayPull& pull) {
   const Vec3<float> x = ray.origin - f.position + hit.distance * ray.direction;

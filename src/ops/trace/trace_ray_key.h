@@ -2,13 +2,13 @@
 
 #include "ops/trace/trace_kernels.h"
 
-// Where a ray stands in the order in which rays are traced.
+// The key by which rays are sorted for tracing.
 namespace traceflow::trace {
 
 inline constexpr int ray_key_bits = 31;
-inline constexpr uint32_t untraceable_key = 1U << 30;  // behind all 30-bit keys
+inline constexpr uint32_t untraceable_key = 1U << 30;  // greater than all 30-bit keys
 
-// Moves the lower 10 bits apart: to bits 0, 3, 6, …
+// Moves the lower 10 bits to bits 0, 3, 6, …
 TRACEFLOW_HD inline uint32_t spread_bits(uint32_t x) {
   x = (x | x << 16) & 0x030000FFU;
   x = (x | x << 8) & 0x0300F00FU;
@@ -22,7 +22,8 @@ TRACEFLOW_HD inline uint32_t morton_key(const Vec3<float>& unit_cube) {
          spread_bits(static_cast<uint32_t>(cell.z)) << 2;
 }
 
-// Along a space-filling curve by the point at the distance `sample_distance`, seen from `centre`.
+// The key along a space-filling curve of the ray's point at the distance `sample_distance`, relative to
+// `centre`.
 TRACEFLOW_HD inline uint32_t ray_key(const RayView& rays, int64_t i, const Vec3<float>& centre,
                                      float sample_distance) {
   UnitRay ray;

@@ -9,7 +9,7 @@
 #include "ops/trace/trace.h"
 #include "ops/trace/trace_usable.h"
 
-// Every ray against every surfel. A ray's hits are sorted by distance, then blended (method §5.2).
+// Tests every ray against every surfel. Sorts a ray's hits by distance, then blends them (method §5.2).
 namespace traceflow::trace {
 
 namespace {
@@ -31,12 +31,12 @@ bool can_be_traced(const BasicRays<double>& rays, int64_t r) {
          (rays.widths.empty() || is_width(rays.widths[r]));
 }
 
-// A Gaussian that a cone has widened (method §5.5): the deviations σ become √(σ² + spread²), and the peak
-// falls from 1 to Π σ / √(σ² + spread²), so that the integral stays.
+// A Gaussian widened by a cone (method §5.5). Its standard deviations σ become √(σ² + spread²). Its peak
+// falls from 1 to Π σ / √(σ² + spread²), so that its integral is unchanged.
 struct Widened {
-  double spread;       // the cone's width times the distance, scene units
+  double spread;       // the cone's width times the distance; scene units
   Vec2<double> scale;  // √(σ² + spread²)
-  double u, v;         // in those
+  double u, v;         // in units of `scale`
   double value;        // at the hit
 };
 
@@ -57,11 +57,11 @@ struct Hit {
 
 BlendRules<double> rules(const Options& o) { return {o.alpha_min, o.alpha_max, o.transmittance_min}; }
 
-// What blending a ray's hits leaves behind.
+// The result of blending a ray's hits.
 struct Blend {
-  std::vector<Hit> hits;              // those blended, front to back
-  std::vector<Vec3<double>> colour;   // of each
-  std::vector<double> transmittance;  // before each
+  std::vector<Hit> hits;              // blended hits, front to back
+  std::vector<Vec3<double>> colour;   // of each hit
+  std::vector<double> transmittance;  // in front of each hit
   double remaining = 1;
   double alpha = 0;
   double distance_sum = 0;
@@ -109,7 +109,7 @@ Blend blend(const BasicPosedSurfels<double>& surfels, const std::vector<Frame>& 
   return result;
 }
 
-// dL/doutput of one ray; zero where the caller left a tensor empty.
+// dL/doutput of one ray; zero for an empty tensor.
 struct RayGradient {
   Vec3<double> colour{0};
   double alpha = 0, distance = 0;
@@ -123,7 +123,7 @@ RayGradient load_gradient(const BasicOutputGradient<double>& grad, int64_t ray) 
   return g;
 }
 
-// dL/dalpha of every hit, back to front: what a hit takes from all behind it is kept in one running sum.
+// dL/dalpha of every hit, back to front, with a running sum over the hits behind.
 std::vector<double> alpha_gradients(const Blend& b, const RayGradient& grad, const Vec3<double>& background) {
   const double distance = b.distance_sum / b.alpha;
   std::vector<double> result(b.hits.size());
@@ -143,8 +143,8 @@ struct HitGradient {
   double opacity = 0, width = 0;
 };
 
-// dL/d(u, v, scale and spread) from dL/d(log of the widened Gaussian), u and v in the surfel's own
-// deviations.
+// dL/d(u, v, scale and spread) from dL/d(log of the widened Gaussian). u and v are in the surfel's own
+// standard deviations.
 struct WidenedGradient {
   double u, v, spread;
   Vec2<double> scale;
@@ -152,12 +152,13 @@ struct WidenedGradient {
 
 WidenedGradient widened_backward(const Frame& frame, const Widened& g, double grad_log) {
   const Vec2<double> share = frame.scale / g.scale;  // σ / √(σ² + spread²)
-  // By the widened deviation of an axis: -1 / it of the peak, and u² / it of the slope.
+  // By the widened standard deviation S of an axis: -1/S from the peak and u²/S from the slope.
   const Vec2<double> by_scale = grad_log * Vec2<double>(g.u * g.u - 1, g.v * g.v - 1) / g.scale;
   WidenedGradient to{};
   to.u = -grad_log * g.u * share.x;
   to.v = -grad_log * g.v * share.y;
-  // u here is a length over the widened deviation: only the peak and that deviation know of σ.
+  // Here the hit's position in lengths is constant, so σ enters only through the peak and the widened
+  // deviation.
   to.scale = grad_log / frame.scale + by_scale * share;
   to.spread = dot(by_scale, g.spread / g.scale);
   return to;
@@ -172,7 +173,8 @@ HitGradient hit_backward(const Frame& frame, const Ray& ray, const Hit& hit, dou
   HitGradient to;
   to.geometry = intersect_backward(frame, ray.origin, ray.direction, hit.at,
                                    grad_t + g.spread * ray.width * length_of_ray, g.u, g.v);
-  // That step holds lengths over the surfel's own deviations; what is by the widened ones is here.
+  // intersect_backward() derives the gradient of the scale from u and v. This replaces it by that of the
+  // widened Gaussian.
   to.geometry.scale = g.scale;
   to.geometry.direction += g.spread * ray.width * hit.at.t * ray.unit();
   to.opacity = grad_exponent / opacity;

@@ -9,7 +9,7 @@
 
 namespace traceflow::trace {
 
-// Whether all of n numbers are finite, without branches: 0 · x is 0 for finite x only.
+// Returns whether all n numbers are finite, without branches: 0 · x is 0 only for a finite x.
 template <class T>
 TRACEFLOW_HD bool all_finite(const T* values, int64_t n) {
   T sum(0);
@@ -17,7 +17,7 @@ TRACEFLOW_HD bool all_finite(const T* values, int64_t n) {
   return sum == T(0);
 }
 
-// Addresses of a set of posed surfels, on any device.
+// Addresses of a set of posed surfels, on either device.
 template <class T>
 struct SurfelView {
   const T *position, *scale, *rotation, *opacity, *sh;
@@ -31,7 +31,8 @@ struct SurfelView {
         sh(s.sh.data()),
         sh_numbers(s.sh.row_size()) {}
 
-  // Whether surfel i can be hit at all: finite, of positive area, of an opacity that reaches alpha_min.
+  // Returns whether surfel i can be hit: finite, with positive area and with an opacity of at least
+  // alpha_min.
   TRACEFLOW_HD bool is_usable(int64_t i, T alpha_min) const {
     return all_finite(position + 3 * i, 3) && all_finite(scale + 2 * i, 2) &&
            all_finite(rotation + 4 * i, 4) && all_finite(sh + sh_numbers * i, sh_numbers) &&
@@ -50,13 +51,13 @@ bool is_usable(const BasicPosedSurfels<T>& surfels, int64_t i, T alpha_min) {
   return SurfelView<T>(surfels).is_usable(i, alpha_min);
 }
 
-// Whether a ray can be traced: finite, with a direction.
+// Returns whether a ray can be traced: finite, with a non-zero direction.
 template <class T>
 TRACEFLOW_HD bool is_traceable(const T* origin, const T* direction) {
   return all_finite(origin, 3) && all_finite(direction, 3) &&
          (direction[0] != T(0) || direction[1] != T(0) || direction[2] != T(0));
 }
-// Whether a cone can: a width that is a number, and not negative.
+// Returns whether the width of a cone is valid: finite and not negative.
 template <class T>
 TRACEFLOW_HD bool is_width(T width) {
   return std::isfinite(width) && width >= T(0);

@@ -10,12 +10,13 @@
 
 #include "ops/raster/cpu/simd-inl.h"
 
-// Unblends the tiles, back to front: each hit's transmittance is that behind it over 1 - α. A surfel's sums
-// over the blocks of a tile stay in registers and are reduced to its SplatGradient of that tile once.
+// Differentiates the blending of tiles, back to front: the transmittance in front of a hit is that behind it
+// divided by 1 - α. The sums of a surfel over the blocks of a tile stay in registers. They are reduced once
+// to the tile's SplatGradient of the surfel.
 HWY_BEFORE_NAMESPACE();
 namespace traceflow::raster::HWY_NAMESPACE {
 
-// dL/doutput of a block, and up to which hit its pixels have been processed.
+// dL/doutput of a block, and the state of its pixels at the current hit.
 struct BlockState {
   alignas(64) float colour[3][pixels_per_block];
   alignas(64) float normal[3][pixels_per_block];
@@ -23,11 +24,11 @@ struct BlockState {
   alignas(64) float silhouette[pixels_per_block];
   alignas(64) float roughness[pixels_per_block];
   alignas(64) float z[pixels_per_block];         // dL/d(Σ w z)
-  alignas(64) float constant[pixels_per_block];  // the part of dL/dw that all hits share
+  alignas(64) float constant[pixels_per_block];  // the part of dL/dw that is the same for all hits
   alignas(64) float median[pixels_per_block];
   alignas(64) float distortion[pixels_per_block];
-  alignas(64) float transmittance[pixels_per_block];  // behind the hit at hand
-  alignas(64) float behind[pixels_per_block];         // Σ w dL/dw of the hits behind
+  alignas(64) float transmittance[pixels_per_block];  // behind the current hit
+  alignas(64) float behind[pixels_per_block];         // Σ w dL/dw over the hits behind
 };
 
 struct TileState {
@@ -48,7 +49,7 @@ HWY_INLINE void load_pixel(const OutputGradient& g, const Vec3<float>& backgroun
   state.roughness[i] = value(g.roughness, pixel);
   state.median[i] = value(g.median_depth, pixel);
   state.distortion[i] = value(g.distortion, pixel);
-  // The expected depth is Σ w z / Σ w; the background shines with 1 - Σ w.
+  // Expected depth is Σ w z / Σ w. The background has the weight 1 - Σ w.
   const float z = saved.alpha[i] > 0 ? value(g.depth, pixel) / saved.alpha[i] : 0.0F;
   state.z[i] = z;
   state.constant[i] = value(g.alpha, pixel) - z * saved.depth[i] -
@@ -70,14 +71,14 @@ HWY_INLINE void load_block(const OutputGradient& g, const Vec3<float>& backgroun
   }
 }
 
-// Which outputs a gradient is asked by: what nobody asks is left out of the loops.
+// The outputs that have a gradient. The loops skip the others.
 enum class Asked {
   colour,    // colour, tint, silhouette, roughness and alpha
-  geometry,  // and normal and expected depth
-  all        // and median depth and distortion
+  geometry,  // also normal and expected depth
+  all        // also median depth and distortion
 };
 
-// The sums of a surfel over pixels, lane by lane, in the order of SplatGradient.
+// The sums of a surfel over pixels, one per lane, in the order of SplatGradient.
 template <class D>
 struct Sums {
   static constexpr int used = 22;
@@ -90,7 +91,7 @@ struct Sums {
         log_opacity = red = green = blue = tint = normal_x = normal_y = normal_z = roughness = hn::Zero(d);
   }
 
-  // Adds one hit per lane; moves the state in front of it.
+  // Adds one hit per lane and moves the state in front of it.
   template <Asked asked>
   HWY_INLINE void add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f, uint32_t place,
                       const SavedBlock& saved, size_t lane, BlockState& state) {
@@ -156,7 +157,7 @@ struct Sums {
     tint = hn::MulAdd(weight, load(state.tint), tint);
     roughness = hn::MulAdd(weight, load(state.roughness), roughness);
 
-    // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero where α is clamped.
+    // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero if α is clamped.
     const auto is_free = hn::And(hit, hn::Lt(f.opacity, alpha_max));
     const auto g = hn::IfThenElseZero(is_free, hn::Mul(alpha, grad_alpha));
     log_opacity = hn::Add(log_opacity, g);
@@ -170,7 +171,7 @@ struct Sums {
     }
   }
 
-  // The plane's hit: u = nu/w, v = nv/w, z = z_plane/w, ρ = u² + v².
+  // The hit in the plane: u = nu/w, v = nv/w, z = z_plane/w, ρ = u² + v².
   template <Asked asked>
   HWY_INLINE void add_plane(const Footprint<D>& f, V<D> g, V<D> grad_z, V<D> z, M<D> on_plane) {
     const auto inverse_w = hn::IfThenElseZero(on_plane, f.inverse_w);
@@ -196,7 +197,7 @@ struct Sums {
     w_1 = hn::Add(grad_w, w_1);
   }
 
-  // The sum over the lanes of every member.
+  // Sums every member over the lanes.
   HWY_INLINE void reduce(D d, float* to) const {
     const auto zero = hn::Zero(d);
     V<D> v[padded] = {u_x,  u_y,     u_1,      v_x,      v_y,      v_1,         w_x,  w_y,
@@ -209,8 +210,8 @@ struct Sums {
   }
 
  private:
-  // Pairs of vectors are added crosswise into one, which halves their number and the lanes of each sum, until
-  // each sum has one lane. Returns how many vectors are left.
+  // Adds pairs of vectors crosswise into one vector, which halves the number of vectors and the lanes per
+  // sum, until each sum has one lane. Returns how many vectors are left.
   HWY_INLINE static size_t add_crosswise([[maybe_unused]] D d, [[maybe_unused]] V<D>* v) {
     size_t count = padded;
 #if HWY_TARGET != HWY_SCALAR

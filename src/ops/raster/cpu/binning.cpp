@@ -8,22 +8,22 @@
 #include "base/parallel.h"
 #include "ops/raster/raster_kernels.h"
 
-// The list of surfels of every tile. Surfels are put in order once; then blocks of them, with fixed
-// boundaries, count and fill their part of every tile's list, so that the lists are the same at any number of
-// threads.
+// Builds the list of surfels of every tile. Surfels are sorted once. Then fixed parts of the sorted surfels
+// count their entries and write their section of every tile's list. So the lists do not depend on the number
+// of threads.
 namespace traceflow::raster {
 namespace {
 
 constexpr int64_t surfels_per_part = 4096;
 
-// A key is the depth of the centre above the index of the surfel.
+// The upper half of a key is the depth of the centre, the lower half the index of the surfel.
 uint64_t sort_key(float z, int64_t surfel) {
   return uint64_t{std::bit_cast<uint32_t>(z)} << 32 | static_cast<uint32_t>(surfel);
 }
 int64_t surfel_of(uint64_t key) { return static_cast<int64_t>(key & 0xffffffffU); }
 
-// Sorts by the upper half, keeping the order of equals. The floats there are positive, so their bits sort as
-// they do.
+// Sorts by the upper half; equal keys keep their order. The floats in it are positive, so their bits have the
+// same order.
 void sort_by_depth(Tensor<uint64_t>& keys, Tensor<uint64_t>& other) {
   constexpr int digit_bits = 11;
   constexpr size_t digits = size_t{1} << digit_bits;
@@ -74,7 +74,7 @@ void for_each_tile(const Saved& saved, int64_t surfel, F&& f) {
   }
 }
 
-// Turns counts (part × tile) into where each part begins in each tile's list.
+// Replaces counts (part × tile) by the start of each part in each tile's list.
 void begin_lists(Tensor<uint32_t>& counts, Saved& saved) {
   const int64_t tiles = saved.tiles();
   saved.tile_begin.resize({tiles + 1});

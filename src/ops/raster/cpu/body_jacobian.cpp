@@ -16,18 +16,18 @@
 
 #include "ops/raster/cpu/simd-inl.h"
 
-// Block by block: vectors of pixels find where its splats are hit, then each pixel adds up its own.
+// For each block, vectors of pixels find where the splats are hit. Then each pixel sums its own hits.
 HWY_BEFORE_NAMESPACE();
 namespace traceflow::raster::HWY_NAMESPACE {
 
 constexpr int pose_size = 6;
 constexpr int channels = 7;  // tint, normal, colour
-// One more, so that they fill whole vectors.
+// Padded by one to whole vectors.
 using Values = std::array<float, channels + 1>;
 using ByPose = std::array<Values, pose_size>;
 
 struct SurfelAxes {
-  Vec3<float> position, axis_u, axis_v, normal;  // world; the axes over their scales
+  Vec3<float> position, axis_u, axis_v, normal;  // world; the axes are divided by their scales
 };
 
 inline SurfelAxes axes_of(const PosedSurfels& s, int64_t i) {
@@ -41,7 +41,7 @@ struct BlockFootprint {
   alignas(64) float inverse_w[pixels_per_block];
   alignas(64) float nu[pixels_per_block], nv[pixels_per_block];
   alignas(64) float dx[pixels_per_block], dy[pixels_per_block];
-  uint32_t inside, on_plane;  // as bits
+  uint32_t inside, on_plane;  // one bit per pixel
 };
 
 template <class D>
@@ -67,13 +67,13 @@ HWY_INLINE void evaluate_block(const Splat& splat, float rho_per_pixel2, int x, 
   }
 }
 
-// A hit's ρ changes by `slope` · the velocity of the matter at `at`.
+// The derivative of a hit's ρ is `slope` · the velocity of the surfel's material at the point `at`.
 struct RhoSlope {
   Vec3<float> at, slope;
 };
 
-// u = axis_u · (x − p) with x on the plane: matter that moves by V changes it by −(axis_u − (d·axis_u / d·n)
-// n) · V.
+// u = axis_u · (x − p) with x on the plane. If the material moves with velocity V, u changes by −(axis_u −
+// (d·axis_u / d·n) n) · V.
 inline RhoSlope plane_slope(const SurfelAxes& f, const Camera<float>& camera, const Vec3<float>& ray,
                             const BlockFootprint& at, int pixel, const Splat& splat) {
   const float inverse = 1 / dot(ray, f.normal);
@@ -94,7 +94,7 @@ inline RhoSlope screen_slope(const SurfelAxes& f, const Camera<float>& camera, c
   return {f.position, in_camera * camera.camera_from_world};
 }
 
-// One tile at a time; its memory is kept between them.
+// Processes one tile at a time and reuses its memory.
 class BodyTile {
  public:
   BodyTile(const PosedSurfels& surfels, const Tensor<int32_t>& body, const Tensor<float>& pivot,
@@ -122,16 +122,16 @@ class BodyTile {
   }
 
  private:
-  // What forward blended into one of the block's pixels, front to back.
+  // A splat that forward blended into a pixel of the block. The list is front to back.
   struct Listed {
     const Splat* splat;
     int32_t body;
-    SurfelAxes axes;  // of carried ones
+    SurfelAxes axes;  // only if body ≥ 0
     Values values;
     BlockFootprint at;
   };
 
-  // False where no body is.
+  // Returns false if no surfel in the block belongs to a body.
   bool list(const TileLists& tile, int block, int left, int top) {
     listed_.clear();
     const auto touches = [&](const TileEntry& entry) {
@@ -160,10 +160,10 @@ class BodyTile {
     float alpha, weight;
   };
 
-  // pixel: of its block.
+  // pixel: index in its block.
   void differentiate(int x, int y, int pixel) {
     hits_.clear();
-    Values behind{};  // what shows of everything, then of what stands behind a hit
+    Values behind{};  // first the blended values of all hits, then of those behind the current hit
     float transmittance = 1;
     for (const Listed& listed : listed_) {
       if ((listed.at.inside >> pixel & 1) == 0) continue;
@@ -195,7 +195,7 @@ class BodyTile {
                                ? plane_slope(listed.axes, camera_, ray, listed.at, pixel, *listed.splat)
                                : screen_slope(listed.axes, camera_, listed.at, pixel, saved_.rho_per_pixel2);
       const Vec3<float> turn = cross(rho.at - load3<float>(pivot_.row(listed.body)), rho.slope);
-      // The hit shows more, what stands behind it less: d ln α = −dρ/2.
+      // More of the hit means less of what is behind it: d ln α = −dρ/2.
       const float dimmed = hit.alpha / (1 - hit.alpha);
       Values by_rho;
       for (size_t c = 0; c < by_rho.size(); ++c)
@@ -226,7 +226,7 @@ class BodyTile {
   std::vector<ByPose> sums_;
 };
 
-// Half open, of tiles.
+// [begin, end): range of tiles.
 void differentiate_tiles(const PosedSurfels& surfels, const Tensor<int32_t>& body, const Tensor<float>& pivot,
                          const Camera<float>& camera, const Options& options, const Saved& saved,
                          int64_t begin, int64_t end, Tensor<float>& jacobian) {

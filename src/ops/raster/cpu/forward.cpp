@@ -10,12 +10,12 @@
 
 #include "ops/raster/cpu/simd-inl.h"
 
-// Blends the tiles, front to back (method §3.3, §3.5). A tile is one task of one thread; within it each block
-// of pixels runs through its list alone, its sums in registers, until none of its pixels lets light through.
+// Blends the tiles front to back (method §3.3, §3.5). A tile is one task of one thread. In a tile, each block
+// of pixels processes its list independently, with its sums in registers, until all of its pixels are opaque.
 HWY_BEFORE_NAMESPACE();
 namespace traceflow::raster::HWY_NAMESPACE {
 
-// What a block of pixels has summed up, beside what it leaves for backward.
+// The sums of a block of pixels that backward does not need.
 struct BlockSums {
   alignas(64) float colour[3][pixels_per_block];
   alignas(64) float normal[3][pixels_per_block];
@@ -54,7 +54,7 @@ class Blend {
 
   HWY_INLINE bool is_live(D d) const { return !hn::AllFalse(d, live_); }
 
-  // Blends the next hit of the list. Returns whether any pixel took it.
+  // Blends the next hit of the list. Returns whether any pixel blended it.
   HWY_INLINE bool add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f) {
     const Int<D> di;
     const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
@@ -74,7 +74,8 @@ class Blend {
     const auto wm = hn::Mul(weight, m);
     m_ = hn::Add(m_, wm);
     m2_ = hn::MulAdd(wm, m, m2_);
-    // The last hit before the transmittance is one half or less; none if it never is.
+    // The median hit is the last one that starts with a transmittance above one half. There is none if the
+    // transmittance never falls to one half.
     const auto may_be_median = hn::And(hit, hn::Gt(transmittance_, set(0.5F)));
     median_depth_ = hn::IfThenElse(may_be_median, z, median_depth_);
     median_ = hn::IfThenElse(hn::RebindMask(di, may_be_median), next_, median_);
@@ -134,10 +135,10 @@ class Blend {
   V<D> transmittance_, alpha_, red_, green_, blue_, tint_, silhouette_, roughness_;
   V<D> normal_x_, normal_y_, normal_z_, depth_, m_, m2_;
   V<D> first_inverse_z_, median_depth_;
-  V<Int<D>> next_, last_, median_;  // places in the list
+  V<Int<D>> next_, last_, median_;  // indices in the list
 };
 
-// One row of a block; a constant number of columns makes copies of vectors.
+// Writes one row of a block. A constant number of columns lets the compiler copy whole vectors.
 template <class Columns>
 HWY_INLINE void write_row(const SavedBlock& saved, const BlockSums& sums, int begin, int64_t pixel,
                           Columns columns, Output& output) {
@@ -171,7 +172,7 @@ HWY_INLINE void write_block(const SavedBlock& saved, const BlockSums& sums, int 
   }
 }
 
-// How many surfels a block evaluates side by side: as the registers allow.
+// The number of surfels that a block evaluates at once, limited by the number of registers.
 constexpr int side_by_side = HWY_TARGET <= HWY_AVX3 ? 4 : 2;
 
 class TileBlender {
@@ -202,7 +203,7 @@ class TileBlender {
   }
 
  private:
-  // Lanes within the image.
+  // Lanes inside the image.
   template <class D>
   HWY_INLINE M<D> live_lanes(D d, const PixelCentres<D>& at) const {
     return hn::And(hn::Lt(at.x, hn::Set(d, static_cast<float>(saved_.width))),

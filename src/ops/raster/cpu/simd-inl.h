@@ -1,5 +1,5 @@
-// What the vector kernels of the fast path share; compiled once per instruction set, so without a plain
-// include guard.
+// Shared definitions of the vector kernels of the fast path. Compiled once per instruction set, so there is
+// no ordinary include guard.
 #if defined(TRACEFLOW_RASTER_SIMD_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_RASTER_SIMD_INL_H
 #undef TRACEFLOW_RASTER_SIMD_INL_H
@@ -20,7 +20,7 @@ HWY_BEFORE_NAMESPACE();
 namespace traceflow::raster::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// As many pixels of a block as a vector holds; blocks have 16.
+// As many pixels of a block (16) as fit in a vector.
 using Pixels = hn::CappedTag<float, pixels_per_block>;
 using OnePixel = hn::CappedTag<float, 1>;
 
@@ -31,18 +31,18 @@ using M = hn::Mask<D>;
 template <class D>
 using Int = hn::RebindToSigned<D>;
 
-// 1/x to the last bit or two.
+// 1/x, accurate to one or two units in the last place.
 template <class D>
 HWY_INLINE V<D> reciprocal(D d, V<D> x) {
   const auto guess = hn::ApproximateReciprocal(x);
   return hn::Mul(guess, hn::NegMulAdd(x, guess, hn::Set(d, 2.0F)));
 }
 
-// 2^x for -126 < x < 127, relative error 2e-7. Anything else gives some number.
+// 2^x for -126 < x < 127, with a relative error of 2e-7. The result is unspecified for other x.
 template <class D>
 HWY_INLINE V<D> exp2(D d, V<D> x) {
   const Int<D> di;
-  // Adding 1.5·2^23 leaves the nearest whole number in the low bits.
+  // Adding 1.5·2^23 leaves the nearest integer in the low bits.
   const auto magic = hn::Set(d, 12582912.0F);
   const auto shifted = hn::Add(x, magic);
   const auto f = hn::Sub(x, hn::Sub(shifted, magic));
@@ -55,16 +55,16 @@ HWY_INLINE V<D> exp2(D d, V<D> x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
 }
 
-// A surfel at the pixels of a vector (method §3.1, §3.2). Outside, z is still finite, u and v may be
-// anything.
+// A surfel at the pixels of a vector (method §3.1, §3.2). If `inside` is false, z is still finite, but u and
+// v may be anything.
 template <class D>
 struct Footprint {
   V<D> x, y;       // pixels from the anchor
   V<D> dx, dy;     // pixels from the projected centre
   V<D> nu, nv, w;  // u = nu/w, v = nv/w
   V<D> inverse_w;
-  V<D> opacity;   // o·G, before the clamp
-  M<D> on_plane;  // the plane's hit wins; elsewhere the low-pass
+  V<D> opacity;   // o·G before the clamp
+  M<D> on_plane;  // the hit in the plane wins over the low-pass
   M<D> inside;    // o·G ≥ alpha_min
 
   HWY_INLINE V<D> z(D d, const Splat& s) const {
@@ -76,7 +76,7 @@ struct Footprint {
   }
 };
 
-// Pixel centres of the lanes from `lane` on of a block whose upper left corner is (x, y).
+// Centres of the pixels of a block, from pixel `lane` on. (x, y) is the upper left corner of the block.
 template <class D>
 struct PixelCentres {
   V<D> x, y;
@@ -92,8 +92,8 @@ HWY_INLINE PixelCentres<D> pixel_centres(D d, int x, int y, size_t lane) {
           hn::Add(hn::ConvertTo(d, hn::Add(row, hn::Set(di, y))), half)};
 }
 
-// Evaluates `count` pairs of a splat and a vector of pixels side by side. A pair is a long chain of dependent
-// operations; step by step for all pairs the chains overlap.
+// Evaluates `count` pairs of a splat and a vector of pixels together. A pair is a long chain of dependent
+// operations; doing each step for all pairs overlaps the chains.
 template <size_t count, class D>
 HWY_INLINE void evaluate(D d, float rho_per_pixel2, const Splat* const* splats, const PixelCentres<D>* at,
                          Footprint<D>* footprints) {
@@ -141,7 +141,7 @@ HWY_INLINE Footprint<D> evaluate(D d, float rho_per_pixel2, const Splat& splat, 
   return f;
 }
 
-// The blocks of a tile in which a splat may reach a pixel, as bits. Exact for the ellipse and the low-pass
+// The blocks of a tile in which a splat may cover a pixel, as bits. Exact for the ellipse and the low-pass
 // disk against the square of each block's pixel centres, up to a margin for rounding.
 HWY_INLINE uint32_t reached_blocks(const Splat& s, float rho_per_pixel2, int tile_x, int tile_y) {
   if (s.ellipse_x != s.ellipse_x) return 0xffff;
@@ -169,7 +169,7 @@ HWY_INLINE uint32_t reached_blocks(const Splat& s, float rho_per_pixel2, int til
     const auto low_y = hn::MulAdd(row, set(block_edge), first_y);
     const auto high_x = hn::Add(low_x, span);
     const auto high_y = hn::Add(low_y, span);
-    // The convex form is lowest in a rectangle on the sides that face its centre.
+    // In a rectangle, the minimum of the convex form is on the sides that face its centre.
     const auto centre_x = set(s.ellipse_x);
     const auto centre_y = set(s.ellipse_y);
     const auto side_x = clamp(centre_x, low_x, high_x);
@@ -188,12 +188,12 @@ HWY_INLINE uint32_t reached_blocks(const Splat& s, float rho_per_pixel2, int til
   return reached;
 }
 
-// A tile of the image, its list, and the places in the list that each of its blocks has to look at.
+// A tile of the image, its list, and for each of its blocks the indices in the list that the block processes.
 struct TileLists {
   int x, y;                  // upper left pixel
   const TileEntry* entries;  // front to back
   uint32_t count;
-  uint32_t blocks;  // those within the image, as bits
+  uint32_t blocks;  // blocks inside the image, as bits
   const uint32_t* of_block[blocks_per_tile];
   uint32_t counts[blocks_per_tile];
 
@@ -201,7 +201,7 @@ struct TileLists {
   int block_y(int block) const { return y + block / blocks_per_row * block_edge; }
 };
 
-// Without the blocks' lists.
+// Returns the tile without the lists of its blocks.
 HWY_INLINE TileLists tile_entries(const Saved& saved, int64_t tile) {
   TileLists lists{};
   lists.x = static_cast<int>(tile % saved.tile_columns) * tile_edge;
@@ -214,7 +214,7 @@ HWY_INLINE TileLists tile_entries(const Saved& saved, int64_t tile) {
   return lists;
 }
 
-// How far ahead a list's splats are fetched into the cache.
+// Splats are prefetched this many elements ahead in the list.
 constexpr uint32_t prefetch_distance = 6;
 HWY_INLINE void prefetch_splat(const Saved& saved, const TileLists& lists, uint32_t place) {
   if (place >= lists.count) return;
@@ -223,8 +223,8 @@ HWY_INLINE void prefetch_splat(const Saved& saved, const TileLists& lists, uint3
   hwy::Prefetch(reinterpret_cast<const char*>(splat) + sizeof(Splat) / 2);
 }
 
-// Appends `count` places from `first` on whose bit is set, without a branch per place. There must be room for
-// a vector more.
+// Appends the indices in [0, count) for which `bit` is set in `reached`, without a branch per index. The
+// output must have room for one more vector.
 HWY_INLINE uint32_t* append_reached(const uint32_t* reached, uint32_t count, uint32_t bit, uint32_t* to) {
   const hn::ScalableTag<uint32_t> d;
   const auto wanted = hn::Set(d, bit);

@@ -1,8 +1,9 @@
 #include "ops/raster/cuda/stages.h"
 #include "ops/raster/cuda/tile.h"
 
-// Unblends the tiles, back to front: each hit's transmittance is that behind it over 1 - α. A warp adds up a
-// splat over its pixels, a tile over its warps, both in a fixed order; no two tiles write to one place.
+// Differentiates the blending of tiles, back to front: the transmittance in front of a hit is that behind it
+// divided by 1 - α. A warp sums a splat over its pixels, and a tile sums it over its warps, both in a fixed
+// order. No two tiles write to the same address.
 namespace traceflow::raster::cuda_stage {
 namespace {
 
@@ -11,14 +12,14 @@ constexpr int sums_used = 22;
 constexpr int sums_stored = sizeof(SplatGradient) / sizeof(float);
 static_assert(sums_stored <= cuda::warp_lanes && backward_batch == cuda::warp_lanes);
 
-// Which outputs a gradient is asked by: what nobody asks is left out of the loops.
+// The outputs that have a gradient. The loops skip the others.
 enum class Asked {
   colour,    // colour, tint, silhouette, roughness and alpha
-  geometry,  // and normal and expected depth
-  all        // and median depth and distortion
+  geometry,  // also normal and expected depth
+  all        // also median depth and distortion
 };
 
-// Addresses; null where nothing is asked.
+// Addresses; null for an output without gradient.
 struct GradientView {
   const float *colour, *alpha, *tint, *silhouette, *roughness, *normal, *depth, *median_depth, *distortion;
 };
@@ -27,13 +28,13 @@ struct KeptPixels {
   const int32_t *last, *median;
 };
 
-// dL/doutput of a pixel and what forward left there.
+// dL/doutput of a pixel and what forward saved for it.
 template <Asked asked>
 struct PixelGradient {
   Vec3<float> colour{0.0F}, normal{0.0F};
   float tint = 0, silhouette = 0, roughness = 0;
   float z = 0;         // dL/d(Σ w z)
-  float constant = 0;  // the part of dL/dw that all hits share
+  float constant = 0;  // the part of dL/dw that is the same for all hits
   float median = 0, distortion = 0;
   float alpha = 0, m = 0, m2 = 0, inverse_z = 0;
   int last = -1, median_place = -1;
@@ -50,7 +51,7 @@ struct PixelGradient {
     constant = value(g.alpha) - dot(colour, background);
     if constexpr (asked != Asked::colour) {
       if (g.normal != nullptr) normal = load3<float>(g.normal + 3 * i);
-      // The expected depth is Σ w z / Σ w.
+      // Expected depth is Σ w z / Σ w.
       z = alpha > 0 ? value(g.depth) / alpha : 0.0F;
       constant -= z * left.depth[i];
     }
@@ -65,7 +66,7 @@ struct PixelGradient {
   }
   __device__ PixelGradient() {}
 
-  // dL/dw of a hit at depth z_hit.
+  // dL/dw of a hit.
   __device__ float by_weight(const KernelOptions& o, const Splat& s, const PixelFootprint& f) const {
     float own = constant + dot(load3<float>(s.colour), colour) + s.tint * tint + s.carried() * silhouette +
                 s.roughness() * roughness;
@@ -78,7 +79,7 @@ struct PixelGradient {
     return own;
   }
 
-  // Adds a hit to a splat's sums, in the order of SplatGradient.
+  // Adds a hit to the sums of a splat, in the order of SplatGradient.
   __device__ void add(const KernelOptions& o, const Splat& s, const PixelFootprint& f, float weight,
                       float grad_alpha, bool is_median, float* sums) const {
     const float z_hit = f.z(s);
@@ -91,7 +92,7 @@ struct PixelGradient {
       grad_z -= 2.0F * distortion * weight * (m - m_hit * alpha) * (o.m_scale * inverse * inverse);
       if (is_median) grad_z += median;
     }
-    // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero where α is clamped.
+    // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero if α is clamped.
     const float g = f.opacity < o.alpha_max ? f.opacity * grad_alpha : 0.0F;
     if (f.on_plane) {
       // u = nu/w, v = nv/w, z = z_plane/w, ρ = u² + v².
@@ -113,7 +114,7 @@ struct PixelGradient {
       sums[8] += grad_w;
       sums[9] += zw;
     } else {
-      // The low-pass: ρ = 2 (dx² + dy²).
+      // The low-pass: ρ = rho_per_pixel2 (dx² + dy²).
       sums[10] += g * f.dx;
       sums[11] += g * f.dy;
       sums[12] += grad_z;
@@ -126,8 +127,8 @@ struct PixelGradient {
   }
 };
 
-// Lane i gets the sum over the lanes of value[i]; value is used up. 31 exchanges instead of five for each
-// value. A recursion, so that every index is known to the compiler and value stays in registers.
+// Returns to lane i the sum of value[i] over the lanes; overwrites value. Needs 31 exchanges instead of five
+// per value. A recursion, so that the compiler knows every index and keeps value in registers.
 template <int half = cuda::warp_lanes / 2>
 __device__ float transposed_sum(float (&value)[cuda::warp_lanes], int lane) {
   const bool upper = (lane & half) != 0;
@@ -211,9 +212,9 @@ __global__ void __launch_bounds__(pixels_per_tile)
   }
 }
 
-// sort = hit: no two pixels share an order, so that each goes through its hits alone, twice: for the sum of
-// all, and for what is behind each. in_turn: one thread of a tile after the other, so that sums have a fixed
-// order.
+// sort = hit: every pixel has its own order, so each processes its hits alone, twice: once for the sum over
+// all hits and once for the sums behind each. in_turn: the threads of a tile run one after another, so that
+// sums have a fixed order.
 template <Asked asked>
 __global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
                                       SplatGradient* gradients, bool in_turn) {

@@ -10,8 +10,8 @@
 #include "primitives/sort.h"
 #include "primitives/sum_kernels.h"
 
-// The list of surfels of every tile. Surfels are put in order of depth once; their entries are written in
-// that order; a stable sort by tile then leaves each tile's list front to back.
+// Builds the list of surfels of every tile. Surfels are sorted by depth once, and their entries are written
+// in that order. A stable sort by tile then leaves each tile's list front to back.
 namespace traceflow {
 
 template void cuda::for_each_index(const char*, int64_t, const raster::ProjectSurfel&);
@@ -21,7 +21,7 @@ template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t,
 
 namespace raster::cuda_stage {
 
-// How many tiles each surfel reaches, and the key that it is sorted by.
+// Computes how many tiles each surfel covers, and its sort key.
 struct CountTiles {
   TileGrid grid;
   bool by_depth;
@@ -37,13 +37,13 @@ struct CountTiles {
     const int32_t tiles = for_each_reached(grid, splats, mine, [](const BoundedSurfel&, int, int) {});
     if (i <= count) counts[i] = tiles;
     if (i >= count) return;
-    // Depths are positive, so that their bits sort as they do.
+    // Depths are positive, so their bits have the same order.
     keys[i] = tiles > 0 && by_depth ? std::bit_cast<uint32_t>(splats[i].z_centre) : 0;
     surfels[i] = surfel;
   }
 };
 
-// The counts in the order of depth.
+// The counts in depth order.
 struct GatherCounts {
   const uint32_t* order;
   const int32_t* counts;
@@ -53,13 +53,14 @@ struct GatherCounts {
   __device__ void operator()(int64_t k) const { ordered[k] = k < count ? int64_t{counts[order[k]]} : 0; }
 };
 
-// The entries of the k-th nearest surfel: its tiles, in the places that the sums of counts give it.
+// Writes the entries of the k-th nearest surfel: its tiles, at the positions given by the prefix sum of the
+// counts.
 struct WriteEntries {
   TileGrid grid;
   const Splat* splats;
   const Bounds* bounds;
   const uint32_t* order;
-  const int64_t* place;  // by order
+  const int64_t* place;  // by depth order
   const int32_t* entry;  // by surfel
   uint32_t *tiles, *places;
   TileEntry* entries;
@@ -94,7 +95,7 @@ struct SortEntries {
   __device__ void operator()(int64_t k) const { sorted[k] = unsorted[places[k]]; }
 };
 
-// Where each tile's list begins: at the first entry that is not of a tile before it.
+// Finds the start of each tile's list: the first entry that does not belong to an earlier tile.
 struct FindTiles {
   const uint32_t* tiles;  // sorted
   uint32_t entries;
@@ -122,7 +123,7 @@ T* resized(Tensor<T>& tensor, int64_t size) {
   return tensor.data();
 }
 
-// A tensor's last number.
+// Returns a tensor's last element.
 int64_t read_back(const Tensor<int64_t>& tensor) {
   int64_t value = 0;
   memory::copy(Device::cpu, &value, Device::cuda, tensor.data() + tensor.size() - 1, sizeof(value));
@@ -146,12 +147,11 @@ void bin(SortOrder order, Saved& saved) {
     ordered = resized(s.surfels_sorted, n);
     cuda::sort_pairs(n, 32, keys, resized(s.depth_keys_sorted, n), surfels, ordered, s.bytes);
   }
-  // By surfel: where its entries begin when they are counted surfel by surfel.
+  // By surfel: the start of its entries in surfel order.
   static_assert(sizeof(uint32_t) == sizeof(int32_t));
   auto* const entry = reinterpret_cast<int32_t*>(resized(saved.entry_begin, n + 1));
   cuda::exclusive_sum(counts, entry, n + 1, s.bytes);
-  // By order of depth: where they are written. In 64 bits, so that a number beyond all bounds is known as
-  // one.
+  // By depth order: the positions to write them to. In 64 bits, so that an overflow is detected.
   int64_t* const place = resized(s.offsets, n + 1);
   cuda::for_each_index("raster: gather counts", n + 1, GatherCounts{ordered, counts, place, n});
   cuda::exclusive_sum(place, place, n + 1, s.bytes);

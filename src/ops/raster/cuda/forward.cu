@@ -11,7 +11,7 @@ static_assert(forward_batch <= pixels_per_tile);
 
 struct OutputView {
   float *colour, *alpha, *tint, *normal, *depth, *median_depth, *distortion;
-  float *silhouette, *roughness;  // null where nobody asks
+  float *silhouette, *roughness;  // null if not wanted
 };
 struct LeftPixels {
   float *transmittance, *alpha, *depth, *m, *m2, *inverse_z;
@@ -21,8 +21,8 @@ struct LeftPixels {
 // The state of one pixel.
 class Blend {
  public:
-  // Blends the hit at a place of the order; whether the pixel took it. Ends the pixel where no light would be
-  // left.
+  // Blends a hit. place: its index in the blending order. Returns whether the pixel blended it. Ends the
+  // pixel if the hit would leave too little transmittance.
   __device__ bool add(const KernelOptions& o, const Splat& s, const PixelFootprint& f, int place) {
     if (!f.inside) return false;
     const float weight = transmittance_ * lower(f.opacity, o.alpha_max);
@@ -36,7 +36,8 @@ class Blend {
     const float m = first_inverse_z_ - inverse_z;
     m_ += weight * m;
     m2_ += weight * m * m;
-    // The last hit before the transmittance is one half or less; none if it never is.
+    // The median hit is the last one that starts with a transmittance above one half. There is none if the
+    // transmittance never falls to one half.
     if (transmittance_ > 0.5F) {
       median_depth_ = z;
       median_ = place;
@@ -102,7 +103,7 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
   for (uint32_t base = 0; base < count; base += forward_batch) {
     const int here = static_cast<int>(count - base < forward_batch ? count - base : forward_batch);
     if (__syncthreads_or(live) == 0) {
-      // Nobody looks at what is left of the list.
+      // No pixel needs the rest of the list.
       for (uint32_t k = base + threadIdx.x; k < count; k += blockDim.x) {
         saved.touched[saved.entries[begin + k].entry] = 0;
       }
@@ -136,7 +137,7 @@ __global__ void blend_by_centre(SavedView saved, KernelOptions o, OutputView out
   if (pixel.in_image) blend.store(o, pixel.index, out, left);
 }
 
-// sort = hit: each pixel takes its hits by their own depth, some at a time.
+// sort = hit: each pixel blends its hits by their own depth, a few at a time.
 __global__ void blend_by_hit(SavedView saved, KernelOptions o, OutputView out, LeftPixels left) {
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
@@ -184,7 +185,7 @@ void blend(const Options& options, Output& output, Saved& saved) {
                         resized(p.inverse_z, plane),
                         resized(p.last, plane),
                         resized(p.median, plane)};
-  // One more, so that pairs of marks can be added as words.
+  // Padded by one, so that pairs of flags can be updated as words.
   uint16_t* const touched = resized(saved.touched, Shape{saved.entries.size() + 1});
   const SavedView view = view_of(saved, touched);
   const KernelOptions kernel_options(options);

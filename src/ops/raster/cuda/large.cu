@@ -1,14 +1,14 @@
 #include "ops/raster/cuda/stages.h"
 #include "ops/raster/cuda/warp.h"
 
-// What is added up over a surfel's tiles, where a warp shares the surfels that are in many.
+// Sums over a surfel's tiles. A warp shares the surfels that are in many tiles.
 namespace traceflow::raster::cuda_stage {
 namespace {
 
 constexpr int values = sizeof(SplatGradient) / sizeof(float);
 static_assert(values <= cuda::warp_lanes);
 
-// The places of a surfel's tiles; none where the lane has no surfel.
+// The range of a surfel's entries; empty if the lane has no surfel.
 struct Entries {
   uint32_t begin = 0, end = 0;
 
@@ -18,8 +18,8 @@ __device__ Entries entries_of(const uint32_t* entry_begin, int64_t i, int64_t co
   return i < count ? Entries{entry_begin[i], entry_begin[i + 1]} : Entries{};
 }
 
-// f(first, blended) for every 32 entries, a bit for each that was blended, until it returns false. The marks
-// are read a round ahead. All lanes of the warp take part.
+// Calls f(first, blended) for every 32 entries, with one bit for each entry that was blended, until it
+// returns false. Flags are read one round ahead. All lanes of the warp take part.
 template <class F>
 __device__ void for_each_blended(const uint16_t* touched, const Entries& of, const F& f) {
   const auto mark = [&](uint32_t first) {
@@ -41,15 +41,15 @@ struct AddTiles {
   int64_t count;
 
   __device__ void operator()(int64_t thread) const {
-    // Neighbours go to different warps: where one surfel is large, those beside it often are.
+    // Neighbouring surfels go to different warps, because neighbours of a large surfel are often large.
     const int64_t warps = int64_t{gridDim.x} * blockDim.x / cuda::warp_lanes;
     const int64_t i = thread % cuda::warp_lanes * warps + thread / cuda::warp_lanes;
     const Entries mine = entries_of(entry_begin, i, count);
     for_each_shared(mine.are_shared(), mine, [this](int, const Entries& shared) { add_up(shared); });
   }
 
-  // A lane a value, in the order of the tiles. Rows are read 32 at a time and added one by one; the zero in
-  // the place of a row that is left out changes no sum.
+  // One lane per value, in tile order. Reads 32 rows at a time and adds them one by one. A row that is left
+  // out counts as zero and changes no sum.
   __device__ void add_up(const Entries& of) const {
     const int lane = lane_of_thread();
     float sum = 0;
@@ -69,7 +69,7 @@ struct AddTiles {
   }
 };
 
-// IsVisible, with a warp for each surfel that is in many tiles.
+// IsVisible, with one warp for each surfel that is in many tiles.
 struct FindVisible {
   IsVisible alone;
   int64_t count;

@@ -4,22 +4,22 @@
 #include "ops/raster/cuda/stages.h"
 #include "ops/raster/raster_footprint.h"
 
-// What the kernels of a tile share: which pixel a thread has, and the splats of a batch in shared memory with
-// the warps that each of them reaches.
+// Shared definitions of the kernels that process a tile: the pixel of each thread, and a batch of splats in
+// shared memory with the warps that each splat may cover.
 namespace traceflow::raster::cuda_stage {
 
 inline constexpr int warps_per_tile = pixels_per_tile / cuda::warp_lanes;
-inline constexpr int warp_columns = 8;  // of a warp's pixels
+inline constexpr int warp_columns = 8;  // of the pixels of a warp
 inline constexpr int warp_rows = cuda::warp_lanes / warp_columns;
 
-// A splat in shared memory. The odd number of quads lets lanes that look at a splat each meet different
-// banks.
+// A splat in shared memory. Its size is an odd number of quads, so that lanes that read different splats use
+// different banks.
 struct BatchSplat : Splat {
   float4 apart;
 };
 static_assert(sizeof(BatchSplat) / sizeof(float4) % 2 == 1);
 
-// The addresses of what forward leaves.
+// The addresses of what forward saves.
 struct SavedView {
   int width, height, tile_columns;
   float rho_per_pixel2;
@@ -36,7 +36,7 @@ inline SavedView view_of(const Saved& saved, uint16_t* touched) {
           saved.entries.data(), touched};
 }
 
-// A thread's pixel.
+// The pixel of a thread.
 struct TilePixel {
   int x, y;
   bool in_image;
@@ -70,7 +70,7 @@ struct TilePixel {
   }
 };
 
-// Copies the splats of `count` entries. All threads of the block take part, eight a splat.
+// Copies the splats of `count` entries. All threads of the block take part, eight per splat.
 __device__ inline void load_batch(const SavedView& saved, uint32_t first_entry, int count,
                                   BatchSplat* batch) {
   constexpr int quads = sizeof(Splat) / sizeof(float4);
@@ -81,14 +81,14 @@ __device__ inline void load_batch(const SavedView& saved, uint32_t first_entry, 
   }
 }
 
-// Of the batch's splats from `first` on, which the warp's pixels may be reached by, a bit each.
+// Bit k is set if splat first + k of the batch may cover a pixel of the warp.
 __device__ inline unsigned reached_splats(const TilePixel& pixel, const BatchSplat* batch, int first,
                                           int count) {
   const int mine = first + pixel.lane;
   return __ballot_sync(cuda::full_warp, mine < count && pixel.reached_by(batch[mine]));
 }
 
-// The bits of `touched` for a warp's pixels that took a splat: those of its two blocks of 4×4.
+// The bits of `touched` for the lanes of a warp that blended a splat: those of its two 4×4 blocks.
 __device__ inline unsigned touched_bits(int warp, unsigned lanes) {
   constexpr unsigned left_lanes = 0x0f0f0f0fU;
   const int block = warp / 2 * blocks_per_row + warp % 2 * (warp_columns / block_edge);
@@ -98,14 +98,14 @@ __device__ inline unsigned touched_bits(int warp, unsigned lanes) {
   return bits;
 }
 
-// Marks a splat's blocks while other warps mark theirs.
+// Sets the bits of a splat's blocks. Atomic, because other warps set theirs at the same time.
 __device__ inline void add_touched(uint16_t* touched, uint32_t entry, unsigned bits) {
   auto* const words = reinterpret_cast<unsigned*>(touched);
   atomicOr(words + entry / 2, bits << (entry % 2 * 16));
 }
 
-// sort = hit: f(place, splat, footprint) for a pixel's hits by their own depth, ties by place, until it
-// returns false. Each pass over the list finds the next few.
+// sort = hit: calls f(place, splat, footprint) for the hits of a pixel in the order of their own depth, ties
+// in list order, until it returns false. Each pass over the list finds the next few hits.
 template <class F>
 __device__ void for_each_hit(const SavedView& saved, const TilePixel& pixel, uint32_t begin, uint32_t end,
                              F&& f) {

@@ -6,13 +6,14 @@
 #include "ops/raster/cuda/warp.h"
 #include "ops/raster/raster_footprint.h"
 
-// Which tiles surfels reach, found by the lanes of a warp, a surfel each, the large ones together. The
-// kernels that count tiles and that list them walk by the same functions, and so find the same ones.
+// Finds the tiles that surfels cover, with one surfel per lane of a warp; the whole warp shares large
+// surfels. The kernels that count tiles and those that list them use the same functions, so they find the
+// same tiles.
 namespace traceflow::raster::cuda_stage {
 
-// What a lane brings. May be extended by what visit() below wants to know.
+// The input of a lane. Can be derived from to pass more data to visit() below.
 struct BoundedSurfel {
-  Bounds bounds;  // empty where the lane has no surfel
+  Bounds bounds;  // empty if the lane has no surfel
   uint32_t surfel = 0;
 };
 
@@ -28,7 +29,7 @@ struct TileGrid {
   }
 };
 
-// A lane alone.
+// For one lane alone.
 template <class Surfel, class Visit>
 __device__ int walk_alone(const TileGrid& grid, const Splat* splats, const Surfel& mine, const Visit& visit) {
   int found = 0;
@@ -40,7 +41,7 @@ __device__ int walk_alone(const TileGrid& grid, const Splat* splats, const Surfe
   return found;
 }
 
-// All lanes of a warp for the same surfel.
+// For all lanes of a warp, with the same surfel.
 template <class Surfel, class Visit>
 __device__ int walk_together(const TileGrid& grid, const Splat* splats, const Surfel& shared,
                              const Visit& visit) {
@@ -62,9 +63,9 @@ __device__ int walk_together(const TileGrid& grid, const Splat* splats, const Su
   return found;
 }
 
-// How many tiles a lane's surfel reaches; it is shared by the number of tiles in its bounds. visit(surfel,
-// tile, k) is called for the k-th of them, row by row; for a surfel that the warp shares by any of its lanes.
-// All lanes of the warp take part, those without a surfel too.
+// Returns how many tiles the lane's surfel covers. The warp shares a surfel if its bounds contain more than
+// tiles_of_one_lane tiles. Calls visit(surfel, tile, k) for the k-th covered tile, row by row; for a shared
+// surfel, any lane may make the call. All lanes of the warp take part, also those without a surfel.
 template <class Surfel, class Visit>
 __device__ int for_each_reached(const TileGrid& grid, const Splat* splats, const Surfel& mine,
                                 const Visit& visit) {

@@ -5,11 +5,11 @@
 
 #include "base/kernel.h"
 
-// Lanes that have a surfel each, of which most are small and some cover most of the image: the large ones are
-// shared among the lanes of the warp.
+// Load balancing for one surfel per lane: most are small, but some cover most of the image. The lanes of the
+// warp share the large ones.
 namespace traceflow::raster::cuda_stage {
 
-// f(thread) for all threads, n of them and those that fill the last block, so that no warp lacks a lane.
+// Calls f(thread) for n threads and for those that fill the last block, so that every warp is complete.
 template <class F>
 __global__ void whole_warps_kernel(F f) {
   f(int64_t{blockIdx.x} * blockDim.x + threadIdx.x);
@@ -23,7 +23,7 @@ void for_each_in_whole_warps(const char* description, int64_t n, const F& f) {
 
 __device__ inline int lane_of_thread() { return static_cast<int>(threadIdx.x) % cuda::warp_lanes; }
 
-// What another lane brings.
+// The value of another lane.
 template <class T>
 __device__ T from_lane(int lane, const T& mine) {
   struct Words {
@@ -36,8 +36,8 @@ __device__ T from_lane(int lane, const T& mine) {
   return std::bit_cast<T>(words);
 }
 
-// f(owner, theirs) by all lanes together, for one lane after the other whose own is shared. All lanes of the
-// warp take part.
+// Calls f(owner, theirs) in all lanes together, for each lane with is_shared in turn. All lanes of the warp
+// take part.
 template <class T, class F>
 __device__ void for_each_shared(bool is_shared, const T& mine, const F& f) {
   for (unsigned left = __ballot_sync(cuda::full_warp, is_shared); left != 0; left &= left - 1) {

@@ -1,7 +1,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "ops/trace/cpu/backward.cpp"
 #include <hwy/foreach_target.h>
-// The order matters: what is compiled once per target comes after.
+// The order matters: code compiled once per target must come after this include.
 #include <hwy/highway.h>
 
 #include "base/parallel.h"
@@ -14,7 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace traceflow::trace::HWY_NAMESPACE {
 
-// One ray's hits as blending saw them.
+// One ray's hits, as blended.
 struct RayHits {
   const uint32_t* surfel;
   const float* distance;
@@ -22,7 +22,7 @@ struct RayHits {
   size_t count;
 };
 
-// What backward works out about each hit of a ray, kept between its loops.
+// Values of backward for each hit of a ray, kept between its loops.
 struct RayScratch {
   std::vector<float*> row;           // of the hit's surfel
   std::vector<float> transmittance;  // before the hit
@@ -30,7 +30,7 @@ struct RayScratch {
   std::vector<float> grad_exponent, grad_distance;
   std::vector<float> distance;
 
-  // With room for a vector beyond the last.
+  // With room for one vector past the end.
   void fit(size_t count) {
     if (own.size() >= count + hit_lanes) return;
     const size_t size = 2 * count + hit_lanes;
@@ -39,7 +39,7 @@ struct RayScratch {
   }
 };
 
-// dL/d of one ray's outputs, distances in scene units.
+// dL/d(outputs of one ray), with distances in scene units.
 struct RayGradient {
   Vec3<float> colour{0};
   float alpha = 0, distance = 0;
@@ -70,7 +70,8 @@ HWY_INLINE RaySums replay(const RayHits& hits, RayScratch& scratch) {
   return sums;
 }
 
-// Colours of all hits: dL/dweight of each, and dL/dsh into the rows; returns dL/d(unit direction) by SH.
+// Differentiates the colours of all hits: sets dL/dweight of each and adds dL/dsh to the rows. Returns
+// dL/d(unit direction) through SH.
 template <int degree>
 HWY_INLINE Vec3<float> colours_backward(const PosedSurfels& surfels, const RayHits& hits, const RaySums& sums,
                                         const RayGradient& grad, const Vec3<float>& direction,
@@ -96,7 +97,7 @@ HWY_INLINE Vec3<float> colours_backward(const PosedSurfels& surfels, const RayHi
   return sh_basis_backward(degree, direction, grad_basis);
 }
 
-// Back to front: what each hit's opacity and distance do to the ray.
+// Differentiates blending, back to front, by the opacity and the distance of each hit.
 HWY_INLINE void blend_backward(const RayHits& hits, const RaySums& sums, const RayGradient& grad,
                                const Options& options, RayScratch& scratch) {
   const float grad_distance = grad.distance / sums.alpha;
@@ -133,10 +134,10 @@ void backward_ray(const BackwardInput& input, int64_t r, const RayHits& hits, Ra
          direction_backward(ray, by_colour + by_place.direction, grad.distance, sums.distance));
 }
 
-// Room that a thread reuses.
+// Memory that a thread reuses.
 struct GroupScratch {
   RayScratch ray;
-  std::vector<float*> row_of;  // of each surfel of the group
+  std::vector<float*> row_of;  // by surfel, for those of the group
 };
 
 template <int degree>
@@ -219,7 +220,7 @@ HWY_EXPORT(add_rows);
 
 namespace {
 
-// The groups that are held at a time. At least one.
+// The next groups whose sums fit in memory together; at least one.
 std::span<const Group> next_chunk(const std::vector<Group>& groups, size_t first, size_t row,
                                   size_t& floats) {
   size_t last = first;

@@ -71,7 +71,7 @@ BvhLeaf make_leaf(const PosedSurfels& surfels, const BlendRules<float>& rules,
   return leaf;
 }
 
-// The median of half the diagonals, which stray surfels do not move.
+// The median of half the diagonals, which outliers do not affect.
 float typical_leaf_size(const std::vector<BinaryNode>& binary, const std::vector<uint32_t>& leaves) {
   if (leaves.empty()) return 0;
   std::vector<float> sizes(leaves.size());

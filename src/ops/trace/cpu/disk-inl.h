@@ -1,4 +1,4 @@
-// Rays and disks, a vector of either against one of the other. Compiled once per target.
+// Intersects rays with disks: a vector of one with a single element of the other. Compiled once per target.
 #if defined(TRACEFLOW_TRACE_DISK_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_TRACE_DISK_INL_H
 #undef TRACEFLOW_TRACE_DISK_INL_H
@@ -19,14 +19,14 @@ HWY_BEFORE_NAMESPACE();
 namespace traceflow::trace::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// What decides whether a hit counts.
+// The limits that decide whether a hit counts.
 struct DiskRules {
   BlendRules<float> blend;
   float log_alpha_min;
   float near;
   bool has_cones;        // whether rays may have widths
   float deviations;      // cone_deviations()
-  size_t hits_per_look;  // hits gathered before it is asked whether a ray has ended
+  size_t hits_per_look;  // hits gathered between two checks of whether a ray has ended
 
   DiskRules(const Options& o, bool cones)
       : blend{o.alpha_min, o.alpha_max, o.transmittance_min},
@@ -43,7 +43,7 @@ struct RayVec {
 };
 
 struct DiskHit {
-  Vec distance, exponent;  // of the opacity at the hit
+  Vec distance, exponent;  // exponent: log of the opacity at the hit
   hn::Mask<Tag> mask;
 };
 
@@ -51,8 +51,8 @@ HWY_INLINE Vec dot(Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
   return hn::MulAdd(az, bz, hn::MulAdd(ay, by, hn::Mul(ax, bx)));
 }
 
-// load(row) gives a vector of one of the leaf's rows: 16 disks, or one disk in all lanes. A lane's result is
-// the same to the bit whichever it is.
+// load(row) returns a vector of one row of the leaf: several disks, or one disk in all lanes. The result of a
+// lane is bitwise the same in both cases.
 template <class LoadRow>
 HWY_INLINE DiskHit intersect_disk(const RayVec& ray, const DiskRules& rules, Vec far, LoadRow&& load,
                                   const BvhLeaf& leaf) {
@@ -72,7 +72,7 @@ HWY_INLINE DiskHit intersect_disk(const RayVec& ray, const DiskRules& rules, Vec
     const Vec ux = load(leaf.u[0]), uy = load(leaf.u[1]), uz = load(leaf.u[2]);
     const Vec vx = load(leaf.v[0]), vy = load(leaf.v[1]), vz = load(leaf.v[2]);
     const Vec spread = hn::Mul(t, ray.width), spread2 = hn::Mul(spread, spread), one = hn::Set(d, 1.0F);
-    // By how much the disk's variances grow.
+    // The growth factors of the disk's variances.
     const Vec grown_u = hn::MulAdd(spread2, dot(ux, uy, uz, ux, uy, uz), one);
     const Vec grown_v = hn::MulAdd(spread2, dot(vx, vy, vz, vx, vy, vz), one);
     radius2 = hn::Add(hn::Div(hn::Mul(u, u), grown_u), hn::Div(hn::Mul(v, v), grown_v));
@@ -80,7 +80,7 @@ HWY_INLINE DiskHit intersect_disk(const RayVec& ray, const DiskRules& rules, Vec
   }
   Vec exponent = hn::NegMulAdd(radius2, half, load(leaf.log_opacity));
   auto mask = hn::And(hn::Ge(exponent, least), hn::And(hn::Ge(t, hn::Set(d, rules.near)), hn::Le(t, far)));
-  // The peak is lower. Most disks are out of the question before it is known by how much.
+  // The peak is lower too. Most disks have failed already, so the logarithm is not computed for them.
   if (rules.has_cones && !hn::AllFalse(d, mask)) {
     exponent = hn::NegMulAdd(half, hn::Log(d, grown), exponent);
     mask = hn::And(mask, hn::Ge(exponent, least));
@@ -88,7 +88,7 @@ HWY_INLINE DiskHit intersect_disk(const RayVec& ray, const DiskRules& rules, Vec
   return {t, exponent, mask};
 }
 
-// Of lanes without a hit, whose exponent may be anything, it is not to be used.
+// Lanes without a hit have an arbitrary exponent, which is replaced by zero.
 HWY_INLINE Vec disk_alpha(const DiskHit& hit, const DiskRules& rules) {
   const Tag d;
   const Vec exponent = hn::IfThenElseZero(hit.mask, hit.exponent);

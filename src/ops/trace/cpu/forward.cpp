@@ -1,7 +1,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "ops/trace/cpu/forward.cpp"
 #include <hwy/foreach_target.h>
-// The order matters: what is compiled once per target comes after.
+// The order matters: code compiled once per target must come after this include.
 #include <hwy/highway.h>
 
 #include "base/parallel.h"
@@ -10,19 +10,19 @@
 #include "ops/trace/cpu/sh-inl.h"
 #include "ops/trace/cpu/trace.h"
 
-// Rays are sorted so that neighbours go the same way, and traced in packets of a vector's lanes: one walk
-// through the tree for all of a packet. Where a packet's rays part too much each walks alone. Then each ray's
-// hits are sorted and blended.
+// Rays are sorted so that neighbours have similar paths, and are traced in packets of one ray per lane. A
+// packet traverses the tree once for all its rays. If they diverge too much, each ray traverses alone. Then
+// the hits of each ray are sorted and blended.
 HWY_BEFORE_NAMESPACE();
 namespace traceflow::trace::HWY_NAMESPACE {
 
-// Room that a thread reuses.
+// Memory that a thread reuses.
 struct Scratch {
   PacketHits packet;
   Hits ray;
   HitSorter sorter;
   std::vector<float> weights;         // of one ray's hits
-  std::vector<float> packet_weights;  // per candidate, a lane per ray
+  std::vector<float> packet_weights;  // by candidate, one lane per ray
 };
 
 struct Blended {
@@ -81,14 +81,15 @@ void trace_ray(const BlockTask& task, const DiskRules& rules, int64_t r, const U
   task.saved->end_ray();
 }
 
-// Up to packet_rays rays that can be traced, next to each other in the tracer's order.
+// Up to packet_rays traceable rays that are adjacent in the tracer's order.
 struct Packet {
   UnitRay rays[packet_rays];
-  int64_t index[packet_rays];  // the caller's
+  int64_t index[packet_rays];  // the caller's index
   size_t count = 0;
 };
 
-// Colours of all rays of a packet, a lane each: a candidate's coefficients are read once for all.
+// The colours of all rays of a packet, one per lane. The coefficients of a candidate are read once for all
+// rays.
 template <int degree>
 HWY_INLINE void packet_colours(const PosedSurfels& surfels, const Packet& packet, const Scratch& scratch,
                                float (&colours)[3][packet_rays]) {
@@ -142,9 +143,9 @@ void trace_packet(const BlockTask& task, const DiskRules& rules, const Packet& p
   }
 }
 
-// Whether one walk for all is worth its wider beam.
+// Returns whether one traversal for all rays is worth its wider beam.
 HWY_INLINE bool is_coherent(const BlockTask& task, const Packet& packet) {
-  constexpr float widest = 2.0F;  // in leaves, where the surfels are
+  constexpr float widest = 2.0F;  // in leaf sizes, at the typical distance
   return packet.count > 1 &&
          Beam(packet.rays, packet.count).radius(task.order.sample_distance) < widest * task.bvh.leaf_size;
 }

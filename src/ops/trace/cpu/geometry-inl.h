@@ -1,4 +1,4 @@
-// The backward pass through where a ray meets its surfels, a hit per lane. Compiled once per target.
+// Differentiates the geometry of a ray's hits, one hit per lane. Compiled once per target.
 #if defined(TRACEFLOW_TRACE_GEOMETRY_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_TRACE_GEOMETRY_INL_H
 #undef TRACEFLOW_TRACE_GEOMETRY_INL_H
@@ -20,7 +20,7 @@ using HitTag = hn::CappedTag<float, 16>;
 using HitVec = hn::Vec<HitTag>;
 inline constexpr size_t hit_lanes = hn::MaxLanes(HitTag());
 
-// Three coordinates, a hit per lane.
+// Three coordinates, one hit per lane.
 struct HitVec3 {
   HitVec x, y, z;
 };
@@ -45,12 +45,12 @@ HWY_INLINE Vec3<float> sum_lanes(const HitVec3& v) {
           hn::GetLane(hn::SumOfLanes(d, v.z))};
 }
 
-// Backward frames, a hit's per lane.
+// Backward frames, one hit per lane.
 struct HitFrames {
   HitVec3 position, t_u, t_v, normal;
   HitVec inverse_scale_u, inverse_scale_v, inverse_opacity;
 
-  // Lanes beyond `count` repeat the last.
+  // Lanes from `count` on repeat the last hit.
   HWY_INLINE HitFrames(const BackwardFrame* HWY_RESTRICT frames, const uint32_t* HWY_RESTRICT surfels,
                        size_t count) {
     const HitTag d;
@@ -67,7 +67,7 @@ struct HitFrames {
   }
 };
 
-// What is known of each hit of a ray: arrays with room for a vector beyond the last.
+// The gradients of each hit of a ray, in arrays with room for one vector past the end.
 struct HitGradients {
   const uint32_t* surfel;
   float* const* row;           // of the hit's surfel
@@ -77,7 +77,8 @@ struct HitGradients {
   size_t count;
 };
 
-// -dL/d(along t_u or t_v), and dL/d(scale), of a hit so far along that axis.
+// The derivatives of a hit by one axis (t_u or t_v). along: -dL/d(position along the axis). scale:
+// dL/d(scale).
 struct AxisPull {
   HitVec along, scale;
 };
@@ -86,21 +87,22 @@ HWY_INLINE AxisPull pull_along(HitVec grad_exponent, HitVec along, HitVec invers
   const HitVec pull = hn::Mul(hn::Mul(grad_exponent, u), inverse_scale);
   return {pull, hn::Mul(pull, u)};
 }
-// The same of a disk that a cone widens by a Gaussian of variance `spread2`; adds to -2 dL/d(spread2).
+// The same for a disk that a cone widens by a Gaussian of variance `spread2`. Adds to by_spread2, which is -2
+// dL/d(spread2).
 HWY_INLINE AxisPull pull_along_widened(HitVec grad_exponent, HitVec along, HitVec inverse_scale,
                                        HitVec spread2, HitVec& by_spread2) {
   const HitTag d;
   const HitVec one = hn::Set(d, 1.0F), scale = hn::Div(one, inverse_scale);
   const HitVec precision = hn::Div(one, hn::MulAdd(scale, scale, spread2));
   const HitVec u = hn::Mul(along, precision);
-  // What widening takes from the exponent, twice: it lowers the peak and flattens the slope.
+  // Twice the loss of the exponent by widening, which lowers the peak and flattens the slope.
   const HitVec lost = hn::Mul(grad_exponent, hn::NegMulAdd(u, u, precision));
   by_spread2 = hn::Add(by_spread2, lost);
-  // The peak is as high as scale · √precision.
+  // The height of the peak is scale · √precision.
   return {hn::Mul(grad_exponent, u), hn::NegMulAdd(scale, lost, hn::Mul(grad_exponent, inverse_scale))};
 }
 
-// Adds the parts of each hit, transposed four at a time, to its row.
+// Adds the contributions of each hit to its row, transposed four at a time.
 HWY_INLINE void add_parts(const HitVec (&parts)[12], float* const* rows, size_t count) {
   const HitTag d;
   const hn::CappedTag<float, 4> four;
@@ -119,7 +121,7 @@ HWY_INLINE void add_parts(const HitVec (&parts)[12], float* const* rows, size_t 
   }
 }
 
-// Adds to each hit's row what its place does to its surfel.
+// Adds the contributions of each hit's geometry to the row of its surfel.
 HWY_INLINE RayPull places_backward(const BackwardFrame* frames, const UnitRay& ray,
                                    const HitGradients& hits) {
   const HitTag d;

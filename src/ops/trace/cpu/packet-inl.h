@@ -1,4 +1,4 @@
-// Finds all hits of a packet of coherent rays, a ray per lane. Compiled once per target.
+// Finds all hits of a packet of coherent rays, one ray per lane. Compiled once per target.
 #if defined(TRACEFLOW_TRACE_PACKET_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_TRACE_PACKET_INL_H
 #undef TRACEFLOW_TRACE_PACKET_INL_H
@@ -21,13 +21,14 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 inline constexpr size_t packet_rays = hn::MaxLanes(Tag());
 
-// What a walk finds. A hit of a ray names a candidate: a surfel that some ray of the packet met.
+// The result of a traversal. A hit of a ray refers to a candidate: a surfel that some ray of the packet hits.
 struct PacketHits {
   Hits rays[packet_rays];
   std::vector<uint32_t> candidates;  // surfels
 };
 
-// A sphere around each disk against the beam: bit k if a ray or a cone may come within the radius of disk k.
+// Tests the bounding sphere of each disk against the beam: bit k is set if a ray or a cone may pass within
+// the radius of disk k.
 HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
   const Tag d;
   const Vec dx = hn::Set(d, beam.direction.x), dy = hn::Set(d, beam.direction.y),
@@ -45,9 +46,9 @@ HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
     const Vec aside2 = hn::NegMulAdd(hn::Mul(along, along), inverse_length2, length2);
     const Vec within = hn::Add(hn::Load(d, leaf.radius + i), start);
     const Vec beam_radius = hn::MulAdd(spread, hn::Add(hn::Sqrt(length2), within), within);
-    // The difference of squares has lost up to a few units of the longer one's last place.
+    // The difference of squares has an error of a few units in the last place of the larger one.
     const Vec limit = hn::MulAdd(beam_radius, beam_radius, hn::Mul(length2, hn::Set(d, 2e-6F)));
-    // Not "within" but "not beyond": where a square overflows the disk itself decides.
+    // "Not beyond" instead of "within": if a square overflows, the test of the disk itself decides.
     bits |= (~mask_bits(hn::Gt(aside2, limit)) & ((1U << hn::Lanes(d)) - 1)) << i;
   }
   return bits;
@@ -55,7 +56,7 @@ HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
 
 class PacketTraversal {
  public:
-  // Lanes beyond `count` repeat the last ray and find nothing.
+  // Lanes from `count` on repeat the last ray and find nothing.
   HWY_INLINE PacketTraversal(const Bvh& bvh, const Tensor<float>& sh, const DiskRules& rules,
                              const UnitRay* rays, size_t count, PacketHits& hits, HitSorter& sorter)
       : bvh_(bvh),
@@ -89,7 +90,7 @@ class PacketTraversal {
     beam_.slope = *std::max_element(slope_, slope_ + packet_rays);
   }
 
-  // All hits of each ray up to where it ends for certain, in order.
+  // Finds all hits of each ray up to where it certainly ends, in order.
   HWY_INLINE void run() {
     farthest_ = farthest_distance;
     const BoxBeam boxes(beam_);
@@ -98,7 +99,8 @@ class PacketTraversal {
   }
 
  private:
-  // A vector of rays against each disk or a vector of disks against each ray, whichever is fewer.
+  // Tests a vector of rays against each disk or a vector of disks against each ray, whichever needs fewer
+  // tests.
   HWY_INLINE void meet_leaf(const BvhLeaf& leaf) {
     const uint32_t rays = meet_rays(leaf);
     if (rays == 0) return;
@@ -112,7 +114,7 @@ class PacketTraversal {
     if (hits_.candidates.size() - looked_ >= rules_.hits_per_look) look();
   }
 
-  // Bit l: ray l meets the leaf's box before it ends, or its cone may.
+  // Bit l is set if ray l, or possibly its cone, meets the leaf's box before the ray ends.
   HWY_INLINE uint32_t meet_rays(const BvhLeaf& leaf) const {
     return rules_.has_cones ? meet_cones(leaf) : meet_lines(leaf);
   }
@@ -129,8 +131,8 @@ class PacketTraversal {
     return mask_bits(hn::Le(enter, hn::Mul(leave, hn::Set(d, 1.000001F))));
   }
 
-  // On each axis a cone is in front of the box until the side of it that goes there faster enters, and within
-  // until the slower one leaves, where that goes the same way.
+  // On each axis a cone enters the box when its faster side does. It leaves the box when its slower side
+  // does, or never if that side moves the other way.
   HWY_INLINE uint32_t meet_cones(const BvhLeaf& leaf) const {
     const Tag d;
     const Vec slope = hn::Load(d, slope_);
@@ -164,8 +166,8 @@ class PacketTraversal {
     }
   }
 
-  // Hits name slots of the leaf until all are found: candidates come in an order that no ray's end can
-  // change.
+  // Until all hits are found, they refer to slots of the leaf. So the order of candidates does not depend on
+  // where rays end.
   HWY_INLINE void meet_each_ray(const BvhLeaf& leaf, uint32_t rays) {
     const Tag d;
     size_t first[packet_rays];
@@ -198,7 +200,7 @@ class PacketTraversal {
     }
   }
 
-  // One ray's hits with a vector of disks, from slot `first` of the leaf.
+  // Appends one ray's hits with a vector of disks, from slot `first` of the leaf on.
   HWY_INLINE void append_to(size_t lane, const DiskHit& hit, uint32_t first) {
     const Tag d;
     const hn::RebindToUnsigned<Tag> du;
@@ -220,7 +222,7 @@ class PacketTraversal {
     return candidate;
   }
 
-  // A disk's hits with all rays.
+  // Appends a disk's hits with all rays.
   HWY_INLINE void append(const DiskHit& hit, uint32_t surfel) {
     const Tag d;
     const Vec alpha = disk_alpha(hit, rules_);
@@ -238,7 +240,7 @@ class PacketTraversal {
     }
   }
 
-  // The candidate's coefficients, which its colour will need when the walk is over.
+  // Prefetches the candidate's coefficients, which its colour needs after the traversal.
   HWY_INLINE void fetch_ahead(uint32_t surfel) const {
     constexpr size_t line = 64 / sizeof(float);
     const float* row = sh_ + sh_row_ * surfel;
@@ -277,10 +279,10 @@ class PacketTraversal {
   HWY_ALIGN float origin_[3][packet_rays];
   HWY_ALIGN float direction_[3][packet_rays];
   HWY_ALIGN float reciprocal_[3][packet_rays];
-  HWY_ALIGN float near_reciprocal_[3][packet_rays];  // of the cones' sides
+  HWY_ALIGN float near_reciprocal_[3][packet_rays];  // for the sides of the cones
   HWY_ALIGN float far_reciprocal_[3][packet_rays];
   HWY_ALIGN float width_[packet_rays];
-  HWY_ALIGN float slope_[packet_rays];  // of the cone's side: beyond it no hit counts
+  HWY_ALIGN float slope_[packet_rays];  // of the cone's side, beyond which no hit counts
   HWY_ALIGN float far_[packet_rays];
   HWY_ALIGN float transmittance_[packet_rays];
   size_t cut_at_[packet_rays];

@@ -1,4 +1,4 @@
-// Finds all hits of one ray that can matter, 16 disks at a time. Compiled once per target.
+// Finds all hits of one ray that can matter, several disks at a time. Compiled once per target.
 #if defined(TRACEFLOW_TRACE_RAY_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_TRACE_RAY_INL_H
 #undef TRACEFLOW_TRACE_RAY_INL_H
@@ -16,7 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace traceflow::trace::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Appends the hits of a leaf's disks between `near` and `far`.
+// Appends the hits with a leaf's disks that are not nearer than `rules.near` nor farther than `far`.
 HWY_INLINE void meet_leaf(const BvhLeaf& leaf, const UnitRay& ray, const DiskRules& rules, float far,
                           Hits& hits) {
   const Tag d;
@@ -39,7 +39,7 @@ HWY_INLINE void meet_leaf(const BvhLeaf& leaf, const UnitRay& ray, const DiskRul
   }
 }
 
-// All hits up to where the ray ends for certain, in order.
+// Finds all hits up to where the ray certainly ends, in order.
 HWY_INLINE void find_hits(const Bvh& bvh, const UnitRay& ray, const DiskRules& rules, Hits& hits,
                           HitSorter& sorter) {
   hits.count = 0;

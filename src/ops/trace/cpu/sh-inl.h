@@ -1,4 +1,5 @@
-// SH of one surfel in one direction, straight from the tensor's rows of (r, g, b). Compiled once per target.
+// SH of one surfel in one direction, read directly from the tensor's rows of (r, g, b). Compiled once per
+// target.
 #if defined(TRACEFLOW_TRACE_SH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_TRACE_SH_INL_H
 #undef TRACEFLOW_TRACE_SH_INL_H
@@ -16,7 +17,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 #if HWY_TARGET == HWY_SCALAR
 
-// Without vectors: the same in plain numbers.
+// The same without vectors.
 using Rgb = Vec3<float>;
 
 template <int degree>
@@ -34,7 +35,7 @@ struct ShBasis {
     for (size_t k = 0; k < ShShape<degree>::coefficients; ++k) sum += value[k] * load3<float>(row + 3 * k);
     return sum;
   }
-  // Adds gradient ⊗ basis: dL/dsh.
+  // Adds gradient ⊗ basis, which is dL/dsh.
   void pull(const Rgb& gradient, float* sums) const {
     for (size_t k = 0; k < ShShape<degree>::coefficients; ++k) {
       for (int c = 0; c < 3; ++c) sums[3 * k + static_cast<size_t>(c)] += gradient[c] * value[k];
@@ -77,7 +78,7 @@ class ShPull {
 
 #else
 
-// A vector holds whole coefficients, three lanes each: lane 3i + c is channel c of the i-th.
+// A vector contains whole coefficients, three lanes each: lane 3i + c is channel c of coefficient i.
 using ShTag = hn::CappedTag<float, 16>;
 using ShVec = hn::Vec<ShTag>;
 using Rgb = ShVec;  // lanes 0, 1, 2; the others are unspecified
@@ -94,8 +95,7 @@ struct ShShape {
   }
 };
 
-// Coefficients of vector j from a surfel's row, zeros in the lanes that are not used. Reads nothing beyond
-// the row.
+// Loads vector j of a surfel's coefficients, with zeros in unused lanes. Does not read past the row.
 template <int degree>
 HWY_INLINE ShVec sh_load(const float* HWY_RESTRICT row, size_t j) {
   const ShTag d;
@@ -108,7 +108,7 @@ HWY_INLINE ShVec sh_load(const float* HWY_RESTRICT row, size_t j) {
   }
 }
 
-// v with lane i taken from lane i + shift; lanes that would come from outside are unspecified.
+// Moves lane i + shift of v to lane i. Lanes whose source is out of range are unspecified.
 HWY_INLINE ShVec sh_shift_down(ShVec v, int shift) {
   const ShTag d;
   const hn::RebindToSigned<ShTag> di;
@@ -117,14 +117,14 @@ HWY_INLINE ShVec sh_shift_down(ShVec v, int shift) {
   return hn::TableLookupLanes(v, hn::IndicesFromVec(d, wrapped));
 }
 
-// Sum over the coefficients of a vector, channel by channel: lanes 0, 1, 2.
+// The sum over the coefficients of a vector for each channel, in lanes 0, 1, 2.
 HWY_INLINE ShVec sh_fold(ShVec v) {
   if constexpr (sh_per_vector >= 4) v = hn::Add(v, sh_shift_down(v, 6));
   if constexpr (sh_per_vector >= 2) v = hn::Add(v, sh_shift_down(v, 3));
   return v;
 }
 
-// Values of the coefficients from `padded` on, each in the three lanes of its coefficient.
+// Loads one value per coefficient from `padded` and copies it to the three lanes of its coefficient.
 HWY_INLINE ShVec sh_spread(const float* HWY_RESTRICT padded) {
   HWY_ALIGN static constexpr int32_t lane_of[16] = {0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 0, 0, 0, 0};
   const ShTag d;
@@ -138,7 +138,7 @@ HWY_INLINE ShVec sh_repeat(ShVec rgb) {
   return hn::TableLookupLanes(rgb, hn::SetTableIndices(d, channel_of));
 }
 
-// A ray's basis, spread over the vectors of a surfel's coefficients.
+// A ray's basis in the layout of the vectors of a surfel's coefficients.
 template <int degree>
 struct ShBasis {
   ShVec value[ShShape<degree>::vectors];
@@ -146,7 +146,7 @@ struct ShBasis {
   explicit HWY_INLINE ShBasis(const float* HWY_RESTRICT padded) {
     for (size_t j = 0; j < ShShape<degree>::vectors; ++j) value[j] = sh_spread(padded + sh_per_vector * j);
   }
-  // Σ_k sh[k] basis[k] + 0.5: the colour before it is clamped at zero.
+  // Σ_k sh[k] basis[k] + 0.5: the colour before the clamp at zero.
   HWY_INLINE Rgb colour(const float* HWY_RESTRICT row) const {
     ShVec sum = hn::Mul(sh_load<degree>(row, 0), value[0]);
     for (size_t j = 1; j < ShShape<degree>::vectors; ++j) {
@@ -154,7 +154,7 @@ struct ShBasis {
     }
     return hn::Add(sh_fold(sum), hn::Set(ShTag(), 0.5F));
   }
-  // Adds gradient ⊗ basis, dL/dsh, in vectors as `value` has them.
+  // Adds gradient ⊗ basis, which is dL/dsh, as vectors in the layout of `value`.
   HWY_INLINE void pull(Rgb gradient, float* HWY_RESTRICT sums) const {
     const ShTag d;
     const ShVec repeated = sh_repeat(gradient);

@@ -16,7 +16,7 @@ HWY_BEFORE_NAMESPACE();
 namespace traceflow::trace::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// How many hits are nearer than each of those in `vectors` vectors from `first` on.
+// Counts the hits that are nearer than each hit in `vectors` vectors from `first` on.
 template <size_t vectors>
 HWY_INLINE void count_nearer(const Hits& hits, size_t first, uint32_t* HWY_RESTRICT rank) {
   const Tag d;
@@ -57,7 +57,7 @@ HWY_NOINLINE inline void rank_hits(const Hits& hits, uint32_t* HWY_RESTRICT rank
   }
 }
 
-// Sorts by distance, then by surfel; `names` gives the surfel of what a hit names, null where hits name
+// Sorts by distance, ties by surfel. `names` maps the `surfel` of a hit to a surfel; null if hits store
 // surfels.
 HWY_INLINE void sort_hits(Hits& hits, HitSorter& sorter, const uint32_t* names = nullptr) {
   if (hits.count > HitSorter::most_ranked) {
@@ -69,8 +69,9 @@ HWY_INLINE void sort_hits(Hits& hits, HitSorter& sorter, const uint32_t* names =
   if (!sorter.place(rank, hits)) sorter.sort_many(hits, names);
 }
 
-// Drops what lies behind the hit at which the ray ends. That hit stays: more hits in front can only end the
-// ray sooner. Returns its distance, or `far` where the ray goes on; `transmittance` is what the hits leave.
+// Drops the hits behind the one at which the ray ends. That hit stays, because more hits in front can only
+// end the ray sooner. Returns its distance, or `far` if the ray does not end. `transmittance`: what remains
+// behind the hits.
 inline float cut_hits(const BlendRules<float>& rules, Hits& hits, float far, float& transmittance) {
   transmittance = 1;
   for (size_t i = 0; i < hits.count; ++i) {

@@ -2,7 +2,7 @@
 
 #include "ops/trace/trace.h"
 
-// The tracer on the CPU's cores; the contract is that of trace.h.
+// The tracer on the CPU. The contract is that of trace.h.
 namespace traceflow::trace::cpu {
 
 void build(const PosedSurfels& surfels, const Options& options, Bvh& bvh);

@@ -1,4 +1,4 @@
-// Walks the tree with a beam of rays, near parts first. Compiled once per target.
+// Traverses the tree with a beam of rays, near parts first. Compiled once per target.
 #if defined(TRACEFLOW_TRACE_TREE_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef TRACEFLOW_TRACE_TREE_INL_H
 #undef TRACEFLOW_TRACE_TREE_INL_H
@@ -33,8 +33,8 @@ HWY_INLINE uint32_t mask_bits(hn::Mask<Tag> mask) {
 // 1/d, finite for any d.
 HWY_INLINE float safe_reciprocal(float d) { return std::copysign(1.0F, d) / std::max(std::abs(d), 1e-10F); }
 
-// Rays that at distance t lie within origin_radius + t · direction_radius of origin + t · direction, axis by
-// axis, and cones about them, as far as t · slope from their rays to all sides.
+// A bundle of rays and of cones about them. On each axis, the rays at distance t are within origin_radius + t
+// · direction_radius of origin + t · direction. The cones extend up to t · slope from their rays.
 struct Beam {
   Vec3<float> origin{0}, direction{0};
   Vec3<float> origin_radius{0}, direction_radius{0};
@@ -52,7 +52,7 @@ struct Beam {
     origin = 0.5F * low_origin + 0.5F * high_origin;
     direction = 0.5F * (low_direction + high_direction);
     const Vec3<float> farthest = glm::max(glm::abs(low_origin), glm::abs(high_origin));
-    // Wider by more than rounding can move a hit.
+    // The margin is larger than the rounding error of a hit.
     origin_radius =
         (high_origin - origin) + Vec3<float>(2e-6F * std::max({farthest.x, farthest.y, farthest.z}));
     direction_radius = count > 1 ? high_direction - direction + Vec3<float>(1e-6F) : Vec3<float>(0);
@@ -62,10 +62,10 @@ struct Beam {
   }
 };
 
-// A beam prepared for boxes. On each axis a ray is in front of the box's near plane until t = (plane -
-// near_origin) · near_reciprocal, and behind its far plane from t = (plane - far_origin) · far_reciprocal.
-// Where the beam's directions have both signs it never leaves by either plane: `open`, and both bound t from
-// below.
+// A beam prepared for tests against boxes. On each axis a ray is in front of the near plane of the box until
+// t = (plane - near_origin) · near_reciprocal, and behind the far plane from t = (plane - far_origin) ·
+// far_reciprocal. `open` is true if the beam's directions have both signs. Then the beam does not leave
+// through either plane, and both values are lower bounds of t.
 struct BoxBeam {
   float near_origin[3], far_origin[3];
   float near_reciprocal[3], far_reciprocal[3];
@@ -87,7 +87,8 @@ struct BoxBeam {
   }
 };
 
-// Bit k: some ray of the beam may meet the box of child k at a distance up to `far`, none before near[k].
+// Bit k is set if some ray of the beam may meet the box of child k at a distance of at most `far`. No ray
+// meets it before near[k].
 HWY_INLINE uint32_t meet_boxes(const BvhNode& node, const BoxBeam& beam, float far,
                                float* HWY_RESTRICT near) {
   const Tag d;
@@ -114,7 +115,7 @@ HWY_INLINE uint32_t meet_boxes(const BvhNode& node, const BoxBeam& beam, float f
   return bits;
 }
 
-// on_leaf(leaf) for every leaf that the beam may meet up to `far`, which on_leaf may shorten.
+// Calls on_leaf(leaf) for every leaf that the beam may meet up to `far`. on_leaf may reduce `far`.
 template <class OnLeaf>
 HWY_INLINE void walk_tree(const Bvh& bvh, const BoxBeam& beam, const float& far, OnLeaf&& on_leaf) {
   struct Entry {

@@ -5,8 +5,8 @@
 
 #include "ops/trace/trace_bvh.h"
 
-// The shape of the tree alone, from boxes: first a binary tree, then its nodes gathered into wide ones. Knows
-// nothing of surfels.
+// Builds the tree from boxes: first a binary tree, whose nodes are then merged into wide ones. Independent of
+// surfels.
 namespace traceflow::trace {
 
 using Float4 = float __attribute__((vector_size(16)));
@@ -27,7 +27,7 @@ struct Box {
     lower = lower_of(lower, p);
     upper = upper_of(upper, p);
   }
-  // Half the surface, the measure of how often a ray meets the box.
+  // Half the surface area, which is proportional to the probability that a ray meets the box.
   float area() const {
     const Float4 d = upper - lower;
     return d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
@@ -37,23 +37,24 @@ struct Box {
 };
 
 struct BoxItem {
-  Box box;  // the fourth lanes are 0
+  Box box;  // the fourth lane is 0
   uint32_t index;
 };
 
-// Over items [begin, end) of the sorted array. A leaf, with at most bvh_width items, has no children: left is
-// 0. Otherwise both children stand behind their parent.
+// A node over items [begin, end) of the sorted array. A leaf has at most bvh_width items and no children:
+// left is 0. Otherwise both children have higher indices than their parent.
 struct BinaryNode {
   Box box;
   uint32_t begin = 0, end = 0;
   uint32_t left = 0, right = 0;
 };
 
-// Sorts `items`; the root is node 0. Empty for no items. Depends on the items and their order only.
+// Sorts `items`. Node 0 is the root; returns no nodes for no items. The result depends only on the items and
+// their order.
 std::vector<BinaryNode> build_binary_tree(std::vector<BoxItem>& items);
 
-// Wide nodes that cost a ray least, and the leaves of the binary tree in the order of their numbers in
-// `nodes`.
+// The wide nodes with the lowest cost per ray, and the leaves of the binary tree in the order of their
+// numbers in `nodes`.
 struct WideTree {
   std::vector<BvhNode> nodes;
   std::vector<uint32_t> leaves;

@@ -5,9 +5,9 @@
 
 #include "base/parallel.h"
 
-// Top-down: the widest box of a node is cut until the node is full. A cut is the cheapest by the surface area
-// heuristic among planes between bins of centres. Minima, maxima and counts do not depend on the order of
-// their terms, so blocks of a large range may be binned by several threads.
+// Builds top-down: cuts a range of items in two until it fits a leaf. A cut is the cheapest plane between
+// bins of centres by the surface area heuristic. Minima, maxima and counts do not depend on the order of
+// their terms, so several threads can bin blocks of a large range.
 namespace traceflow::trace {
 
 namespace {
@@ -29,7 +29,7 @@ struct Bins {
   std::array<std::array<uint32_t, most_bins>, 3> count{};
 };
 
-// Which bin a centre falls in, on all three axes.
+// The bin of a centre on all three axes.
 struct Binning {
   Float4 offset, factor;
   int bins;
@@ -54,7 +54,7 @@ struct Binning {
 
 struct Cut {
   int axis = -1;
-  int bin = 0;  // items of lower bins go left
+  int bin = 0;  // items of lower bins go to the left
   float cost = std::numeric_limits<float>::max();
 };
 
@@ -87,7 +87,7 @@ Bins fill_bins_parallel(const BoxItem* items, uint32_t count, const Binning& bin
   return partial[0];
 }
 
-// Leaves are tested 16 surfels at a time: a part costs as many tests as it fills leaves.
+// Leaves are tested 16 surfels at a time, so the cost of a part is the number of leaves that it fills.
 float part_cost(const Box& box, uint32_t count) {
   const uint32_t leaves = (count + bvh_width - 1) / bvh_width;
   return box.area() * static_cast<float>(leaves);
@@ -136,15 +136,15 @@ class Builder {
  public:
   explicit Builder(std::vector<BoxItem>& items) : items_(items) {}
 
-  // A subtree that is left for later: its root is to stand in the place of `node`.
+  // A subtree to be built later. Its root replaces `node`.
   struct Job {
     uint32_t node;
     Range range;
     int depth;
   };
 
-  // Adds the node over `range` and all below it, but leaves what has at most job_items to `jobs` where there
-  // are any.
+  // Adds the node over `range` and its descendants. If `jobs` is not null, it postpones subtrees of at most
+  // job_items items to `jobs`.
   uint32_t add_node(const Range& range, int depth, std::vector<BinaryNode>& out, std::vector<Job>* jobs) {
     const auto index = static_cast<uint32_t>(out.size());
     out.push_back({range.box, range.begin, range.end, 0, 0});
@@ -200,7 +200,7 @@ class Builder {
     return {left, right};
   }
 
-  // For items that no plane tells apart, or a tree that has grown too deep.
+  // For items that no plane separates, or if the tree has become too deep.
   std::pair<Range, Range> halve(const Range& range) {
     const Float4 size = range.centres.upper - range.centres.lower;
     const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
@@ -219,7 +219,7 @@ class Builder {
   std::vector<BoxItem>& items_;
 };
 
-// Appends the subtrees, each without its root, which takes the place that was kept for it.
+// Appends the subtrees. Each root replaces the node that was reserved for it.
 void join(const std::vector<Builder::Job>& jobs, const std::vector<std::vector<BinaryNode>>& parts,
           std::vector<BinaryNode>& out) {
   for (size_t i = 0; i < jobs.size(); ++i) {

@@ -3,18 +3,18 @@
 
 #include "ops/trace/cpu/tree.h"
 
-// Which nodes of the binary tree become wide nodes, and which are passed over, is chosen by dynamic
-// programming: cheapest in the sum of areas of all that a ray may have to visit.
+// Dynamic programming chooses which nodes of the binary tree become wide nodes and which are skipped. It
+// minimises the sum of the areas of all that a ray may have to visit.
 namespace traceflow::trace {
 
 namespace {
 
-// What a visit costs, a leaf against a node.
+// The cost of visiting a leaf and a node.
 constexpr float leaf_cost = 0.8F;
 constexpr float node_cost = 1.0F;
 
-// For one binary node: the cost of standing for its subtree by at most k+1 wide children, and how many of
-// those the left half gets (0: use k instead).
+// For one binary node: the cost of representing its subtree by at most k+1 children of a wide node, and how
+// many of these the left half gets (0: at most k children cost as little).
 struct Choices {
   std::array<float, bvh_width> cost;
   std::array<uint8_t, bvh_width> left;
@@ -90,7 +90,7 @@ class Widener {
       gather(left, to_left, children, count);
       gather(right, bvh_width - to_left, children, count);
     } else {
-      children[static_cast<size_t>(count++)] = node;  // a tree of one leaf
+      children[static_cast<size_t>(count++)] = node;  // a tree with one leaf
     }
     return count;
   }

@@ -10,21 +10,21 @@ namespace {
 
 constexpr int backward_threads = 128;
 
-// What the lanes of a block bring to their surfels, a row each, so that a warp adds a row together.
+// What the lanes of a block add to their surfels, one row each, so that a warp adds a row together.
 struct Rows {
-  float basis[backward_threads][17];  // of the lane's ray; an odd width keeps the rows in different banks
+  float basis[backward_threads][17];  // of the lane's ray; the odd width puts the rows in different banks
   float passed[backward_threads][3];
   float part[backward_threads][part::count + 1];
   uint32_t surfel[backward_threads];
 };
 
-// A ray's records from the last hit to the first.
+// Iterates over a ray's records from the last hit to the first.
 class RecordIterator {
  public:
   __device__ RecordIterator(const Record* records, uint32_t last_head)
       : records_(records), next_head_(last_head) {}
 
-  // Whether there is another hit, at place().
+  // Moves to the next hit, at place(). Returns false if there is none.
   __device__ bool next() {
     if (left_ == 0) {
       if (next_head_ == no_record) return false;
@@ -45,15 +45,15 @@ class RecordIterator {
   uint32_t next_head_, head_ = 0, left_ = 0;
 };
 
-// A ray on its way from its last hit to its first.
+// The state of a ray, from its last hit to its first.
 template <int degree>
 struct RayBackward {
   UnitRay ray;
   RaySums sums{};
   Vec3<float> grad_colour{0};
-  float grad_alpha = 0, grad_distance = 0;  // the distance in scene units
-  float behind = 0;                         // Σ over the hits behind of weight · dL/dweight
-  RayPull pull;                             // dL/d, by the places of the hits
+  float grad_alpha = 0, grad_distance = 0;  // distance in scene units
+  float behind = 0;                         // Σ weight · dL/dweight over the hits behind
+  RayPull pull;                             // dL/d(ray) through the geometry of the hits
   float basis_pull[sh_coefficients(degree)] = {};
 
   __device__ void load(const BackwardTask& task, int64_t i, int64_t r) {
@@ -64,7 +64,7 @@ struct RayBackward {
     behind = sums.remaining * dot(grad_colour, task.rays.background);
   }
 
-  // What a hit brings to its surfel: dL/dcolour and the parts.
+  // Computes what a hit adds to its surfel: dL/dcolour and the contributions.
   __device__ void pass(const BackwardTask& task, const Record& hit, const float* basis, float* passed,
                        float* parts) {
     constexpr int numbers = 3 * sh_coefficients(degree);
@@ -94,8 +94,8 @@ struct RayBackward {
   }
 };
 
-// Adds the rows of those lanes of the warp that met the same surfel to it. All lanes take part, so that
-// neighbours in memory are added to at once.
+// Adds the rows of the lanes that hit the same surfel to that surfel. All lanes take part, so that adjacent
+// addresses are updated together.
 template <int degree>
 __device__ void add_group(const Rows& rows, int first_row, unsigned group, const BackwardTask& task) {
   constexpr int numbers = 3 * sh_coefficients(degree);
@@ -128,7 +128,7 @@ __device__ void add_rows(const Rows& rows, bool mine, const BackwardTask& task) 
   __syncwarp();
 }
 
-// Keeps a lane's row for sums in a fixed order.
+// Stores a lane's row, for sums in a fixed order.
 __device__ void keep_row(const Rows& rows, int64_t i, const RecordIterator& record,
                          const BackwardTask& task) {
   const uint32_t place = record.place();
@@ -144,7 +144,7 @@ __device__ void keep_row(const Rows& rows, int64_t i, const RecordIterator& reco
   task.places[record.head()] = record.head();
 }
 
-// A thread a ray, back to front.
+// One thread per ray, back to front.
 template <int degree, bool in_order>
 __global__ void __launch_bounds__(backward_threads) backward_kernel(BackwardTask task) {
   __shared__ Rows rows;

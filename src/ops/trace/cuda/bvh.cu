@@ -5,8 +5,8 @@
 #include "ops/trace/trace_disk.h"
 #include "primitives/sort.h"
 
-// Builds the tree from scratch (Karras 2012): keys along a curve, a sort, all nodes at once from the keys,
-// and the boxes from the leaves up.
+// Builds the tree from scratch (Karras 2012): computes keys along a space-filling curve, sorts them, builds
+// all nodes at once from the keys, and the boxes from the leaves up.
 namespace traceflow::trace::cuda {
 
 using namespace traceflow::cuda;
@@ -14,10 +14,10 @@ using namespace traceflow::cuda;
 namespace {
 
 constexpr int build_threads = 256;
-constexpr uint64_t left_out = uint64_t{1} << 63;  // behind every key of the curve
+constexpr uint64_t left_out = uint64_t{1} << 63;  // greater than every key of the curve
 constexpr uint32_t no_parent = 0xffffffffU;
 
-// Numbers in the order of the floats; 0 is less than all of theirs.
+// Integers in the same order as the floats; 0 is less than all of them.
 __device__ uint32_t to_ordered(float x) {
   const uint32_t bits = __float_as_uint(x);
   return bits >> 31 != 0 ? ~bits : bits | 0x80000000U;
@@ -42,8 +42,8 @@ __device__ DiskBox box_of(const BuildInput& input, int64_t i) {
   return disk_box(input.surfels.frame(i), std::sqrt(cutoff_radius2(input.rules, input.surfels.opacity[i])));
 }
 
-// Finds the surfels that can be hit, and the bounds of their centres: bounds holds the largest of x, y, z,
-// -x, -y, -z, ordered.
+// Finds the surfels that can be hit, and the bounds of their centres: bounds is the largest of x, y, z, -x,
+// -y, -z, as ordered integers.
 __global__ void __launch_bounds__(build_threads)
     choose_surfels(BuildInput input, uint64_t* keys, uint32_t* indices, uint32_t* bounds) {
   const int64_t i = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
@@ -63,7 +63,7 @@ __global__ void __launch_bounds__(build_threads)
   }
 }
 
-// Moves the lower 21 bits apart: to bits 0, 3, 6, …
+// Moves the lower 21 bits to bits 0, 3, 6, …
 __device__ uint64_t spread_bits(uint64_t x) {
   x = (x | x << 32) & 0x001f00000000ffffU;
   x = (x | x << 16) & 0x001f0000ff0000ffU;
@@ -84,14 +84,14 @@ __global__ void __launch_bounds__(build_threads)
   }
   uint64_t key = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    // One centre only, or all in one place: any key will do.
+    // If there is one centre only, or all coincide, any key is valid.
     const float cell = extent > 0 ? (position[3 * i + axis] - lower[axis]) / extent * cells : 0.0F;
     key |= spread_bits(static_cast<uint64_t>(std::fmin(std::fmax(cell, 0.0F), cells))) << axis;
   }
   keys[i] = key;
 }
 
-// How many leading bits the keys of places i and j share, equal keys being told apart by their place.
+// The number of leading bits that the keys at positions i and j share. The position distinguishes equal keys.
 struct Keys {
   const uint64_t* key;
   int count;
@@ -111,11 +111,11 @@ struct TreeView {
 
 __device__ void set_child(const TreeView& tree, uint32_t node, uint32_t side, uint32_t child, bool is_disk) {
   tree.nodes[node].child[side] = is_disk ? child | disk_bit : child;
-  tree.nodes[node].unused[side] = 0;  // walks load it with the rest
+  tree.nodes[node].unused[side] = 0;  // traversals load it with the rest
   (is_disk ? tree.disk_parent : tree.node_parent)[child] = 2 * node + side;
 }
 
-// One disk alone has a root all the same, whose right half is empty.
+// A single disk also needs a root, whose right child is empty.
 __device__ void make_lone_root(const TreeView& tree) {
   set_child(tree, 0, 0, 0, true);
   tree.arrived[0] = 0;
@@ -127,8 +127,8 @@ __device__ void make_lone_root(const TreeView& tree) {
   }
 }
 
-// Node i covers the places of all keys that share more bits with key i than key i shares with its neighbour
-// on the other side, and is cut where those keys first differ.
+// Node i covers all keys that share more bits with key i than key i shares with its neighbour on the other
+// side. It is split where those keys first differ.
 __global__ void __launch_bounds__(build_threads) make_nodes(Keys keys, TreeView tree) {
   const int64_t index = int64_t{blockIdx.x} * blockDim.x + threadIdx.x;
   if (index == 0) tree.node_parent[0] = no_parent;
@@ -164,8 +164,8 @@ __device__ Disk make_disk(const BuildInput& input, uint32_t surfel) {
           {f.rotation[0] / f.scale.x, f.rotation[1] / f.scale.y, {}}};
 }
 
-// Joins the box with that of the other half of the node. Read past the first cache, which does not see what
-// other processors write.
+// Merges the box of the other half of the node. Bypasses the L1 cache, which does not see what other
+// multiprocessors write.
 __device__ void join_other_half(const Node& node, uint32_t side, DiskBox& box) {
   for (int axis = 0; axis < 3; ++axis) {
     const float* other = node.box[axis] + 2 * (1 - side);
@@ -174,8 +174,8 @@ __device__ void join_other_half(const Node& node, uint32_t side, DiskBox& box) {
   }
 }
 
-// Every disk climbs towards the root and fills in boxes, until it comes to a node whose other child is not
-// there yet: that one will go on.
+// The thread of a disk climbs towards the root and sets boxes. It stops at a node whose other child is not
+// ready yet; the thread of that child continues from there.
 __global__ void __launch_bounds__(build_threads)
     make_disks_and_boxes(BuildInput input, const uint64_t* sorted_keys, const uint32_t* sorted_indices,
                          TreeView tree, Disk* disks) {

@@ -7,7 +7,7 @@ using namespace traceflow::cuda;
 
 namespace {
 
-// One ray while it is blended.
+// The state of one ray.
 struct Blending {
   float remaining = 1, alpha = 0, distance = 0;
   Vec3<float> colour{0};
@@ -16,7 +16,8 @@ struct Blending {
   __device__ float mean_distance() const { return hits > 0 ? distance / alpha : 0; }
 };
 
-// Blends the hits front to back. Returns how many: a ray that ends does so in front of a hit.
+// Blends the hits front to back. Returns how many it blended: a ray ends in front of the hit that would leave
+// too little transmittance.
 template <int degree>
 __device__ int blend_hits(const RayInput& input, bool coloured, KBuffer& hits, const float* basis,
                           Blending& ray) {
@@ -35,7 +36,8 @@ __device__ int blend_hits(const RayInput& input, bool coloured, KBuffer& hits, c
   return i;
 }
 
-// Gives every lane of the warp as many records as it wants, with one addition for all. All lanes take part.
+// Allocates the records that each lane of the warp wants, with one atomic addition for all. All lanes take
+// part.
 __device__ unsigned long long take_records(unsigned long long* used, unsigned wanted) {
   const int lane = static_cast<int>(threadIdx.x) % warp_lanes;
   unsigned sum = wanted;
@@ -49,8 +51,8 @@ __device__ unsigned long long take_records(unsigned long long* used, unsigned wa
   return first + sum - wanted;
 }
 
-// Keeps the first `count` hits of a pass that met them with this transmittance. All lanes of the warp take
-// part.
+// Stores the first `count` hits of a pass. transmittance: in front of the first of them. All lanes of the
+// warp take part.
 __device__ void keep_hits(const RecordStore& store, KBuffer& hits, int count, float transmittance,
                           uint32_t& last_head) {
   const unsigned wanted = count > 0 ? static_cast<unsigned>(count) + 1 : 0;
@@ -77,7 +79,7 @@ __device__ void keep_ray(const RecordStore& store, int64_t i, const Blending& b)
   store.sums[i] = {b.remaining, b.alpha, b.mean_distance()};
 }
 
-// A thread a ray. In each pass all lanes of a warp find their next hits, then blend them.
+// One thread per ray. In each pass all lanes of a warp find their next hits, then blend them.
 template <int degree>
 __global__ void __launch_bounds__(walk_threads)
     trace_kernel(RayInput input, RayOutput output, RecordStore store) {

@@ -6,10 +6,10 @@
 #include "math/blend.h"
 #include "ops/trace/cuda/trace.h"
 
-// Steps of the tracer on the device that its .cu files share.
+// Steps of the tracer on the device that several .cu files share.
 namespace traceflow::trace::cuda {
 
-// What lies at an address that no one writes to meanwhile, 16 bytes at a time.
+// Loads a value 16 bytes at a time from memory that no thread writes to during the kernel.
 template <class T>
 __device__ T load_quads(const T& at) {
   constexpr size_t count = sizeof(T) / sizeof(float4);
@@ -43,45 +43,46 @@ struct TraversalRules {
         deviations(cone_deviations(o)) {}
 };
 
-// Rays [first, last) in the tracer's order, and what is traced. `nodes` is null where there is nothing.
+// Rays [first, last) in the tracer's order, and what they are traced through. `nodes` is null for an empty
+// tree.
 struct RayInput {
   const Node* nodes;
   const Disk* disks;
   const float* sh;
   RayView rays;
-  const uint32_t* order;  // the caller's index of each ray; null where that is the tracer's
+  const uint32_t* order;  // the caller's index of each ray; null if the orders are the same
   int64_t first, last;
   TraversalRules rules;
   Vec3<float> background;
 
-  // The ray of this thread.
+  // The index of this thread's ray.
   __device__ int64_t own() const { return first + int64_t{blockIdx.x} * blockDim.x + threadIdx.x; }
   __device__ int64_t callers(int64_t i) const { return order ? int64_t{order[i]} : i; }
 };
 
-// Where rays go that are traced; null where they are traced for their hits only.
+// The outputs of the rays; null if rays are traced for their hits only.
 struct RayOutput {
   float *colour, *alpha, *distance;
 };
 
-// Where hits are kept. Those that find no room are left out, but counted in `used`.
+// Where hits are stored. Hits that do not fit are dropped, but counted in `used`.
 struct RecordStore {
-  bool keep;  // else nothing here is touched
+  bool keep;  // if false, nothing here is used
   Record* records;
   uint64_t capacity;
   unsigned long long* used;
   uint32_t* last_head;
-  // Null where rays are traced again.
+  // Null if rays are traced again.
   uint32_t* hits;
   RaySums* sums;
 };
 
-// The order of all rays, of which there is one and a surfel. Equal ones stay in the caller's order.
+// Sorts all rays. There must be at least one ray and one surfel. Equal keys keep the caller's order.
 const uint32_t* sort_rays(const RayInput& input, int64_t surfels, SortedRays& rays);
 
 void trace_rays(int degree, const RayInput& rays, const RayOutput& output, const RecordStore& store);
 
-// What backward has beside the rays. Hits are those in `records`.
+// The input and output of backward. Hits are in `records`.
 struct BackwardTask {
   RayInput rays;
   const Record* records;
@@ -90,12 +91,12 @@ struct BackwardTask {
   const BackwardFrame* frames;
   const float *grad_colour, *grad_alpha, *grad_distance;  // null means zero
   float *grad_origins, *grad_directions;
-  float* grad_widths;  // null where rays have none
-  // Sums of all hits, added to as they come ...
+  float* grad_widths;  // null if rays have no widths
+  // Without `parts`: sums over all hits, added to in any order.
   SurfelSums* surfel_sums;
   float* grad_sh;
-  // ... or, where they are to be added in a fixed order, what each hit brings: by the place of its record.
-  // The key sorts hits by surfel and ray.
+  // With `parts`, for sums in a fixed order: the contributions of each hit, by the index of its record. The
+  // key sorts hits by surfel and ray.
   HitParts* parts;
   uint64_t* keys;
   uint32_t* places;
@@ -106,8 +107,8 @@ struct BackwardTask {
 
 void trace_backward(int degree, const BackwardTask& task);
 
-// Adds the hits in the first `records` places of `hits` to the sums of their surfels, in the order of the
-// rays. `surfels`: how many there are.
+// Adds the first `records` elements of `hits.parts` to the sums of their surfels, in the order of the rays.
+// `surfels`: the number of surfels.
 void sum_in_order(int degree, int64_t records, uint32_t surfels, int ray_bits, SavedHits& hits,
                   SurfelSums* sums, float* grad_sh);
 

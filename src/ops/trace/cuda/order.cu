@@ -2,7 +2,7 @@
 #include "ops/trace/trace_ray_key.h"
 #include "primitives/sort.h"
 
-// Orders rays as trace_order.cpp does on the CPU, but for its groups.
+// Orders rays like trace_order.cpp on the CPU, but without groups.
 namespace traceflow::trace::cuda {
 
 using namespace traceflow::cuda;
@@ -12,13 +12,13 @@ namespace {
 constexpr int samples = 256;
 constexpr int order_threads = 256;
 
-// One number from each thread of the block, and the one in their middle.
+// One number per thread of the block, and their median.
 struct Median {
   float value[samples];
   float middle;
 };
 
-// The median of the numbers of those threads that have one; 0 where none has. All threads take part.
+// The median of the numbers of the threads with `has`; 0 if there is none. All threads take part.
 __device__ float find_median(Median& shared, float own, bool has) {
   const int me = static_cast<int>(threadIdx.x);
   shared.value[me] = has ? own : INFINITY;
@@ -35,7 +35,7 @@ __device__ float find_median(Median& shared, float own, bool has) {
   return middle;
 }
 
-// Medians of samples: neither stray rays nor stray surfels move them. One block.
+// Medians of samples, which outliers among rays and surfels do not affect. One block.
 __global__ void __launch_bounds__(samples) find_frame(RayInput input, int64_t surfels, float* frame) {
   __shared__ Median shared;
   const int64_t r = input.last * threadIdx.x / samples;

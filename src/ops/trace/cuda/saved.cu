@@ -6,28 +6,28 @@
 #include "ops/trace/cuda/traverse.h"
 #include "ops/trace/trace_bvh.h"
 
-// What the host does for both passes. Forward keeps hits as long as there is room. Where it ran out, backward
-// traces the rays again, in parts whose hits have room.
+// The host side of both passes. Forward stores hits as long as there is room. If it runs out, backward traces
+// the rays again, in parts whose hits fit.
 namespace traceflow::trace::cuda {
 
 using namespace traceflow::cuda;
 
 namespace {
 
-// Whether rays are sorted before they are traced. Changes speed, and the order of sums.
+// Whether rays are sorted before they are traced. Changes speed and the order of sums.
 constexpr bool sorts_rays = true;
-constexpr int64_t expected_records = 64;  // of a ray, until it is known better
+constexpr int64_t expected_records = 64;  // per ray, as a first estimate
 constexpr int64_t most_records = no_record - 1;
 
-// A tensor's memory on the device, in this shape.
+// Resizes a tensor on the device and returns its memory.
 template <class T>
 T* room(Tensor<T>& tensor, const Shape& shape) {
   tensor.place(Device::cuda).resize(shape);
   return tensor.data();
 }
 
-// The same for a tensor that is bounded: one that grows is given a quarter more, but where that would pass
-// the bound it is made anew.
+// The same for a tensor of at most `most` numbers. A growing tensor gets a quarter more memory. If that
+// exceeds `most`, the tensor is freed and allocated again.
 template <class T>
 T* room_within(int64_t most, Tensor<T>& tensor, int64_t count) {
   if (tensor.size() < count && count + count / 4 > most) tensor = {};
@@ -36,15 +36,15 @@ T* room_within(int64_t most, Tensor<T>& tensor, int64_t count) {
 
 const float* data_or_null(const Tensor<float>& tensor) { return tensor.empty() ? nullptr : tensor.data(); }
 
-// How many the limit allows.
+// The number of records that the limit allows.
 int64_t allowed_records(const Saved& saved) {
-  // Of a sort that keeps what it is given, and of the ends of spans.
+  // For a sort that keeps its input, and for the ends of spans.
   constexpr size_t in_order = sizeof(HitParts) + 3 * (sizeof(uint64_t) + sizeof(uint32_t)) + 8;
   const size_t bytes = sizeof(Record) + (deterministic() ? in_order : 0);
   return std::clamp<int64_t>(saved.device_bytes / static_cast<int64_t>(bytes), 1, most_records);
 }
 
-// Of a ray: its hits, and a head for each pass.
+// The records of a ray: its hits, and one head for each pass.
 int64_t records_of(uint32_t hits) { return hits + (int64_t{hits} + held_hits - 1) / held_hits; }
 
 SavedHits& hits_of(const Saved& saved) {
@@ -66,7 +66,8 @@ void allocate(const Saved& saved, int64_t rays, SavedHits& hits) {
   hits.overwritten = false;
 }
 
-// All of the gradient is set, but for dL/dsh, which hits are added to, and tints, which no ray sees.
+// Everything in the gradient is set later, except dL/dsh, which hits add to, and tints, which rays do not
+// use.
 void allocate(const PosedSurfels& surfels, const Rays& rays, InputGradient& gradient) {
   PosedSurfels& g = gradient.surfels;
   room(g.position, surfels.position.shape());
@@ -83,8 +84,8 @@ void allocate(const PosedSurfels& surfels, const Rays& rays, InputGradient& grad
   room(gradient.position_gradient, {surfels.count()});
 }
 
-// Reads how many records the forward pass wanted. The host waits for the device: what is launched next
-// depends on it.
+// Reads how many records the forward pass wanted. The host waits for the device, because the next launch
+// depends on the number.
 int64_t look_at_records(SavedHits& hits) {
   if (hits.records_wanted == SavedHits::unknown) {
     hits.records_wanted = static_cast<int64_t>(hits.used.on(Device::cpu)[0]);
@@ -140,7 +141,7 @@ class Backward {
     task_.head_key = uint64_t{surfels_} << task_.ray_bits;
   }
 
-  // Rays [first, last), whose hits are in the first `records` records.
+  // Processes rays [first, last), whose hits are in the first `records` records.
   void run(int64_t first, int64_t last, int64_t records) {
     task_.rays.first = first;
     task_.rays.last = last;
@@ -152,7 +153,8 @@ class Backward {
     }
   }
 
-  // The same for all rays, of whose hits at most `allowed` have room at a time; but a ray's always have.
+  // Processes all rays in parts with at most `allowed` records each. A part always has room for at least one
+  // ray.
   void trace_again(int64_t allowed) {
     require(hits_.tree != nullptr && hits_.tree->builds == hits_.builds,
             "the BVH of the forward pass is still there");

@@ -3,10 +3,11 @@
 #include "math/spherical_harmonics.h"
 #include "ops/trace/cuda/forward.h"
 
-// Spherical harmonics of one surfel seen by one thread. Included by .cu files only.
+// Spherical harmonics of one surfel, for one thread. Included by .cu files only.
 namespace traceflow::trace::cuda {
 
-// f(k, channel, number) for all coefficients of a surfel, read four at a time where rows are so aligned.
+// Calls f(k, channel, number) for all coefficients of a surfel. Reads four at a time if the rows are aligned
+// to that.
 template <int degree, class F>
 __device__ void for_each_coefficient(const float* row, F&& f) {
   constexpr int numbers = 3 * sh_coefficients(degree);
@@ -26,7 +27,7 @@ __device__ void for_each_coefficient(const float* row, F&& f) {
   }
 }
 
-// Σ_k sh[k] basis[k] + 0.5: the colour before it is clamped at zero.
+// Σ_k sh[k] basis[k] + 0.5: the colour before the clamp at zero.
 template <int degree>
 __device__ Vec3<float> raw_colour(const float* row, const float* basis) {
   float colour[3] = {0.5F, 0.5F, 0.5F};

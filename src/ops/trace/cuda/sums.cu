@@ -2,9 +2,10 @@
 #include "ops/trace/cuda/forward.h"
 #include "primitives/sort.h"
 
-// Adds what hits bring to their surfels in an order that is the same every run. Hits are sorted by surfel,
-// and by ray. A warp adds the runs of a span of them: one that lies inside the span is done, those at its
-// ends become rows of a shorter list, which is treated in the same way until one span holds it.
+// Sums the contributions of hits to their surfels in a fixed order. Hits are sorted by surfel, then by ray. A
+// run is a sequence of hits of one surfel. A warp sums the runs of a span of hits. A run inside the span is
+// complete. The runs at the two ends become rows of a shorter list, which is processed in the same way until
+// one span holds it all.
 namespace traceflow::trace::cuda {
 
 using namespace traceflow::cuda;
@@ -13,13 +14,13 @@ namespace {
 
 constexpr int sum_threads = 128;
 constexpr int64_t span_rows = 64;
-constexpr int row_values = 2 * warp_lanes;  // dL/dsh, then the parts, then nothing
+constexpr int row_values = 2 * warp_lanes;  // dL/dsh, then the contributions, then padding
 
 struct Totals {
   SurfelSums* sums;
   float* grad_sh;
-  int numbers;       // of dL/dsh
-  uint32_t surfels;  // rows of others are heads of passes
+  int numbers;       // in dL/dsh
+  uint32_t surfels;  // rows with higher numbers are heads of passes
 };
 
 // The sorted hits.
@@ -47,7 +48,7 @@ struct EndRows {
   __device__ float value(int64_t i, int v) const { return values[row_values * i + v]; }
 };
 
-// Two rows for each span.
+// Output: two rows for each span.
 struct Ends {
   uint32_t* surfels;
   float* values;
@@ -103,7 +104,7 @@ __global__ void __launch_bounds__(sum_threads) add_runs(Rows rows, int64_t count
     add_total(totals, surfel, sum);
     return;
   }
-  // A run that fills the span has a second row of zeros, so that equal surfels stay side by side.
+  // If one run fills the whole span, the second row is zero, so that rows of equal surfels stay adjacent.
   if (first_run) {
     ends.write(2 * span, surfel, sum);
     sum[0] = sum[1] = 0;

@@ -4,31 +4,31 @@
 #include "ops/trace/cuda/forward.h"
 #include "ops/trace/trace_bvh.h"
 
-// How one thread finds the next hits of one ray. Included by .cu files only.
+// Finds the next hits of one ray, in one thread. Included by .cu files only.
 namespace traceflow::trace::cuda {
 
 inline constexpr int walk_threads = 128;
-// k: hits that are held at a time. Where more exist the ray walks again, from the last one on.
+// k: the capacity of the k-buffer. If there are more hits, the ray traverses again from the last one on.
 inline constexpr int held_hits = 16;
-// A tree is no deeper than its keys have bits: 64, and 30 of the index where keys are equal. Each of its
-// nodes leaves one child waiting.
+// The tree is at most as deep as its keys have bits: 64, plus 30 of the index for equal keys. Each node on
+// the path leaves at most one child on the stack.
 inline constexpr int walk_stack = 96;
 
-// A place in a ray's order of hits.
+// A position in a ray's order of hits.
 struct HitPlace {
   float distance;
   uint32_t surfel;
   __device__ bool before(float d, uint32_t s) const { return distance < d || (distance == d && surfel < s); }
 };
 
-// A block's hits, one column a thread.
+// The hits of a block, one column per thread.
 struct HitColumns {
   float distance[held_hits][walk_threads];
   uint32_t surfel[held_hits][walk_threads];
   float alpha[held_hits][walk_threads];
 };
 
-// The nearest hits of this thread's ray behind `after`, in order: at most held_hits, and fewer where the ray
+// The nearest hits of this thread's ray behind `after`, in order: at most held_hits, and fewer if the ray
 // ends among them.
 class KBuffer {
  public:
@@ -43,7 +43,7 @@ class KBuffer {
   __device__ float& distance(int i) { return columns_.distance[i][threadIdx.x]; }
   __device__ uint32_t& surfel(int i) { return columns_.surfel[i][threadIdx.x]; }
   __device__ float& alpha(int i) { return columns_.alpha[i][threadIdx.x]; }
-  // No hit from here on can matter.
+  // Hits beyond this distance cannot matter.
   __device__ float far() const { return far_; }
 
   __device__ bool takes(float d, uint32_t s) {
@@ -72,8 +72,8 @@ class KBuffer {
   }
 
  private:
-  // Drops what lies behind the hit at which the ray ends. That hit stays: more hits in front can only end the
-  // ray sooner.
+  // Drops the hits behind the one at which the ray ends. That hit stays, because more hits in front can only
+  // end the ray sooner.
   __device__ void cut() {
     remaining_ = transmittance_;
     for (int i = 0; i < count_; ++i) {
@@ -88,21 +88,21 @@ class KBuffer {
 
   HitColumns& columns_;
   const BlendRules<float>& rules_;
-  float transmittance_, remaining_;  // in front of the first, and about what all of them leave
+  float transmittance_, remaining_;  // in front of the first hit, and approximately behind all of them
   HitPlace after_;
   int count_ = 0;
   float far_ = farthest_distance;
-  bool closed_ = false;  // nothing behind the last one matters
+  bool closed_ = false;  // hits behind the last one do not matter
 };
 
-// A ray prepared for boxes, which are taken to be wider by what rounding may move a hit of a far origin. It
-// passes a plane at t = plane · reciprocal - offset. A cone enters by the side of it that goes that way
-// faster and leaves by the slower one; where that goes the other way it never leaves.
+// A ray prepared for tests against boxes. Boxes are enlarged by the rounding error of a hit with a far
+// origin. The ray crosses a plane at t = plane · reciprocal - offset. A cone enters a box when its faster
+// side does, and leaves it when its slower side does, or never if that side moves the other way.
 struct BoxRay {
   float near_reciprocal[3], far_reciprocal[3], near_offset[3], far_offset[3];
   bool forwards[3], open[3];
 
-  // slope: of the cone's side; beyond it no hit counts.
+  // slope: of the cone's side, beyond which no hit counts.
   __device__ BoxRay(const UnitRay& ray, float slope) {
     const Vec3<float> o = glm::abs(ray.origin);
     const float radius = 2e-6F * std::fmax(o.x, std::fmax(o.y, o.z));
@@ -118,8 +118,8 @@ struct BoxRay {
       far_offset[axis] = (ray.origin[axis] - sign * radius) * far_reciprocal[axis];
     }
   }
-  // Where the ray enters the box of a node's child, at or after `near`; infinite where it leaves it before
-  // that, or enters it behind `far`.
+  // The distance at which the ray enters the box of a child, at least `near`. Infinite if the ray leaves the
+  // box before that, or enters it beyond `far`.
   template <int side>
   __device__ float enter(const Node& node, float near, float far) const {
     float leave = far;
@@ -134,7 +134,7 @@ struct BoxRay {
   }
 };
 
-// Sums in the order in which the CPU's vectors have them, so that hits at equal distances are the same.
+// Adds in the same order as the CPU's vectors, so that hits at equal distances are the same on both.
 __device__ inline float dot_fused(const Vec3<float>& a, const Vec3<float>& b) {
   return std::fma(a.z, b.z, std::fma(a.y, b.y, a.x * b.x));
 }
@@ -143,7 +143,7 @@ __device__ inline void intersect_disk(const Disk& disk, const UnitRay& ray, cons
                                       KBuffer& hits) {
   const DiskPlane plane = load_quads(disk.plane);
   const Vec3<float> q = ray.origin - plane.position;
-  // The sum turns -0 into 0, which is a distance.
+  // Adding 0 turns -0 into 0, which is a valid distance.
   const float t = -(dot_fused(plane.normal, q) / dot_fused(plane.normal, ray.direction)) + 0.0F;
   if (!(t >= rules.t_min) || !hits.takes(t, plane.surfel)) return;
   const DiskAxes axes = load_quads(disk.axes);
@@ -152,7 +152,7 @@ __device__ inline void intersect_disk(const Disk& disk, const UnitRay& ray, cons
   const float u = dot_fused(axes.u, x), v = dot_fused(axes.v, x);
   float radius2 = std::fma(u, u, v * v), top = plane.log_opacity;
   if (ray.width > 0) {
-    // By how much the disk's variances grow.
+    // The growth factors of the disk's variances.
     const float spread = t * ray.width;
     const float grown_u = std::fma(spread * spread, dot_fused(axes.u, axes.u), 1.0F);
     const float grown_v = std::fma(spread * spread, dot_fused(axes.v, axes.v), 1.0F);
@@ -164,11 +164,11 @@ __device__ inline void intersect_disk(const Disk& disk, const UnitRay& ray, cons
   hits.insert(t, plane.surfel, std::fmin(std::exp(exponent), rules.blend.alpha_max));
 }
 
-// Boxes that wait, nearest on top.
+// Pending boxes, the nearest on top.
 class TraversalStack {
  public:
   __device__ void push(float near, uint32_t child) { waiting_[depth_++] = {near, child}; }
-  // The next one that is entered before `far`, or no_child.
+  // Returns the next child that the ray enters before `far`, or no_child.
   __device__ uint32_t pop(float far) {
     while (depth_ > 0) {
       const Entry entry = waiting_[--depth_];
@@ -179,20 +179,19 @@ class TraversalStack {
 
  private:
   struct alignas(8) Entry {
-    float near;  // where the ray enters the box
+    float near;  // distance at which the ray enters the box
     uint32_t child;
   };
   Entry waiting_[walk_stack];
   int depth_ = 0;
 };
 
-// Meets all disks of the tree that can have a hit for `hits`, none of which is before `near`; near boxes
-// first.
+// Tests all disks of the tree that can add a hit to `hits`, near boxes first. No such hit is before `near`.
 __device__ inline void traverse(const RayInput& input, const UnitRay& ray, float near, KBuffer& hits) {
   const BoxRay box_ray(ray, input.rules.deviations * ray.width);
   TraversalStack stack;
   for (uint32_t at = 0; at != no_child; at = stack.pop(hits.far())) {
-    // Down to a disk. no_child has the disk's bit too.
+    // Descends to a disk. no_child has the disk's bit too.
     while ((at & disk_bit) == 0) {
       const Node node = load_quads(input.nodes[at]);
       const float left = box_ray.enter<0>(node, near, hits.far());
