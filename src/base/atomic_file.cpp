@@ -14,7 +14,7 @@ namespace traceflow {
 
 namespace {
 
-constexpr size_t longest_name = 255;  // of a file in its folder, in bytes
+constexpr size_t longest_name = 255;  // bytes of a file name
 
 [[noreturn]] void fail(const std::filesystem::path& path, const char* step) {
   throw InputError(path.string(), step, std::system_category().message(errno), "a writable file",
@@ -25,7 +25,7 @@ std::filesystem::path beside(const std::filesystem::path& path, const std::strin
   return path.parent_path() / (path.filename().string().substr(0, longest_name - ending.size()) + ending);
 }
 
-// Until no other process holds it. A file system that knows no locks has none to wait for.
+// Waits until no other process holds the lock. Returns at once on file systems without locks.
 void hold(const Descriptor& file, const std::filesystem::path& path, PartialFile::OtherWriter other) {
   const int how = other == PartialFile::OtherWriter::refused ? LOCK_EX | LOCK_NB : LOCK_EX;
   while (::flock(file.number(), how) != 0) {
@@ -36,7 +36,7 @@ void hold(const Descriptor& file, const std::filesystem::path& path, PartialFile
   }
 }
 
-// What a failed sync of a folder says where there is no such thing, or where only others may ask for it.
+// Errors of syncing a folder where the file system has no such operation, or where the user lacks permission.
 bool means_no_sync(int error) {
   return error == EINVAL || error == ENOTSUP || error == ENOSYS || error == EBADF || error == EACCES;
 }
@@ -45,7 +45,7 @@ bool means_no_sync(int error) {
 
 PartialFile::PartialFile(std::filesystem::path path, OtherWriter other, const std::string& ending)
     : path_(std::move(path)), name_(beside(path_, ending)) {
-  // Whoever held it before may have put it in its place meanwhile.
+  // The process that held the lock before may have renamed the file meanwhile.
   do {
     file_ = Descriptor(::open(name_.c_str(), O_WRONLY | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
     if (!file_) fail(path_, "open");

@@ -11,33 +11,33 @@
 
 namespace traceflow {
 
-// Writes bytes under a temporary name in the same folder, syncs file and folder, and renames: readers see the
-// old file or a new one, never a part, however many write at once. Throws InputError naming the path and the
-// reason when the disk refuses.
+// Writes bytes under a temporary name in the same folder, syncs file and folder, and renames. Readers see the
+// old file or a new one, never a part, also when several processes write at once. Throws InputError with the
+// path and the reason when writing fails.
 void write_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_atomically(const std::filesystem::path& path, std::string_view text);
-// The same of bytes that lie in several places, in order.
+// The same for bytes in several places, in order.
 void write_atomically(const std::filesystem::path& path,
                       const std::vector<std::span<const std::byte>>& parts);
 
-// A file under its temporary name, empty at first, until it is put in its place. As long as this stands no
-// other one writes it; what a program that was killed has left there is written over.
+// A file that is written under a temporary name, empty at first, until put_in_place(). While this object
+// exists no other PartialFile writes that name. A file that a killed program left under it is overwritten.
 class PartialFile {
  public:
   enum class OtherWriter { awaited, refused };
 
-  // ending: of the temporary name. Throws InputError naming `path`, as all here do.
+  // ending: of the temporary name. Throws InputError with `path`, like all members.
   explicit PartialFile(std::filesystem::path path, OtherWriter other = OtherWriter::awaited,
                        const std::string& ending = ".partial");
-  // Removes it, unless it was put in its place.
+  // Removes the file unless put_in_place() succeeded.
   ~PartialFile();
   PartialFile(const PartialFile&) = delete;
   PartialFile& operator=(const PartialFile&) = delete;
 
-  // Where it lies now.
+  // The temporary path.
   const std::filesystem::path& name() const { return name_; }
   void write(std::span<const std::byte> bytes);
-  // Waits until it is on the disk, whoever has written it, and gives it its own name.
+  // Waits until all bytes are on the disk, also those that others wrote, and renames the file to its path.
   void put_in_place();
 
  private:
@@ -46,11 +46,11 @@ class PartialFile {
   bool in_place_ = false;
 };
 
-// Waits until what was made or renamed in a folder is on the disk. Throws InputError where it may be lost;
-// file systems that sync no folders are taken as they are.
+// Waits until files created or renamed in a folder are on the disk. Throws InputError if they may be lost.
+// Does nothing on file systems that cannot sync folders.
 void sync_folder(const std::filesystem::path& folder);
 
-// Makes a folder and those above it that are missing, so that they last. Throws InputError.
+// Creates a folder and its missing parents, and syncs them. Throws InputError.
 void make_folder(const std::filesystem::path& folder);
 
 }  // namespace traceflow

@@ -7,7 +7,7 @@
 
 namespace traceflow {
 
-// A file descriptor that is closed with its owner; -1 is none.
+// Owns a file descriptor and closes it; -1 means none.
 class Descriptor {
  public:
   Descriptor() = default;
@@ -23,7 +23,7 @@ class Descriptor {
 
   int number() const { return number_; }
   explicit operator bool() const { return number_ >= 0; }
-  // Whether this name, and no link of that name, is still the file's: others may have taken it away.
+  // Whether this path still names the open file, not through a link. Others may have removed or replaced it.
   bool is_named(const std::filesystem::path& name) const;
   void close() {
     if (number_ >= 0) ::close(std::exchange(number_, -1));

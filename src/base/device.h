@@ -11,18 +11,17 @@
 #define TRACEFLOW_HD
 #endif
 
-// Marks the declaration of a function that is defined only in programs that are linked with the CUDA code: in
-// others its address is null. A caller with tensors on the CUDA device never meets that case, since nothing
-// could have put them there.
+// Marks the declaration of a function that is defined only in programs linked with the CUDA code. In others
+// its address is null. A caller that holds tensors on the CUDA device may call it unchecked: without the CUDA
+// code no tensor can be there.
 #define TRACEFLOW_WITH_CUDA [[gnu::weak]]
 
-// For a small function that a loop must swallow whole in order to be vectorised, whatever the loop's target
-// is.
+// For a small function that must be inlined for a loop to be vectorised, whatever the loop's target is.
 #define TRACEFLOW_ALWAYS_INLINE inline __attribute__((always_inline))
 
 namespace traceflow {
 
-// Fetches bytes into the host's cache; nothing on a device.
+// Prefetches bytes into the host's cache; does nothing on a device.
 TRACEFLOW_HD inline void prefetch([[maybe_unused]] const void* begin, [[maybe_unused]] int64_t bytes) {
 #if !defined(__CUDA_ARCH__)
   constexpr int64_t line = 64;
@@ -30,7 +29,7 @@ TRACEFLOW_HD inline void prefetch([[maybe_unused]] const void* begin, [[maybe_un
 #endif
 }
 
-// Where a tensor lives and where the op that reads it runs.
+// Where a tensor is stored, and where the ops that read it run.
 enum class Device { cpu, cuda };
 constexpr std::array<std::string_view, 2> enum_names(Device) { return {"cpu", "cuda"}; }
 constexpr std::string_view name_of(Device device) { return enum_names(device)[static_cast<size_t>(device)]; }

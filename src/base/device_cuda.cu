@@ -17,9 +17,9 @@ cudaStream_t stream() {
 }
 
 void check(cudaError_t result, const char* what) {
-  // Also of what a library's kernel takes when it runs for the first time.
+  // Also reported when a library's kernel needs memory at its first launch.
   if (result == cudaErrorMemoryAllocation) {
-    cudaGetLastError();  // forgets it
+    cudaGetLastError();  // clears the error
     size_t free = 0, total = 0;
     cudaMemGetInfo(&free, &total);
     throw memory::OutOfMemory(0, free);
@@ -31,14 +31,14 @@ namespace {
 
 __global__ void nothing() {}
 
-// Whether this program holds code for the device.
+// Checks that this program contains code for the device.
 cudaError_t find_code() {
   cudaFuncAttributes attributes{};
   return cudaFuncGetAttributes(&attributes, reinterpret_cast<const void*>(nothing));
 }
 
-// Memory that was given back stays in the pool: the driver is asked only while a program still grows. Null
-// where the device has no pools.
+// Freed memory stays in the pool, so the driver is asked only while the program's use grows. Null if the
+// device has no pools.
 cudaMemPool_t pool() {
   static const cudaMemPool_t the_pool = [] {
     int has_pools = 0;
@@ -70,7 +70,7 @@ bool answers(std::string& why_not) {
   if (result == cudaSuccess && count > 0) result = find_code();
   if (result == cudaSuccess && count > 0) return true;
   why_not = result == cudaSuccess ? "no device is there" : cudaGetErrorString(result);
-  cudaGetLastError();  // forgets it
+  cudaGetLastError();  // clears the error
   return false;
 }
 
@@ -87,7 +87,7 @@ void* allocate(size_t bytes) {
   void* memory = nullptr;
   cudaError_t result = take(&memory, bytes);
   if (result == cudaErrorMemoryAllocation && pool() != nullptr) {
-    // What the pool holds in pieces that are too small goes back before the last try.
+    // Before the last attempt, returns the pool's unused pieces to the driver.
     cudaGetLastError();
     trim_pool();
     result = take(&memory, bytes);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::align_val_t alignment{64};
 
-// What stands on the CUDA device.
+// What is allocated on the CUDA device.
 struct Account {
   std::atomic<size_t> bytes = 0, most = 0;
   std::atomic<int64_t> allocations = 0;

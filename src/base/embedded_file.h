@@ -5,9 +5,9 @@
 
 namespace traceflow {
 
-// A file that is part of the program (cmake/TraceflowEmbed.cmake).
+// A file embedded in the program (cmake/TraceflowEmbed.cmake).
 struct EmbeddedFile {
-  std::string_view name;  // without a folder
+  std::string_view name;  // without its folder
   std::span<const unsigned char> bytes;
 
   std::string_view text() const { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }

@@ -6,7 +6,7 @@ namespace traceflow {
 
 namespace {
 
-// What is said of a value; a path is said whole.
+// Longest text of a value in a message; paths are never cut.
 constexpr size_t longest_words = 300;
 constexpr size_t longest_path = 8192;
 

@@ -5,23 +5,23 @@
 
 namespace traceflow {
 
-// Input that cannot be used: a file, an option, a capture. The program prints what() as its one line and
-// exits 2. One line that can be shown, whatever stands in the parts.
+// Unusable input: a file, an option or a capture. The program prints what() and exits with 2. what() is a
+// single printable line, whatever its parts contain.
 class InputError : public std::runtime_error {
  public:
-  // where: the file or option; field: the place inside it, may be empty; found, expected: values in words;
-  // remedy: what the user can do, may be empty.
+  // where: the file or option; field: the place inside it, may be empty; found, expected: the values in
+  // words; remedy: what the user can do, may be empty.
   InputError(const std::string& where, const std::string& field, const std::string& found,
              const std::string& expected, const std::string& remedy = "");
 };
 
-// A broken promise inside the program, with the values that were observed.
+// A violated invariant of the program, with the observed values.
 class InternalError : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
 
-// Throws InternalError with the condition's text and the given values when an invariant does not hold.
+// Throws InternalError with the invariant's text and the observed values unless the condition holds.
 void require(bool condition, const char* invariant, const std::string& observed = "");
 
 }  // namespace traceflow

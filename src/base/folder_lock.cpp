@@ -32,7 +32,7 @@ std::string name_of_host() {
 
 std::string name_of_process(pid_t id) { return "process " + std::to_string(id) + " on " + name_of_host(); }
 
-// Whether a name is that of a process of this machine that has ended.
+// Whether `name` is that of a process on this machine that has ended.
 bool has_ended(const std::string& name) {
   const std::string before = "process ";
   if (!name.starts_with(before)) return false;
@@ -40,7 +40,8 @@ bool has_ended(const std::string& name) {
   return id > 0 && name == name_of_process(id) && ::kill(id, 0) != 0 && errno == ESRCH;
 }
 
-// What the holder wrote: who it is. Where that has ended, it is a program that it had started.
+// The holder's name, as written in the lock file. If that process has ended, the holder is a program that it
+// started.
 std::string holder(int descriptor) {
   std::array<char, 200> text{};
   const ssize_t size = ::pread(descriptor, text.data(), text.size(), 0);
@@ -57,21 +58,21 @@ FolderLock::FolderLock(const std::filesystem::path& file, const std::filesystem:
                        const std::string& work)
     : file_(file) {
   do {
-    // Programs that are started inherit it (there is no O_CLOEXEC): where this one is killed, the lock stands
-    // until they end, and with them what they still write. That they end with their parent
-    // (PR_SET_PDEATHSIG) could be asked of the first of them alone, not of what a script then starts.
-    // A link may lead to anybody's file, and what is locked is written to.
+    // Child processes inherit the descriptor (there is no O_CLOEXEC). If this process is killed, the lock
+    // therefore remains until its children, which may still write, have ended. PR_SET_PDEATHSIG would end
+    // only direct children, not the processes that a script starts. O_NOFOLLOW: the lock file is written to,
+    // and a link may lead to anybody's file.
     lock_ = Descriptor(::open(file_.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW, 0644));
     if (!lock_) fail(file_);
     keeps_others_out_ = ::flock(lock_.number(), LOCK_EX | LOCK_NB) == 0;
-    // Any other error is that of a file system which knows no locks.
+    // Any other error means that the file system has no locks.
     if (!keeps_others_out_ && errno == EWOULDBLOCK) {
       throw InputError(folder.string(), "", holder(lock_.number()) + " " + work + " in it",
                        "a folder of its own", "wait for that process or stop it, or choose another folder");
     }
   } while (!lock_.is_named(file_));
   const std::string who = name_of_process(::getpid()) + "\n";
-  // A name that cannot be written is only missed in a message.
+  // If the name cannot be written, only a message lacks it.
   if (::ftruncate(lock_.number(), 0) != 0 || ::pwrite(lock_.number(), who.data(), who.size(), 0) < 0) return;
 }
 

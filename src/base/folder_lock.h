@@ -7,17 +7,17 @@
 
 namespace traceflow {
 
-// Keeps a second program out of a folder's work for as long as this stands. Readers are free. The system lets
-// go of it when the program ends, however it ends; where it is killed, when what it has started has ended
-// too.
+// Keeps other programs from working in a folder while this object exists. Readers need no lock. The system
+// releases the lock when the program ends, however it ends; if it is killed, when the programs that it
+// started have ended too.
 class FolderLock {
  public:
-  // file: the lock, in the folder or beside it, in a folder that is there. work: what is being done, as in
-  // "training", for who is kept out. Throws InputError, naming the folder and who holds it, when another
-  // process does, and when the file cannot be written.
+  // file: the lock file, in an existing folder: this one or its parent. work: the activity, such as
+  // "training", for the message to other programs. Throws InputError with the folder and the holder if
+  // another process holds the lock, and if the file cannot be written.
   FolderLock(const std::filesystem::path& file, const std::filesystem::path& folder, const std::string& work);
   ~FolderLock();
-  // False where the file system knows no locks, so that nobody is kept out.
+  // False if the file system has no locks, so that nothing keeps others out.
   bool keeps_others_out() const { return keeps_others_out_; }
   FolderLock(const FolderLock&) = delete;
   FolderLock& operator=(const FolderLock&) = delete;

@@ -8,8 +8,8 @@
 
 namespace traceflow {
 
-// Throws InternalError unless the indices rise strictly within [0, limit): what lets threads write one entry
-// each. Indices on another device are made there by the program's own code and are taken as they are.
+// Throws InternalError unless the indices are strictly ascending within [0, limit), so that each thread can
+// write its own entry. Indices on another device are not checked: the program computed them there.
 inline void require_ascending(const Tensor<int32_t>& indices, int64_t limit) {
   if (indices.device() != Device::cpu) return;
   int64_t previous = -1;

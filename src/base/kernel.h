@@ -1,7 +1,7 @@
 #pragma once
 
-// What a .cu file needs to start kernels. Compiled by nvcc these are CUDA's; the tests compile the same files
-// with the host's compiler, where an emulation stands in (tests/emulation).
+// What a .cu file needs to launch kernels: CUDA's own when compiled by nvcc. Tests compile the same files
+// with the host's compiler and an emulation (tests/emulation).
 #if defined(__CUDACC__)
 #include <cuda_runtime.h>
 #else
@@ -23,15 +23,15 @@ inline constexpr int warp_lanes = 32;
 
 struct Grid {
   int64_t blocks;
-  int threads;  // a block
+  int threads;  // per block
 };
 
-// Gives the driver back what the pool holds and no tensor stands in. Waits for all work.
+// Returns the pool's unused memory to the driver. Waits for all work.
 void trim_pool();
 
-// Starts a kernel. start: tries to, and says whether the driver had memory for it, which it takes when it
-// loads a kernel's code or makes room for its stacks. As for a tensor, what the pool holds goes back before
-// the last try; then throws OutOfMemory.
+// Launches a kernel. start: tries to launch, and returns whether the driver had enough memory, which it needs
+// to load a kernel's code or to grow its stacks. As for a tensor, the pool's unused memory is returned before
+// the last attempt; then throws OutOfMemory.
 template <class Start>
 void start_kernel(const Start& start) {
   if (start()) return;
@@ -41,9 +41,9 @@ void start_kernel(const Start& start) {
 
 #if defined(__CUDACC__)
 
-// The stream that all work is put on.
+// The stream that all work runs on.
 cudaStream_t stream();
-// Throws OutOfMemory where a call found no memory, InternalError where it was refused otherwise.
+// Throws OutOfMemory if a call ran out of memory, InternalError for any other error.
 void check(cudaError_t result, const char* what);
 
 template <class... Parameters, class... Arguments>
@@ -88,7 +88,7 @@ void for_each_index(const char* description, int64_t n, const F& f) {
   launch(description, {blocks_for(n, threads), threads}, index_kernel<F>, n, f);
 }
 
-// The sum over the lanes of a warp, in all of them; in a fixed order.
+// The sum over the lanes of a warp, returned to all of them; in a fixed order.
 template <class T>
 __device__ T warp_sum(T value) {
   for (int by = warp_lanes / 2; by > 0; by /= 2) value += __shfl_xor_sync(full_warp, value, by);

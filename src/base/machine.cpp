@@ -26,7 +26,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(blank) + 1 - first);
 }
 
-// What follows the colon in the first line "key : value"; empty where there is none.
+// The text after the colon of the first line "key : value"; empty if there is none.
 std::string_view value_of(std::string_view text, std::string_view key) {
   while (!text.empty()) {
     const std::string_view line = text.substr(0, text.find('\n'));
@@ -38,7 +38,7 @@ std::string_view value_of(std::string_view text, std::string_view key) {
   return {};
 }
 
-// The number that the text begins with, or 0.
+// The number at the beginning of the text, or 0.
 int64_t number_at_start(std::string_view text) {
   int64_t number = 0;
   std::from_chars(text.data(), text.data() + text.size(), number);

@@ -18,13 +18,13 @@ std::string with_underscores(std::string text) {
   return text;
 }
 
-// The names of choices have hyphens.
+// Names of choices use hyphens.
 std::string with_hyphens(std::string text) {
   std::replace(text.begin(), text.end(), '_', '-');
   return text;
 }
 
-// Levenshtein's distance: insertions, deletions and replacements that turn a into b.
+// The Levenshtein distance: insertions, deletions and replacements that turn a into b.
 size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<size_t> row(b.size() + 1);
   for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -40,8 +40,8 @@ size_t edit_distance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
-// The path that the user may have meant, or an empty one: nearest as a whole, or, when the groups were left
-// out, by its name.
+// The path that the user may have meant, or an empty one: the nearest whole path, or the one with this name
+// if the groups were left out.
 std::string nearest_path(const std::vector<OptionField>& fields, const std::string& path) {
   std::string best;
   size_t best_distance = std::max<size_t>(2, path.size() / 3) + 1;
@@ -77,7 +77,7 @@ std::optional<OptionValue> parse_list(std::string_view text) {
   }
 }
 
-// Text as a value of the field's kind; none where it cannot be read as one.
+// Text as a value of the field's kind; nullopt if it cannot be parsed.
 std::optional<OptionValue> parse(const OptionField& field, const std::string& text) {
   switch (field.kind) {
     case OptionKind::boolean:

@@ -12,56 +12,56 @@
 
 #include "base/options.h"
 
-// Options structs seen from outside: a list of fields with path, help, and a way to read and write each.
-// Flags, --set, TOML, JSON and the page of all options work on this list and know no struct.
+// Reflection for options structs: a list of fields with path, help, and functions to read and write each.
+// Flags, --set, TOML, JSON and the page of all options work on this list and need no struct.
 namespace traceflow {
 
 enum class OptionKind { boolean, integer, number, text, three_numbers, choice };
 
-// A value on its way in or out of a field. A choice travels as its name.
+// A field's value outside its struct. A choice is represented by its name.
 using OptionValue = std::variant<bool, int64_t, double, std::string, std::vector<double>>;
 
-// One field of an options struct, which must outlive it.
+// One field of an options struct; the struct must outlive it.
 struct OptionField {
   std::string path;  // dotted, snake_case: "loss.normal"
   std::string unit;  // may be empty
   std::string help;
   OptionKind kind = OptionKind::text;
-  std::vector<std::string> choices;  // of a choice
+  std::vector<std::string> choices;  // for a choice
   std::function<OptionValue()> get;
-  // False, and nothing changed, when the field's type cannot hold the value.
+  // Returns false and changes nothing if the field's type cannot hold the value.
   std::function<bool(const OptionValue&)> set;
 
-  // Part after the last dot.
+  // The part after the last dot.
   std::string name() const;
-  // What the field takes, in words: "a whole number".
+  // The values that the field accepts, in words: "a whole number".
   std::string expected() const;
-  // The help, followed by the names of the choices where it does not say them itself.
+  // The help, followed by the names of the choices if it does not mention them.
   std::string full_help() const;
 };
 
-// Fields of `options` in the order of its visit(). `prefix` comes before every path.
+// Fields of `options` in the order of its visit(). Every path is prefixed with `prefix`.
 template <class Options>
 std::vector<OptionField> option_fields(Options& options, const std::string& prefix = "");
 
-// The command that lists the options of a training; what has others says which one lists those.
+// The command that lists the options of a training. Callers with other options name their own command.
 constexpr std::string_view training_options_page = "traceflow --help-options";
 
-// The field of this path ('-' counts as '_'), or an InputError that begins with `where`, suggests the nearest
-// path, and names the command that lists all of them.
+// The field with this path ('-' counts as '_'). If there is none, throws an InputError that begins with
+// `where`, suggests the nearest path, and names the command that lists all of them.
 const OptionField& find_option(const std::vector<OptionField>& fields, const std::string& path,
                                const std::string& where, std::string_view listed_by = training_options_page);
 
-// Writes one field, from a value or from text as the command line has it ("0.5", "true", "1,0,0", "hit").
-// Throws InputError beginning with `where` and naming the path, what was found and what the field takes.
+// Writes one field, from a value or from text in the command line's syntax ("0.5", "true", "1,0,0", "hit").
+// Throws InputError beginning with `where` and naming the path, what was found and what the field accepts.
 void set_option(const OptionField& field, const OptionValue& value, const std::string& where);
 void set_option_text(const OptionField& field, const std::string& text, const std::string& where);
 
-// Writes the field that "path=value" names.
+// Writes the field named by "path=value".
 void set_option_assignment(const std::vector<OptionField>& fields, const std::string& assignment,
                            const std::string& where, std::string_view listed_by = training_options_page);
 
-// The value as the command line has it.
+// The value in the command line's syntax.
 std::string option_text(const OptionValue& value);
 
 namespace detail {
@@ -74,8 +74,8 @@ concept ThreeNumbers = requires(T v) {
   requires !requires { v.w; };
 };
 
-// The double that the float's shortest decimal text names, so that 0.001F is shown and saved as 0.001; it
-// reads back as the same float.
+// The double with the float's shortest decimal text, so that 0.001F is shown and saved as 0.001; it reads
+// back as the same float.
 double shortest_double(float value);
 
 template <class T>
@@ -102,7 +102,7 @@ OptionValue number_value(T value) {
   }
 }
 
-// Turns a field's reference into an OptionField, and a group into those of its fields.
+// Turns a reference to a field into an OptionField, and a group into those of its fields.
 class FieldCollector {
  public:
   FieldCollector(std::string prefix, std::vector<OptionField>& fields)

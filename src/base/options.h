@@ -14,16 +14,16 @@
 //   }
 //
 // and `void validate() const`, which throws InputError through check_option. Everything else (flags, --set,
-// TOML, the checkpoint, the viewer) is a visitor of these (base/option_fields.h), so an option is named once.
-// A dotted path names a field from outside: `loss.normal`. Names use snake_case; supported types: bool, int,
+// TOML, the checkpoint, the viewer) is a visitor (base/option_fields.h), so that each option is named once. A
+// dotted path names a field from outside: `loss.normal`. Names use snake_case. Supported types: bool, int,
 // int64_t, float, double, std::string, Vec3 of a float, and enums whose values count from 0 and whose names
-// stand beside them in a function found by ADL:
+// are given by a function found by ADL:
 //
 //   enum class SortOrder { centre, hit };
 //   constexpr std::array<std::string_view, 2> enum_names(SortOrder) { return {"centre", "hit"}; }
 namespace traceflow {
 
-// A number as the user would write it: the shortest text that reads back as the same value.
+// The shortest decimal text that reads back as the same value.
 std::string number_text(double value);
 std::string number_text(float value);
 std::string number_text(int64_t value);

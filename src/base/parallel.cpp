@@ -28,7 +28,8 @@ void detail::deal_to_plain_threads(int64_t blocks, const std::function<void(int6
   std::atomic<int64_t> next{0};
   const auto work = [&] {
     in_loop = in_loop || threads > 1;
-    // Relaxed, or taking a block would order it after those that others took, and hide their races.
+    // Relaxed on purpose: a stronger order would synchronise the blocks of different threads, and hide their
+    // races from the sanitizer.
     for (int64_t block; (block = next.fetch_add(1, std::memory_order_relaxed)) < blocks;) run(block);
   };
   const bool outside = !in_loop;

@@ -15,16 +15,16 @@
 
 namespace traceflow {
 
-// Number of threads that parallel loops use. 0: OMP_NUM_THREADS, or else all cores.
+// Number of threads of parallel loops. 0: OMP_NUM_THREADS, or all cores if it is not set.
 void set_threads(int count);
 int thread_count();
-// Whether the caller is inside a loop that several threads share.
+// Whether the caller runs inside a loop that several threads share.
 bool in_parallel_loop();
 
 namespace detail {
 
-// Carries an exception out of an OpenMP region, which must not be left by one: that of the first block that
-// fails, at any number of threads. What comes behind a block that has failed is not run.
+// Carries an exception out of an OpenMP region, since exceptions must not leave one. It is that of the first
+// block that fails, at any number of threads. Blocks after a failed one are not run.
 class ExceptionBridge {
  public:
   template <class F>
@@ -50,17 +50,17 @@ class ExceptionBridge {
 };
 
 #ifdef __SANITIZE_THREAD__
-// run(block) for every block, which takes memory. The thread sanitizer does not see how OpenMP's runtime
-// orders its threads and takes the end of every loop for a race; under it the same blocks are dealt to
-// threads that it does see.
+// Calls run(block) for every block; allocates memory. The thread sanitizer does not see how OpenMP's runtime
+// orders its threads and reports a race at the end of every loop. Under it the blocks run on threads that it
+// does see.
 void deal_to_plain_threads(int64_t blocks, const std::function<void(int64_t)>& run);
 #endif
 
 }  // namespace detail
 
-// f(begin, end) over [0, n) in blocks of `grain`, dealt to threads as they come free. Which elements share a
-// block never depends on the number of threads, so a sum kept per block and added in block order has the same
-// bytes at any count. What the first block that throws has thrown comes out.
+// Calls f(begin, end) over [0, n) in blocks of `grain`, which idle threads take in turn. Which elements share
+// a block never depends on the number of threads, so a sum kept per block and added in block order has the
+// same bytes at any number. Rethrows the exception of the first block that throws.
 template <class F>
 void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
   if (n <= 0) return;
@@ -83,7 +83,7 @@ void parallel_blocks(const char* description, int64_t n, int64_t grain, F&& f) {
   bridge.rethrow();
 }
 
-// f(i) for every i in [0, n): the element-wise steps.
+// Calls f(i) for every i in [0, n), for element-wise steps.
 template <class F>
 void parallel_for(const char* description, int64_t n, F&& f, int64_t grain = 1024) {
   parallel_blocks(description, n, grain, [&](int64_t begin, int64_t end) {
@@ -92,14 +92,14 @@ void parallel_for(const char* description, int64_t n, F&& f, int64_t grain = 102
 }
 
 namespace cuda {
-// f(i) for every i in [0, n) as a kernel. Defined in base/kernel.h; the .cu file beside a functor
+// Calls f(i) for every i in [0, n) in a kernel. Defined in base/kernel.h; the .cu file beside a functor
 // instantiates it.
 template <class F>
 TRACEFLOW_WITH_CUDA void for_each_index(const char* description, int64_t n, const F& f);
 }  // namespace cuda
 
-// The element-wise steps of ops that run on any device: f is a functor of plain numbers and addresses whose
-// operator() is TRACEFLOW_HD.
+// For element-wise steps of ops that run on any device. f is a functor of plain numbers and addresses with a
+// TRACEFLOW_HD operator().
 template <class F>
 void parallel_for(Device device, const char* description, int64_t n, const F& f, int64_t grain = 1024) {
   if (device == Device::cpu) {
@@ -111,7 +111,7 @@ void parallel_for(Device device, const char* description, int64_t n, const F& f,
   for_each(description, n, f);
 }
 
-// Sum of f(i) over [0, n) in a fixed order: per block of `grain` first, then over the blocks.
+// Sum of f(i) over [0, n) in a fixed order: first within blocks of `grain`, then over the blocks.
 template <class T, class F>
 T ordered_sum(const char* description, int64_t n, F&& f, int64_t grain = 4096) {
   std::vector<T> partial(static_cast<size_t>((n + grain - 1) / grain), T{});

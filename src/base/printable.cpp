@@ -8,13 +8,13 @@ namespace traceflow {
 
 namespace {
 
-// Bytes of the character at the beginning of the text that may be shown; 0 where there is none.
+// Bytes of the printable character at the beginning of the text; 0 if there is none.
 size_t shown_bytes(std::string_view text) {
   const auto character = first_utf8_character(text);
   if (!character) return 0;
   const char32_t code = character->code;
   const bool is_control = code < 0x20 || (code >= 0x7f && code < 0xa0);
-  // What turns the direction of writing shows a line in another order than it has.
+  // Characters that change the direction of writing would display a line in another order.
   const bool turns = (code >= 0x200e && code <= 0x200f) || (code >= 0x2028 && code <= 0x202e) ||
                      (code >= 0x2066 && code <= 0x2069);
   return is_control || turns ? 0 : character->bytes;

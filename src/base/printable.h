@@ -5,9 +5,8 @@
 
 namespace traceflow {
 
-// Text from outside as it may stand in one line of a terminal or a log: valid UTF-8, in which each control
-// character and each byte that belongs to no character is a "?"; of more than `longest` bytes, the beginning
-// and "…".
+// Text from outside made safe for one line of a terminal or a log: valid UTF-8, with "?" for each control
+// character and each invalid byte. Text of more than `longest` bytes is cut and ends in "…".
 std::string printable(std::string_view text, size_t longest);
 
 }  // namespace traceflow

@@ -33,15 +33,15 @@ std::vector<char*> as_arguments(std::vector<std::string>& words) {
   return arguments;
 }
 
-// Where SIGCHLD is ignored, as a parent may have left it, the system keeps no exit status and every program
-// seems to fail. Seen to here, where it is needed: not all that starts programs sets up signals before.
+// If SIGCHLD is ignored, as a parent may have left it, the system keeps no exit status and every program
+// seems to fail. It is reset here because not every caller sets up signals first.
 void keep_exit_statuses() {
   struct sigaction action {};
   if (::sigaction(SIGCHLD, nullptr, &action) == 0 && action.sa_handler == SIG_IGN)
     std::signal(SIGCHLD, SIG_DFL);
 }
 
-// What posix_spawn is told, freed at the end.
+// Arguments of posix_spawn, freed by the destructor.
 class SpawnPlan {
  public:
   explicit SpawnPlan(const ProcessStreams& streams) {
@@ -109,7 +109,8 @@ bool Process::wait() {
   int status = 0;
   while (id_ >= 0 && ::waitpid(id_, &status, 0) < 0) {
     if (errno == EINTR) continue;
-    // Somebody else has waited for it: its number may be another's by now, whom end() must not signal.
+    // Another thread has waited for it. The id may belong to a new process by now, which end() must not
+    // signal.
     id_ = -1;
     return false;
   }
@@ -139,7 +140,7 @@ void Process::end() {
       break;
     std::this_thread::sleep_for(glance);
   }
-  // The group's name is its own until its leader has been waited for.
+  // The group's id cannot be reused before its leader has been waited for.
   ::kill(group, SIGKILL);
   wait();
 }

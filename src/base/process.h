@@ -10,49 +10,49 @@
 
 #include "base/descriptor.h"
 
-// Other programs, started without a shell.
+// Starts other programs, without a shell.
 namespace traceflow {
 
-// Whether a program of this name can be started.
+// Whether a program of this name is in PATH and executable.
 bool is_in_path(const std::string& program);
 
-// Where a program's streams come from and go to, as descriptors that stay the caller's; -1 is nothing to
-// read, and nobody who listens. `environment` has "NAME=value" beyond this program's own.
+// The program's streams, as descriptors that the caller keeps; -1 means /dev/null. `environment` has
+// "NAME=value" entries in addition to this program's own.
 struct ProcessStreams {
   int input = -1, output = -1, error = -1;
   std::vector<std::string> environment = {};
 };
 
-// A running program, in a process group of its own: Ctrl-C reaches this program alone, which then decides.
-// What is still running when this is destroyed is ended. Where SIGCHLD was ignored, it no longer is.
+// A running program in its own process group: Ctrl-C reaches only this program, which then decides. The
+// destructor ends what is still running. If SIGCHLD was ignored, its default handling is restored.
 class Process {
  public:
-  // words: the program, found in PATH, and its arguments. Throws InputError where it cannot be started.
+  // words: the program, found in PATH, and its arguments. Throws InputError if it cannot be started.
   Process(const std::vector<std::string>& words, const ProcessStreams& streams);
   ~Process();
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
 
-  // Until it has ended by itself: whether well.
+  // Waits until it ends by itself. Returns whether it succeeded.
   bool wait();
-  // The same, unless `stop` turns true: then it and what it has started are ended, and the answer is false.
-  // Calls `meanwhile` some times a second.
+  // The same, unless `stop` becomes true: then ends it and its children, and returns false. Calls `meanwhile`
+  // several times a second.
   bool wait(
       const std::atomic<bool>& stop, const std::function<void()>& meanwhile = [] {});
-  // Asks it and what it has started to end, and insists after two seconds.
+  // Asks it and its children to end, and kills them after two seconds.
   void end();
 
  private:
   pid_t id_ = -1;
 };
 
-// Both ends of a pipe, which programs that are started do not inherit.
+// Both ends of a pipe; started programs do not inherit them.
 struct Pipe {
   Descriptor reading, writing;
 };
 Pipe make_pipe();
 
-// A file to write a program's output to, emptied first. Throws InputError.
+// Opens an empty file for a program's output. Throws InputError.
 Descriptor open_log(const std::filesystem::path& path);
 
 }  // namespace traceflow

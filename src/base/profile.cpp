@@ -32,7 +32,7 @@ Scope::~Scope() {
   try {
     if (entry == table.end()) entry = table.insert(table.end(), Entry{name_, 0, 0});
   } catch (const std::bad_alloc&) {
-    return;  // a step that was not counted; the scope may end because of this very want of memory
+    return;  // not counted; the scope may end because of this lack of memory
   }
   entry->calls += 1;
   entry->seconds += seconds;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-// Where the time of a run goes. Every step opens a Scope under its name; the table falls out at the end.
+// Measures where the time of a run goes. Every step opens a Scope with its name; entries() gives the table.
 namespace traceflow::profile {
 
 struct Entry {
@@ -28,12 +28,12 @@ class Scope {
   std::chrono::steady_clock::time_point start_;
 };
 
-// Off at the start. Scopes opened inside a parallel region are not recorded. While it is on, work on the CUDA
-// device is waited for kernel by kernel (base/kernel.h, base/device_memory.cpp): each time is its own, and
-// the whole takes longer.
+// Initially off. Scopes opened inside a parallel region are not recorded. While profiling is on, the host
+// waits for the CUDA device after each kernel (base/kernel.h, base/device_memory.cpp): each time is exact,
+// and the whole takes longer.
 void enable(bool on);
 bool is_on();
-// All entries since the last clear(), in the order in which their names were first seen.
+// All entries since the last clear(), in the order in which their names first appeared.
 std::vector<Entry> entries();
 void clear();
 

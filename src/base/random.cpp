@@ -7,7 +7,7 @@
 namespace traceflow {
 
 Random::Random(uint64_t seed) : state_{} {
-  // splitmix64 spreads the seed over the state, as the generator's authors advise.
+  // splitmix64 spreads the seed over the state, as the authors of the generator recommend.
   for (uint64_t& word : state_) {
     seed += 0x9E3779B97F4A7C15ULL;
     uint64_t z = seed;

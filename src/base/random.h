@@ -5,7 +5,8 @@
 
 namespace traceflow {
 
-// xoshiro256**: a small generator whose whole state can be saved and restored. The same on every platform.
+// xoshiro256**: a small generator whose whole state can be saved and restored. Same numbers on every
+// platform.
 class Random {
  public:
   using State = std::array<uint64_t, 4>;
@@ -17,7 +18,8 @@ class Random {
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
   // Uniform in {0, …, n-1}; n > 0.
   int64_t below(int64_t n);
-  // Standard normal deviate; draws two uniforms each time, so that the state is all there is to save.
+  // Standard normal deviate. Draws two uniforms each time and keeps neither, so that state_ is the whole
+  // state.
   double normal();
 
   const State& state() const { return state_; }

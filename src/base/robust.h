@@ -4,7 +4,7 @@
 
 namespace traceflow {
 
-// Of the two middle values the greater; 0 for none.
+// The median; for an even count the greater of the two middle values. 0 for no values.
 double median(std::vector<double> values);
 // Standard deviation of a normal distribution with this median absolute deviation.
 double robust_deviation(const std::vector<double>& values);

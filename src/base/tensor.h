@@ -18,7 +18,7 @@
 
 namespace traceflow {
 
-// Up to four dimensions, row-major: the last index runs fastest.
+// Up to four dimensions, row-major: the last index varies fastest.
 class Shape {
  public:
   Shape() = default;
@@ -38,11 +38,10 @@ class Shape {
   int rank_ = 0;
 };
 
-// A contiguous row-major array that owns its memory (64-byte aligned) and knows its device. Copies are deep
-// and on the same device. T is a plain number, or a struct of such. resize() keeps the allocation where it is
-// large enough, so a tensor kept across iterations stops allocating; the content after resize() is
-// unspecified. Elements may be read and written by the host only where the device is the CPU; elsewhere
-// data() is an address for kernels.
+// A contiguous row-major array that owns its memory (64-byte aligned) on a device. Copies are deep and on the
+// same device. T is a plain number, or a struct of such. resize() keeps the allocation if it is large enough,
+// so a tensor kept across iterations stops allocating; the content after resize() is unspecified. The host
+// may read and write elements only if the device is the CPU; otherwise data() is an address for kernels.
 template <class T>
 class Tensor {
   static_assert(std::is_trivially_copyable_v<T>);
@@ -54,7 +53,7 @@ class Tensor {
     zero();
   }
   Tensor(const Tensor& other) { *this = other; }
-  // A tensor that was moved from is empty.
+  // A moved-from tensor is empty.
   Tensor(Tensor&& other) noexcept { swap(other); }
   Tensor& operator=(const Tensor& other) {
     if (this != &other) copy_from(other, other.device());
@@ -73,14 +72,14 @@ class Tensor {
   int64_t dim(int i) const { return shape_[i]; }
   Device device() const { return memory_.get_deleter().device; }
 
-  // The same numbers on a device.
+  // A copy on a device.
   Tensor on(Device device) const {
     Tensor result;
     result.copy_from(*this, device);
     return result;
   }
-  // Moves to a device, leaving the content behind: for what is about to be resized and written. Keeps the
-  // memory where the device is the same.
+  // Changes the device and drops the content, for tensors that are about to be resized and written. Keeps the
+  // memory if the device is the same.
   Tensor& place(Device device) {
     if (device != this->device()) *this = Tensor(Memory(nullptr, Free{device}));
     return *this;
@@ -90,7 +89,7 @@ class Tensor {
   const T* data() const { return memory_.get(); }
   std::span<T> values() { return {data(), static_cast<size_t>(size_)}; }
   std::span<const T> values() const { return {data(), static_cast<size_t>(size_)}; }
-  // First element of row i, a row being everything but the first index.
+  // First element of row i; a row is everything but the first index.
   T* row(int64_t i) { return data() + i * row_size(); }
   const T* row(int64_t i) const { return data() + i * row_size(); }
   int64_t row_size() const { return shape_.rank() == 0 || shape_[0] == 0 ? 0 : size_ / shape_[0]; }
@@ -111,7 +110,7 @@ class Tensor {
     if (wanted > capacity_) {
       const Device device = this->device();
       const int64_t room = roomier(wanted);
-      memory_.reset();  // first, so that both do not stand side by side
+      memory_.reset();  // first, so that both are never allocated at once
       shape_ = Shape();
       size_ = capacity_ = 0;
       const size_t bytes = static_cast<size_t>(room) * sizeof(T);
@@ -150,7 +149,7 @@ class Tensor {
   explicit Tensor(Memory memory) : memory_(std::move(memory)) {}
 
   size_t bytes() const { return static_cast<size_t>(size_) * sizeof(T); }
-  // A list on the CUDA device that grows once will grow again, and new memory there is dear: a quarter more.
+  // On the CUDA device allocations are slow, and a list that grew once will grow again: adds a quarter.
   int64_t roomier(int64_t wanted) const {
     return device() == Device::cuda && capacity_ > 0 ? wanted + wanted / 4 : wanted;
   }
@@ -166,7 +165,7 @@ class Tensor {
   int64_t capacity_ = 0;
 };
 
-// A list as a tensor of one dimension, on the CPU.
+// A list as a one-dimensional tensor on the CPU.
 template <class T>
 Tensor<T> tensor_of(const std::vector<T>& list) {
   Tensor<T> tensor(Shape{static_cast<int64_t>(list.size())});
@@ -174,7 +173,7 @@ Tensor<T> tensor_of(const std::vector<T>& list) {
   return tensor;
 }
 
-// The tensor itself where the host can read it, else a copy of it, left in `fetched`.
+// The tensor itself if it is on the CPU; otherwise a copy of it in `fetched`.
 template <class T>
 const Tensor<T>& on_host(const Tensor<T>& tensor, Tensor<T>& fetched) {
   if (tensor.device() == Device::cpu) return tensor;
@@ -182,7 +181,7 @@ const Tensor<T>& on_host(const Tensor<T>& tensor, Tensor<T>& fetched) {
   return fetched;
 }
 
-// The same numbers in another scalar type, e.g. to hand float parameters to a double-precision reference.
+// Converts to another scalar type, e.g. float parameters for a double-precision reference.
 template <class To, class From>
 Tensor<To> convert(const Tensor<From>& from) {
   Tensor<To> to(from.shape());

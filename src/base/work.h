@@ -8,23 +8,23 @@
 
 namespace traceflow {
 
-// Thrown where the user has asked to stop; nothing is lost by it.
+// Thrown when the user has asked to stop; no work is lost.
 struct Stopped {};
 
-// Long work that somebody waits for, who may stop it and is told how far it is.
+// Long work whose caller may stop it and is told its progress.
 class Work {
  public:
-  // So many of all are done; all is 0 where that is not known.
+  // Progress: `done` of `all`; all is 0 if unknown.
   using Progress = std::function<void(int64_t done, int64_t all)>;
 
-  // Implicit: whoever may stop a piece of work need not listen to it.
+  // Implicit, because not every caller wants to listen to progress.
   // NOLINTNEXTLINE(google-explicit-constructor)
   Work(
       const std::atomic<bool>& stop, Progress progress = [](int64_t, int64_t) {})
       : stop_(&stop), progress_(std::move(progress)) {}
 
   const std::atomic<bool>& stop() const { return *stop_; }
-  // Throws Stopped where that was asked for.
+  // Throws Stopped if the caller has asked to stop.
   void check() const {
     if (*stop_) throw Stopped{};
   }

@@ -6,8 +6,8 @@
 
 namespace traceflow {
 
-// One number in [0,1] ↔ 8 bit, rounding to nearest and clamping (method §8). The same level whether a
-// compiler fuses the product with the sum or not: all floats were tried.
+// Converts one number in [0,1] to or from 8 bits, rounding to nearest and clamping (method §8). The level
+// does not depend on whether the compiler fuses the product with the sum: all floats were tested.
 TRACEFLOW_HD inline uint8_t to_8bit(float v) {
   const float shifted = v * 255.0F + 0.5F;
   // A NaN fails both comparisons and becomes black.

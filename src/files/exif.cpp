@@ -12,7 +12,7 @@ constexpr uint32_t orientation_tag = 0x0112;
 constexpr uint32_t short_type = 3;
 constexpr size_t entry_size = 12;
 
-// Numbers of a TIFF structure in its own byte order; 0 past its end.
+// Reads numbers of a TIFF structure in its byte order; 0 past its end.
 struct Tiff {
   std::span<const std::byte> bytes;
   bool little = true;

@@ -16,7 +16,7 @@ constexpr size_t longest_path = 4096;
 
 std::string with_slash(const std::string& folder) { return folder.empty() ? "" : folder + "/"; }
 
-// The folder that all paths lie in, with its slash; empty where there is none.
+// The folder that contains all paths, with its slash; empty if there is none.
 std::string common_folder(const std::map<std::string, ZipMember>& members) {
   if (members.empty()) return "";
   const std::string& first = members.begin()->first;
@@ -28,10 +28,10 @@ std::string common_folder(const std::map<std::string, ZipMember>& members) {
   return all ? folder : "";
 }
 
-// Where a link leads that leads nowhere: what it names is not there, or is the link itself.
+// How a link is broken: its target is missing, or the link leads back to itself.
 enum class DeadEnd { none, missing, loop };
 
-// none for all else, also for what cannot be looked at.
+// Returns none for everything else, also for what cannot be examined.
 DeadEnd dead_end(const fs::path& path) {
   std::error_code error;
   if (!fs::is_symlink(path, error)) return DeadEnd::none;
@@ -40,7 +40,7 @@ DeadEnd dead_end(const fs::path& path) {
   return target.type() == fs::file_type::not_found ? DeadEnd::missing : DeadEnd::none;
 }
 
-// The first link on the way to a file of a folder that leads nowhere, in words, if there is one.
+// Describes the first broken link on the way to a file of a folder; nullopt if there is none.
 std::optional<std::string> link_to_nowhere(const fs::path& folder, const std::string& inside) {
   fs::path at;
   for (const fs::path& part : fs::path(inside)) {
@@ -56,7 +56,7 @@ std::optional<std::string> link_to_nowhere(const fs::path& folder, const std::st
   return std::nullopt;
 }
 
-// What a Mac adds to an archive that it makes.
+// What macOS adds to the archives that it makes.
 bool is_clutter(const std::string& path) { return path.starts_with("__MACOSX/") || path == ".DS_Store"; }
 
 }  // namespace

@@ -5,10 +5,10 @@
 
 namespace traceflow {
 
-// The float32 that bfloat16's 16 bits begin.
+// The float32 whose upper 16 bits are the bfloat16's.
 inline float widen_bfloat16(uint16_t bits) { return std::bit_cast<float>(static_cast<uint32_t>(bits) << 16); }
 
-// The float32 equal to an IEEE half; every half, subnormals and NaN payloads too, has one.
+// The float32 equal to an IEEE half; every half has one, including subnormals and NaN payloads.
 inline float widen_half(uint16_t bits) {
   const uint32_t sign = static_cast<uint32_t>(bits & 0x8000U) << 16;
   const uint32_t exponent = (bits >> 10) & 0x1FU;

@@ -21,7 +21,7 @@ struct Signature {
   const char* name;
 };
 
-// What people have that is neither.
+// Common formats that are neither PNG nor JPEG.
 constexpr std::array<Signature, 9> others = {{{0, "GIF8", "a GIF image"},
                                               {8, "WEBP", "a WebP image"},
                                               {0, "BM", "a BMP image"},

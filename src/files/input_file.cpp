@@ -16,10 +16,10 @@ namespace traceflow {
 
 namespace {
 
-// What the last system call that failed says.
+// The message of the last failed system call.
 std::string reason() { return std::generic_category().message(errno); }
 
-// Without waiting for somebody to write, should it be a pipe.
+// O_NONBLOCK: opening a pipe must not wait for a writer.
 constexpr int to_read = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
 
 }  // namespace

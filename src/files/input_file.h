@@ -10,23 +10,23 @@
 
 namespace traceflow {
 
-// A file that is there and that the system does not let us read, so that nothing is known of what it holds.
+// A file that exists but that the system does not let us read, so that its content is unknown.
 class UnreadableFile : public InputError {
  public:
   UnreadableFile(const std::filesystem::path& path, const std::string& reason)
       : InputError(path.string(), "", reason, "a readable file") {}
 };
 
-// A file opened for reading at any place, by several threads at once. Every failure is an InputError naming
-// the file; those of the system, but that there is none, an UnreadableFile.
+// A file opened for reading at any offset, by several threads at once. Every failure is an InputError with
+// the file's name. Errors of the system are UnreadableFile, except that the file does not exist.
 class InputFile {
  public:
   explicit InputFile(const std::filesystem::path& path);
-  // The file at `path`, which errors call `name`.
+  // Opens the file at `path`; errors call it `name`.
   InputFile(const std::filesystem::path& path, std::filesystem::path name);
-  // A nameless file in the machine's temporary folder, gone when closed; errors name `origin`.
+  // A nameless temporary file that disappears when closed; errors name `origin`.
   static InputFile scratch(const std::filesystem::path& origin);
-  // `size` bytes of this file from `offset`, which it must have, as a file of their own called `name`.
+  // The `size` bytes from `offset`, which must exist, as a file of their own with this name.
   InputFile part(int64_t offset, int64_t size, std::filesystem::path name) const;
   // The same file under another name in errors.
   InputFile renamed(std::filesystem::path name) &&;
@@ -38,20 +38,20 @@ class InputFile {
 
   const std::filesystem::path& path() const { return path_; }
   int64_t size() const { return size_; }
-  // Fills `bytes` from `offset`. Throws when the file ends before.
+  // Fills `bytes` from `offset`. Throws if the file is too short.
   void read_at(int64_t offset, std::span<std::byte> bytes) const;
-  // Only for scratch files: grows the file.
+  // Grows the file; only for scratch files.
   void append(std::span<const std::byte> bytes);
 
  private:
-  // What was opened for reading; -1 where errno says why it could not be.
+  // Takes a descriptor opened for reading; if it is -1, errno has the reason.
   InputFile(std::filesystem::path path, int descriptor);
   InputFile(std::filesystem::path path, int descriptor, int64_t size);
   void close() noexcept;
 
   std::filesystem::path path_;
   int descriptor_ = -1;
-  int64_t begin_ = 0;  // in what the descriptor opens
+  int64_t begin_ = 0;  // offset in the descriptor's file
   int64_t size_ = 0;
 };
 

@@ -9,7 +9,7 @@ namespace traceflow {
 
 namespace {
 
-// From here on a picture is for looking closely: edges between colours stay sharp.
+// From this quality on colours keep the full resolution, so that edges between them stay sharp.
 constexpr int fine_quality = 90;
 
 struct Sink {
@@ -28,7 +28,7 @@ bool grow(std::string& bytes, size_t size) noexcept {
   return true;
 }
 
-// Gives the library the bytes from `used` on to write to, of at least twice as many.
+// Lets the library write from byte `used` on, after at least doubling the buffer.
 void give_room(j_compress_ptr info, size_t used) {
   Sink* sink = sink_of(info);
   if (!grow(sink->bytes, std::max<size_t>(2 * used, 1 << 15))) ERREXIT1(info, JERR_OUT_OF_MEMORY, 0);
@@ -43,7 +43,7 @@ boolean on_full(j_compress_ptr info) {
 }
 void end(j_compress_ptr info) {
   Sink* sink = sink_of(info);
-  // Shorter: takes no memory.
+  // Shrinking allocates no memory.
   sink->bytes.resize(sink->bytes.size() - sink->manager.free_in_buffer);
 }
 
@@ -52,7 +52,7 @@ struct Encoder {
   Sink sink{};
   jpeg_compress_struct jpeg{};
 
-  // False with error.text where the library gave up.
+  // Returns false and sets error.text if the library failed.
   bool encode(const Tensor<uint8_t>& pixels, int quality) {
     jpeg.err = error.prepare();
     if (setjmp(error.jump) != 0) return false;

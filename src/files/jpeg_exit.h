@@ -5,14 +5,14 @@
 #include <cstdio>
 #include <new>
 
-// libjpeg's header wants the above before it.
+// libjpeg's header requires those above.
 #include <jpeglib.h>
-// Its macros for errors.
+// The macros of its errors.
 #include <jerror.h>
 
-// How libjpeg leaves: by longjmp, which skips destructors. What owns memory lives outside the jump. The
-// library hands back pointers to its own structs, which are therefore the first members of those that hold
-// them.
+// Error handling for libjpeg, which leaves by longjmp and so skips destructors. Objects that own memory are
+// outside the jump. The library passes back pointers to its own structs, so each is the first member of a
+// struct of ours.
 namespace traceflow {
 
 struct JpegExit {
@@ -20,7 +20,7 @@ struct JpegExit {
   std::jmp_buf jump;
   std::array<char, JMSG_LENGTH_MAX> text;
 
-  // Makes the library's errors end here; what it would print is dropped.
+  // Directs the library's errors to this object and drops its messages.
   jpeg_error_mgr* prepare() {
     jpeg_std_error(&manager);
     manager.error_exit = [](j_common_ptr info) { leave(info); };
@@ -38,7 +38,7 @@ struct JpegExit {
     std::longjmp(exit->jump, 1);
   }
 
-  // After a jump that there was no memory for.
+  // Call after a jump. Throws if the cause was a lack of memory.
   void throw_if_out_of_memory() const {
     if (manager.msg_code == JERR_OUT_OF_MEMORY) throw std::bad_alloc();
   }

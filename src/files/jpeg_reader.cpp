@@ -13,9 +13,9 @@ namespace traceflow {
 
 namespace {
 
-// All coefficients of a picture in several scans are held at once, two bytes each beside the pixels.
+// An image in several scans holds all its coefficients at once, two bytes each, in addition to the pixels.
 constexpr int64_t max_pixels_in_scans = int64_t{1} << 27;
-// A picture has a few scans; a file of thousands keeps a decoder busy for hours.
+// Images have a few scans; a file with thousands keeps a decoder busy for hours.
 constexpr int max_scans = 500;
 
 struct Source {
@@ -23,13 +23,13 @@ struct Source {
   const InputFile* file;
   int64_t offset;
   std::array<JOCTET, 1 << 16> buffer;
-  int orientation = 1;                 // that EXIF has told so far
-  std::array<JOCTET, 0xffff> segment;  // the last that was read for it
+  int orientation = 1;                 // from EXIF, so far
+  std::array<JOCTET, 0xffff> segment;  // the last APP1 segment
 };
 
 Source* source_of(j_decompress_ptr info) { return reinterpret_cast<Source*>(info->src); }
 
-// The library would go on with made-up pixels where data are broken or missing.
+// The library would continue with invented pixels where data are broken or missing.
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;
   const int code = info->err->msg_code;
@@ -80,11 +80,11 @@ JOCTET take_byte(j_decompress_ptr info) {
   return *manager.next_input_byte++;
 }
 
-// The library's own way keeps every segment, and a file may hold gigabytes of them.
+// The library's own handler keeps every segment, and a file may hold gigabytes of them.
 boolean on_exif(j_decompress_ptr info) {
   Source* source = source_of(info);
   const size_t high = take_byte(info), length = high << 8 | take_byte(info);
-  // The length counts its own two bytes.
+  // The length includes its own two bytes.
   const size_t count = length < 2 ? 0 : length - 2;
   if (source->orientation != 1) {
     on_skip(info, static_cast<long>(count));
@@ -165,7 +165,7 @@ class JpegReader {
     if (colours == JCS_CMYK || colours == JCS_YCCK) fail("the colours of print (CMYK)");
     if (colours != JCS_GRAYSCALE && colours != JCS_YCbCr && colours != JCS_RGB)
       fail(std::to_string(jpeg_.num_components) + " colour components");
-    // Its codes say no fewest number of bytes.
+    // Its codes have no minimum number of bytes.
     if (jpeg_.arith_code != 0) fail("arithmetic coding");
     if (size.width > max_image_side || size.height > max_image_side ||
         int64_t{size.width} * size.height > max_image_pixels) {
@@ -175,7 +175,7 @@ class JpegReader {
       fail(size_text(size) + " in several scans, of which 2²⁷ pixels are read");
   }
 
-  // Each block of 8×8 numbers takes a bit at least.
+  // Each block of 8×8 numbers takes at least one bit.
   int64_t fewest_bytes() const {
     int64_t most_wide = 1, most_high = 1, blocks = 0;
     const std::span components(jpeg_.comp_info, static_cast<size_t>(jpeg_.num_components));

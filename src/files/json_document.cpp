@@ -14,7 +14,7 @@ namespace {
 
 constexpr int64_t max_bytes = int64_t{64} << 20;
 constexpr int max_depth = 64;
-// A place that knows its name takes a hundred times the two bytes that an element of a list may have.
+// A JsonField takes a hundred times the two bytes that a list element may have.
 constexpr size_t max_elements = 1'000'000;
 
 nlohmann::json parse(const std::string& name, std::string_view text) {

@@ -14,18 +14,18 @@
 
 namespace traceflow {
 
-// A place in a JSON document that knows its name, so that what is wrong there can be said: every reader
-// throws InputError with the document, the field, what was found and what was expected.
+// A value in a JSON document with its path, for error messages. Every reader throws InputError with the
+// document, the field, what was found and what was expected.
 class JsonField {
  public:
   // Whether there is such a member; null counts as none.
   bool has(const std::string& key) const;
-  // A member that must be there.
+  // A required member.
   JsonField operator[](const std::string& key) const;
-  // As it stands in the document. Who looks into it includes nlohmann/json.hpp.
+  // The raw value. Callers that use it include nlohmann/json.hpp.
   const nlohmann::json& json() const { return *value_; }
 
-  // Finite.
+  // A finite number.
   double number() const;
   double number(double low, double high) const;
   double positive() const;
@@ -35,19 +35,19 @@ class JsonField {
   std::string text(size_t longest = 4096) const;
   // `count` finite numbers.
   std::vector<double> numbers(size_t count) const;
-  // Three numbers that single precision still holds after some arithmetic: within ±1e15.
+  // Three numbers within ±1e15, so that single precision can hold them after some arithmetic.
   Vec3<double> vector() const;
-  // The nearest rotation to the three rows that stand here; files carry few digits.
+  // The rotation nearest to the 3×3 matrix given as rows; files carry few digits.
   Mat3<double> rotation() const;
-  // Strings; whole numbers are taken for their digits.
+  // A list of strings; whole numbers are accepted and become their digits.
   std::vector<std::string> strings() const;
-  // The elements of an array, a million at most, in the second case `count`.
+  // The elements of an array: at most a million, or exactly `count`.
   std::vector<JsonField> elements() const;
   std::vector<JsonField> elements(size_t count) const;
 
   [[noreturn]] void fail(const std::string& found, const std::string& expected,
                          const std::string& remedy = "") const;
-  // The same with the beginning of what stands here as what was found.
+  // The same, with the beginning of this value as what was found.
   [[noreturn]] void expect(const std::string& expected) const;
 
  protected:
@@ -63,21 +63,21 @@ class JsonField {
   const nlohmann::json* value_;
 };
 
-// What stands in a text of JSON, told before it is parsed.
+// Bounds on the content of a JSON text, known before it is parsed.
 struct JsonExtent {
-  int depth = 0;      // of arrays and objects in one another
-  size_t values = 0;  // at most
+  int depth = 0;      // of nested arrays and objects
+  size_t values = 0;  // upper bound
 };
 JsonExtent json_extent(std::string_view text);
-// Parsed they take up to 160 bytes each.
+// A parsed value takes up to 160 bytes.
 constexpr size_t max_json_values = 4'000'000;
 
-// A whole document; fields taken from it live as long as it does. Throws InputError for text that is not
-// JSON, for more than max_json_values, and for arrays and objects in one another deeper than 64: what walks
-// them does so by recursion.
+// A whole document; its fields are valid as long as it exists. Throws InputError for text that is not JSON,
+// for more than max_json_values, and for arrays and objects nested deeper than 64, since the code that
+// traverses them is recursive.
 class JsonDocument : public JsonField {
  public:
-  // name: of the document in errors.
+  // name: the document's name in errors.
   JsonDocument(std::string name, std::string_view text);
   ~JsonDocument();
   JsonDocument(const JsonDocument&) = delete;

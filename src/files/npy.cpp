@@ -27,7 +27,7 @@ constexpr std::string_view magic = "\x93NUMPY";
   throw InputError(path.string(), field, found, expected, remedy);
 }
 
-// The text of a key's value in the header's Python dictionary, from its first character on.
+// The header from the first character of a key's value on; the header is a Python dictionary.
 std::string_view value_of(std::string_view header, const std::filesystem::path& path,
                           const std::string& key) {
   const size_t at = header.find("'" + key + "'");
@@ -100,7 +100,7 @@ void widen_halves(const std::byte* from, int64_t count, float* to) {
 
 using Widen = void (*)(const std::byte*, int64_t, float*);
 
-// Null for a type that is not read.
+// Null for an unsupported type.
 Widen widen_for(char kind, int width) {
   if (kind == 'f')
     return width == 2 ? widen_halves : width == 4 ? widen<float> : width == 8 ? widen<double> : nullptr;
@@ -121,14 +121,14 @@ Widen widen_for(char kind, int width) {
   }
 }
 
-// Numbers in Fortran order (first index fastest) put into C order.
+// Converts from Fortran order (first index fastest) to C order.
 Tensor<float> transpose(const Tensor<float>& fortran) {
   const int rank = fortran.shape().rank();
   int64_t dims[4] = {1, 1, 1, 1};
   for (int r = 0; r < rank; ++r) dims[4 - rank + r] = fortran.dim(r);
   Tensor<float> result;
   result.resize(fortran.shape());
-  if (result.empty()) return result;  // of any number of empty rows
+  if (result.empty()) return result;  // any number of empty rows
   int64_t to = 0;
   for (int64_t a = 0; a < dims[0]; ++a)
     for (int64_t b = 0; b < dims[1]; ++b)
@@ -251,7 +251,7 @@ void write_array(const std::filesystem::path& path, const std::string& type, con
   for (int r = 0; r < array.shape().rank(); ++r)
     header += (r == 0 ? "" : ", ") + std::to_string(array.dim(r));
   header += array.shape().rank() == 1 ? ",), }" : "), }";
-  // The data starts at a multiple of 64 bytes, the header's last byte is a newline.
+  // The data start at a multiple of 64 bytes, and the header's last byte is a newline.
   constexpr size_t fixed = 10;
   header.append(63 - (fixed + header.size()) % 64, ' ').push_back('\n');
   std::string text(magic);

@@ -10,22 +10,22 @@
 namespace traceflow {
 
 // Reads a .npy array of up to 4 dimensions as float32. Accepts little-endian float16/32/64, int and uint of 8
-// to 64 bits and bool, C order (Fortran order is transposed). Throws InputError for object arrays, other
-// types, and sizes that the file does not hold (checked before memory is taken). A scalar is read as an array
+// to 64 bits and bool, in C or Fortran order (which is transposed). Throws InputError for object arrays,
+// other types, and sizes that exceed the file (checked before memory is allocated). A scalar becomes an array
 // of one element.
 Tensor<float> read_npy(InputFile file);
 Tensor<float> read_npy(const std::filesystem::path& path);
-// The array `name` of a .npz (zip, stored or deflated); an empty name takes the only one.
+// Reads the array `name` of a .npz (zip, stored or deflated); an empty name means the only one.
 Tensor<float> read_npz(const std::filesystem::path& path, const std::string& name = "");
-// float32 or int32, C order, format version 1.0. Written atomically.
+// Writes float32 or int32, C order, format version 1.0, atomically.
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array);
 void write_npy(const std::filesystem::path& path, const Tensor<int32_t>& array);
 
-// An array left on the disk and read in slices, for those larger than memory should hold. Throws InputError
-// as read_npy does.
+// An array that stays on the disk and is read in slices, for arrays too large for memory. Throws InputError
+// like read_npy.
 class NpyFile {
  public:
-  // A .npy, or by the extension .npz the array `name` of one (empty: the only one). A deflated array is
+  // A .npy, or the array `name` of a .npz by its extension (empty: the only one). A deflated array is
   // unpacked once into a nameless temporary file.
   explicit NpyFile(InputFile file, const std::string& name = "");
   explicit NpyFile(const std::filesystem::path& path, const std::string& name = "")
@@ -43,8 +43,8 @@ class NpyFile {
 
   InputFile file_;
   Shape shape_;
-  char kind_ = 'f';  // numpy's: f, i, u, b
-  int width_ = 4;    // bytes of an element
+  char kind_ = 'f';  // of numpy: f, i, u, b
+  int width_ = 4;    // bytes per element
   bool fortran_order_ = false;
   int64_t data_offset_ = 0;
 };

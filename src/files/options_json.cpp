@@ -12,7 +12,7 @@ namespace {
 
 using OrderedJson = nlohmann::ordered_json;
 
-// Beyond what options are: to read them in their order takes the square of their number.
+// Far more than options have. Reading them in order takes time quadratic in their number.
 constexpr int deepest_option = 16;
 constexpr size_t most_values = 10'000;
 

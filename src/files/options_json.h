@@ -7,9 +7,9 @@
 
 namespace traceflow {
 
-// An options struct as JSON text, groups as objects, fields in their order: {"iterations": 60000, "loss":
-// {"normal": 0.05}}. This is how a checkpoint keeps its settings; reading it back gives the same values, bit
-// for bit.
+// An options struct as JSON text, with groups as objects and fields in their order: {"iterations": 60000,
+// "loss": {"normal": 0.05}}. Checkpoints keep their settings in this form. Reading it back gives the same
+// values, bit for bit.
 std::string options_to_json(const std::vector<OptionField>& fields);
 
 template <class Options>
@@ -20,7 +20,7 @@ std::string options_to_json(const Options& options) {
 }
 
 // Writes the fields that the text names; the others keep their values. Throws InputError beginning with
-// `where` for text that is no JSON object, unknown names, and values that a field cannot hold.
+// `where` for text that is not a JSON object, unknown names, and values that a field cannot hold.
 void options_from_json(const std::string& text, const std::vector<OptionField>& fields,
                        const std::string& where);
 

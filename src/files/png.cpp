@@ -37,13 +37,13 @@ bool encode(png_structp png, png_infop info, png_uint_32 width, png_uint_32 heig
   png_set_IHDR(png, info, width, height, bits, colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                PNG_FILTER_TYPE_DEFAULT);
   png_write_info(png, info);
-  if (bits == 16) png_set_swap(png);  // a PNG has the high byte first
+  if (bits == 16) png_set_swap(png);  // PNG stores the high byte first
   png_write_image(png, rows);
   png_write_end(png, info);
   return true;
 }
 
-// where: for errors.
+// where: names the image in errors.
 template <class T>
 std::string encoded(const std::string& where, const Tensor<T>& pixels) {
   const int rank = pixels.shape().rank();

@@ -6,7 +6,8 @@
 #include <cstdio>
 #include <new>
 
-// How libpng leaves: by longjmp, which skips destructors. What owns memory lives outside the jump.
+// Error handling for libpng, which leaves by longjmp and so skips destructors. Objects that own memory are
+// outside the jump.
 namespace traceflow {
 
 struct PngExit {
@@ -19,7 +20,7 @@ struct PngExit {
     png_longjmp(png, 1);
   }
   static void ignore(png_structp, png_const_charp) {}
-  // libpng's own memory, so that its want is told from a picture that is broken.
+  // Allocates for libpng, so that a lack of memory can be told from a broken image.
   static png_voidp take_memory(png_structp png, png_alloc_size_t size) {
     void* memory = ::operator new(size, std::nothrow);
     if (memory == nullptr) static_cast<PngExit*>(png_get_mem_ptr(png))->out_of_memory = true;
@@ -27,7 +28,7 @@ struct PngExit {
   }
   static void give_back(png_structp, png_voidp memory) { ::operator delete(memory); }
 
-  // After a jump that there was no memory for.
+  // Call after a jump. Throws if the cause was a lack of memory.
   void throw_if_out_of_memory() const {
     if (out_of_memory) throw std::bad_alloc();
   }

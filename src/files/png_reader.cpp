@@ -42,7 +42,7 @@ void read_bytes(png_structp png, png_bytep bytes, size_t count) {
 
 class PngReader {
  public:
-  // bits: of a number in what is read, 8 or 16.
+  // bits: of each number in the result, 8 or 16.
   PngReader(const InputFile& file, int bits) : source_(file), bits_(bits) {
     PngExit* exit = &source_;
     png_ = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, exit, PngExit::leave, PngExit::ignore, exit,
@@ -84,7 +84,7 @@ class PngReader {
   static std::string size_text(const PngSize& size) {
     return std::to_string(size.width) + "×" + std::to_string(size.height);
   }
-  // Ahead of libpng, which says neither which side it refuses nor what it is.
+  // Checked before libpng does: its message says neither which side is too large nor how large it is.
   void refuse_sides() const {
     std::array<png_byte, 24> start{};
     if (source_.file.size() < static_cast<int64_t>(start.size())) return;
@@ -105,7 +105,7 @@ class PngReader {
     png_set_user_limits(png_, max_image_side, max_image_side);
     png_set_chunk_cache_max(png_, 128);
     png_set_chunk_malloc_max(png_, 8U << 20);
-    // Text, profiles and the like are not wanted, and each may unpack to those 8 MiB.
+    // Text, profiles and the like are not needed, and each may unpack to those 8 MiB.
     png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     png_read_info(png_, info_);
     stored_row_bytes_ = static_cast<int64_t>(png_get_rowbytes(png_, info_));

@@ -25,7 +25,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr uint64_t length_bytes = 8;
-constexpr uint64_t max_header_bytes = 100'000'000;  // the format's own limit
+constexpr uint64_t max_header_bytes = 100'000'000;  // the format's limit
 constexpr size_t max_rank = 4;
 constexpr int deepest_header = 8;
 constexpr const char* metadata_key = "__metadata__";
@@ -53,7 +53,7 @@ constexpr const char* type_name() {
   if constexpr (std::is_same_v<T, uint8_t>) return "U8";
 }
 
-// One tensor as the header describes it, checked against itself but not yet against its neighbours.
+// One tensor as the header describes it. Checked alone, but not yet against its neighbours.
 struct Described {
   std::string name;
   Type type;
@@ -62,7 +62,7 @@ struct Described {
   uint64_t end;
 };
 
-// Text from a file as it may be shown in one line: short, without control characters.
+// Text from a file made printable: one short line without control characters.
 std::string shown(const std::string& text) {
   std::string result = text.substr(0, 80);
   for (char& c : result) {
@@ -75,8 +75,8 @@ std::string shown(const Json& value) {
   return shown(value.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-// The header as JSON. A name that stands twice is refused, since readers would differ on which one counts; so
-// is nesting that no header has, since printing it would take the stack.
+// Parses the header. Rejects duplicate names, since readers would differ on which one counts, and deeper
+// nesting than any header has, since printing it would overflow the stack.
 Json parse_header(const std::string& text, const std::string& origin) {
   const JsonExtent extent = json_extent(text);
   if (extent.depth > deepest_header)
@@ -129,7 +129,7 @@ uint64_t unsigned_number(const Json& value, const std::string& origin, const std
   return value.get<uint64_t>();
 }
 
-// Also computes the number of elements, which must fit 63 bits.
+// Also computes the number of elements, which must fit in 63 bits.
 Shape parse_shape(const Json& dims, const std::string& origin, const std::string& field, uint64_t& elements) {
   if (!dims.is_array() || dims.size() > max_rank) {
     throw InputError(origin, field, shown(dims), "a list of at most 4 dimensions");
@@ -200,7 +200,7 @@ std::map<std::string, std::string> parse_metadata(const Json& metadata, const st
   return result;
 }
 
-// The tensors must tile the data: no byte twice, none left over, as the format demands.
+// The tensors must tile the data, without overlap or gaps, as the format requires.
 void check_tiling(const std::vector<Described>& tensors, const std::string& origin, uint64_t data_bytes) {
   uint64_t next = 0;
   for (const Described& t : tensors) {
@@ -224,7 +224,7 @@ Json shape_list(const Shape& shape) {
 
 std::string checksum(std::string_view head, std::span<const std::byte> bytes) {
   uLong crc = crc32_z(0, reinterpret_cast<const Bytef*>(head.data()), head.size());
-  // An address that is null asks zlib for a first value.
+  // For a null address zlib returns its initial value.
   if (!bytes.empty()) crc = crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
   return fmt::format("{:08x}", crc);
 }
@@ -233,15 +233,15 @@ std::string checksum(std::string_view type, const Shape& shape, std::span<const 
   return checksum(std::string(type) + shape_list(shape).dump(), bytes);
 }
 
-// Of the text that is written, in which bytes that are not UTF-8 have been replaced.
+// Computed from the text as written, in which invalid UTF-8 bytes have been replaced.
 std::string checksum(const std::map<std::string, std::string>& metadata) {
   return checksum(Json(metadata).dump(-1, ' ', false, Json::error_handler_t::replace), {});
 }
 
-// What a file says of its sections: {"metadata": "89abcdef", "tensors": {NAME: "01234567", …}}.
+// The checksums stored in a file: {"metadata": "89abcdef", "tensors": {NAME: "01234567", …}}.
 class Checksums {
  public:
-  // Takes them out of the metadata, which must agree with its own.
+  // Removes them from the metadata and verifies the metadata's own checksum.
   Checksums(std::map<std::string, std::string>& metadata, std::string origin) : origin_(std::move(origin)) {
     const auto found = metadata.find(checksums_key);
     if (found == metadata.end()) return;
@@ -363,7 +363,7 @@ void Safetensors::add(const std::string& name, const Tensor<uint8_t>& tensor) {
 void Safetensors::write(const std::filesystem::path& path) const {
   require(!has(metadata_key), "no tensor takes the metadata's name");
   require(metadata.count(checksums_key) == 0, "no metadata take the checksums' name");
-  // Wide types first, so that every tensor starts at a multiple of its element's size.
+  // Wide types come first, so that every tensor starts at a multiple of its element size.
   std::vector<std::pair<const std::string*, const Entry*>> order;
   for (const auto& [name, entry] : entries_) order.emplace_back(&name, &entry);
   std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {

@@ -30,7 +30,7 @@ constexpr uint32_t in_zip64_32 = 0xffffffff;
                    "pack or save it again");
 }
 
-// Little-endian numbers out of bytes that were read; reading past the end is a broken archive.
+// Reads little-endian numbers from a buffer; reading past its end means a broken archive.
 class Bytes {
  public:
   Bytes(const InputFile& file, int64_t offset, int64_t count) : file_(file) {
@@ -90,7 +90,7 @@ Directory find_directory(const InputFile& file) {
   fail(file, begins_as_one ? "a zip archive whose end is missing" : "a file that is no zip archive");
 }
 
-// Sizes of 4 GiB and more stand in an extra field, in a fixed order, only those that did not fit.
+// Sizes of 4 GiB and more are in an extra field, in a fixed order; it has only those that did not fit.
 void apply_zip64(const Bytes& bytes, int64_t extra, int64_t extra_end, ZipMember& member, int64_t& header) {
   while (extra + 4 <= extra_end) {
     const uint32_t id = bytes.u16(extra);
@@ -194,7 +194,7 @@ InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
     if (stream.avail_in == 0) {
       const auto count =
           static_cast<size_t>(std::min<int64_t>(static_cast<int64_t>(piece), member.stored_size - consumed));
-      // Perhaps none is left, while zlib holds back what did not fit into the last piece.
+      // `count` may be 0 while zlib still holds output that did not fit into the last piece.
       file.read_at(member.offset + consumed, std::span(input).first(count));
       consumed += static_cast<int64_t>(count);
       stream.next_in = reinterpret_cast<Bytef*>(input.data());

@@ -6,7 +6,7 @@
 
 #include "files/input_file.h"
 
-// The little of the zip format that .npz files use: members stored or deflated, zip64 sizes, no encryption.
+// The subset of the zip format that .npz files use: members stored or deflated, zip64 sizes, no encryption.
 namespace traceflow {
 
 struct ZipMember {
@@ -15,16 +15,15 @@ struct ZipMember {
   int64_t offset = 0;  // of the member's data in the file
   int64_t stored_size = 0;
   int64_t size = 0;
-  uint32_t checksum = 0;  // CRC-32 of what it holds
+  uint32_t checksum = 0;  // CRC-32 of the unpacked data
 };
 
-// Throws InputError for what is not a zip, uses other features, points outside the file, has members on top
-// of one another, or promises more of one than its bytes can hold.
+// Lists the members. Throws InputError for what is not a zip, uses other features, points outside the file,
+// has overlapping members, or promises a larger member than its bytes can hold.
 std::vector<ZipMember> list_zip(const InputFile& file);
 
 // Unpacks a deflated member into a scratch file, in pieces, so that memory does not grow with its size.
-// Throws InputError where the temporary folder has no room for it, and for what is not what the directory
-// says.
+// Throws InputError if the temporary folder has no room for it, and for data that do not match the directory.
 InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member);
 
 }  // namespace traceflow

@@ -9,22 +9,21 @@ namespace traceflow {
 
 namespace cuda {
 
-// Memory on the device that starts at a multiple of 16 bytes.
+// Memory on the device, aligned to 16 bytes.
 struct Range {
   std::byte* begin;
   int64_t bytes;
-  int32_t first_block = 0;  // of the kernel's blocks, the first that works on it
+  int32_t first_block = 0;  // the first of the kernel's blocks that works on it
 };
-// Fills all of them with zeros. Sets first_block.
+// Fills all ranges with zeros. Sets first_block.
 TRACEFLOW_WITH_CUDA void fill_zero(std::vector<Range>& ranges);
 
 }  // namespace cuda
 
-// Tensors that are filled with zeros together: on the CUDA device by one kernel, where each would need a fill
-// of its own.
+// Fills many tensors with zeros together: on the CUDA device by one kernel instead of one fill each.
 class BatchedZeroFill {
  public:
-  // The tensor must be neither resized nor released before fill(). One of the host is fill_zero at once.
+  // The tensor must be neither resized nor released before fill(). A tensor on the host is filled at once.
   template <class T>
   void add(Tensor<T>& tensor) {
     if (tensor.device() == Device::cpu) {

@@ -5,13 +5,13 @@
 
 #include <string>
 
-// cuBLASLt, opened when it is first needed: half a gigabyte that a program without a device, or asked for the
-// CPU, does not load, and does not ask of a machine that lacks it.
+// cuBLASLt, loaded on first use. The library is half a gigabyte: programs that use only the CPU need not load
+// it, nor have it installed.
 namespace traceflow::cuda {
 
 class CublasLt {
  public:
-  // The library as it was found, once; where it was not, why.
+  // The library, searched for once; why_not() is the reason if it was not found.
   static const CublasLt& instance() {
     static const CublasLt library;
     return library;
@@ -33,7 +33,7 @@ class CublasLt {
 
  private:
   CublasLt() {
-    // The version that the headers are of; where the loader does not know it, as the toolkit had it.
+    // The version of the headers, first by the loader's search path, then in the toolkit's folder.
     const std::string name = "libcublasLt.so." + std::to_string(CUBLAS_VER_MAJOR);
     library_ = dlopen(name.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library_ == nullptr) library_ = dlopen((TRACEFLOW_CUDA_LIBRARIES "/" + name).c_str(), RTLD_NOW);

@@ -15,7 +15,7 @@ namespace traceflow::cuda {
 namespace {
 
 constexpr size_t workspace_bytes = size_t{32} << 20;
-// What every address and row is a multiple of, and so what algorithms may count on.
+// Every address and row is a multiple of this, so that algorithms may rely on it.
 constexpr uint32_t alignment = 16;
 
 const CublasLt& lt() {
@@ -41,8 +41,8 @@ cublasLtEpilogue_t epilogue_of(const GemmDescription& p) {
   return p.bias ? CUBLASLT_EPILOGUE_BIAS : CUBLASLT_EPILOGUE_DEFAULT;
 }
 
-// A product as the library wants it, which knows only columns: a row-major matrix is its transpose there, and
-// C = A·B becomes Cᵀ = Bᵀ·Aᵀ. So the library's first operand is B.
+// A product for the library, which is column-major: a row-major matrix is its own transpose there, and C =
+// A·B becomes Cᵀ = Bᵀ·Aᵀ. So the library's first operand is B.
 class Plan {
  public:
   explicit Plan(const GemmDescription& p, cublasLtHandle_t handle);
@@ -93,7 +93,8 @@ Plan::Plan(const GemmDescription& p, cublasLtHandle_t handle) {
   set(CUBLASLT_MATMUL_DESC_TRANSB, p.transposed_a ? CUBLAS_OP_T : CUBLAS_OP_N);
   set(CUBLASLT_MATMUL_DESC_EPILOGUE, epilogue_of(p));
   if (p.mask != Mask::none) set(CUBLASLT_MATMUL_DESC_EPILOGUE_AUX_LD, p.mask_stride);
-  // Algorithms are chosen by the alignment of addresses, here the least that run() brings.
+  // The library chooses algorithms by the alignment of addresses: these have the least alignment that run()
+  // uses.
   const auto* const least_aligned = reinterpret_cast<const void*>(uintptr_t{alignment});
   point(p, least_aligned, least_aligned);
   b_ = layout(p.operands, p.transposed_b ? p.n : p.k, p.transposed_b ? p.k : p.n, p.stride_b, p.batches,
@@ -111,7 +112,7 @@ void Plan::choose(cublasLtHandle_t handle) {
     check_blas(lt().set_preference(preference, attribute, &value, sizeof(value)), "a product's preferences");
   };
   prefer(CUBLASLT_MATMUL_PREF_MAX_WORKSPACE_BYTES, uint64_t{workspace_bytes});
-  // Parts of a sum meet in the workspace and are added in their order, never where they fall.
+  // Partial sums meet in the workspace and are added in order, not atomically in the order of arrival.
   prefer(CUBLASLT_MATMUL_PREF_REDUCTION_SCHEME_MASK,
          uint32_t{CUBLASLT_REDUCTION_SCHEME_NONE | CUBLASLT_REDUCTION_SCHEME_COMPUTE_TYPE});
   for (const auto attribute :
@@ -137,8 +138,8 @@ void Plan::run(const GemmDescription& p, const GemmAddresses& at, cublasLtHandle
              "a matrix product on the CUDA device");
 }
 
-// The library's handle, its workspace and all plans made so far. Stands until the program ends, since the
-// device may be gone before what is destroyed last.
+// The library's handle, its workspace and all plans made so far. It is never destroyed, since the device may
+// already be gone when static objects are.
 class Library {
  public:
   static Library& instance() {
@@ -182,7 +183,7 @@ class Library {
 
   std::mutex mutex_;
   cublasLtHandle_t handle_ = nullptr;
-  // Older devices have no units for it, and the library's products in their place are slower than fp32's.
+  // Older devices have no units for bf16, and the library's replacement is slower than fp32.
   bool multiplies_bf16_ = false;
   Tensor<std::byte> workspace_;
   std::map<GemmDescription, std::unique_ptr<const Plan>> plans_;

@@ -4,8 +4,8 @@
 #include "primitives/list_where.h"
 #include "primitives/sort.h"
 
-// Counts the entries of every key, adds the counts up to places, fills the places as threads come, and puts
-// each list into order: one thread a list, for lists are short.
+// Counts the entries of every key, sums the counts to offsets, fills the lists in the order in which threads
+// arrive, and sorts each list with one thread, since lists are short.
 namespace traceflow::cuda {
 
 namespace {
@@ -25,7 +25,7 @@ __global__ void fill_lists(int64_t n, const int32_t* key, const int32_t* begin, 
   if (i < n && key[i] >= 0) entry[begin[key[i]] + atomicAdd(&filled[key[i]], 1)] = static_cast<int32_t>(i);
 }
 
-// Restores a heap of n, the largest on top, whose entry at `at` may be too small for its place.
+// Restores a heap of n, largest on top, in which only the entry at `at` may be too small.
 __device__ void sift_down(int32_t* heap, int32_t n, int32_t at) {
   const int32_t value = heap[at];
   for (int32_t child = 2 * at + 1; child < n; child = 2 * at + 1) {

@@ -11,7 +11,7 @@ namespace traceflow {
 namespace {
 
 struct Level {
-  int64_t target;  // Highway's; the better a target, the lower its bit
+  int64_t target;  // of Highway; better targets have lower bits
   dnnl::cpu_isa isa;
 };
 
@@ -30,7 +30,7 @@ struct IsaName {
   dnnl::cpu_isa isa;
   const char* name;
 };
-// Each has what stands below it.
+// Best first: each includes those after it.
 constexpr IsaName isa_names[] = {{dnnl::cpu_isa::avx512_core_amx, "amx"},
                                  {dnnl::cpu_isa::avx512_core_bf16, "avx512 with bf16"},
                                  {dnnl::cpu_isa::avx512_core, "avx512"},

@@ -9,7 +9,7 @@
 
 namespace traceflow {
 
-// 1 where f holds. The entry after the last is 0, so that the running sum ends in the count.
+// 1 where f holds. The entry after the last is 0, so that the running sum ends with the count.
 template <class F>
 struct FlagWhere {
   F f;
@@ -18,19 +18,19 @@ struct FlagWhere {
   TRACEFLOW_HD void operator()(int64_t i) const { flag[i] = i < n && f(i) ? 1 : 0; }
 };
 
-// Puts every flagged i at its place, which is the number of those before it.
+// Writes every flagged i to its place, the number of flagged ones before it.
 struct PutFlagged {
-  const int32_t* place;  // one entry more than there are things
+  const int32_t* place;  // number of items + 1 entries
   int32_t* list;
   TRACEFLOW_HD void operator()(int64_t i) const {
     if (place[i] != place[i + 1]) list[place[i]] = static_cast<int32_t>(i);
   }
 };
 
-// Lists, ascending, those i of [0, n) for which f(i) holds, on any device; f is a functor as parallel_for
-// takes it, and the .cu file beside it instantiates for_each_index for FlagWhere<F>. The list has room for
-// all, so that its memory stays where it is whatever their number. The host waits for that number: what
-// follows is as large.
+// Lists, ascending, those i of [0, n) for which f(i) holds, on any device. f is a functor as for
+// parallel_for; the .cu file beside it instantiates for_each_index for FlagWhere<F>. The list reserves room
+// for all, so that its memory does not move whatever the count. The host waits for the count, since it is the
+// size of later work.
 template <class F>
 void list_where(Device device, const char* description, int64_t n, const F& f, Tensor<int32_t>& list) {
   static thread_local Tensor<int32_t> place;

@@ -6,14 +6,14 @@
 
 #include "base/device.h"
 
-// One kernel for many pieces of memory of different sizes, since a kernel each would cost more than most of
-// them take: every piece, a part with a member int32_t first_block, gets blocks of its own.
+// One kernel for many pieces of memory of different sizes: most are so small that a kernel each would take
+// longer to launch. Every piece, a part with a member int32_t first_block, gets its own blocks.
 namespace traceflow::cuda {
 
-// Kernels take their parameters in this many bytes on every device and with every toolkit that is supported.
+// The size of kernel parameters that every supported device and toolkit allows.
 inline constexpr size_t most_parameter_bytes = 4096;
 
-// Gives each part its first block; blocks_of(part) is how many it wants. Returns how many there are.
+// Assigns each part its first block; blocks_of(part) is the number that it needs. Returns the total.
 template <class Part, class F>
 int64_t assign_blocks(std::span<Part> parts, const F& blocks_of) {
   int64_t blocks = 0;

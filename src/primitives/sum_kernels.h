@@ -7,18 +7,18 @@
 #include "base/tensor.h"
 #include "primitives/sums.h"
 
-// Sums on the CUDA device, in an order that depends on nothing but the number of terms: every block adds up
-// its share, and then one block what they found.
+// Sums on the CUDA device, in an order that depends only on the number of terms: each block sums its share,
+// then one block sums the results.
 namespace traceflow::cuda {
 
 inline constexpr unsigned sum_threads = 256;
 
-// The sum over the sum_threads threads of a block, in all of them.
+// The sum over the sum_threads threads of a block, returned to all of them.
 template <class T>
 __device__ T block_sum(const T& mine) {
   alignas(T) __shared__ unsigned char memory[sum_threads * sizeof(T)];
   T* const sums = reinterpret_cast<T*>(memory);
-  __syncthreads();  // the sum before this one may still be read
+  __syncthreads();  // the previous sum may still be in use
   sums[threadIdx.x] = mine;
   __syncthreads();
   for (unsigned half = sum_threads / 2; half > 0; half /= 2) {
@@ -45,8 +45,8 @@ __global__ void __launch_bounds__(sum_threads) add_up(int64_t n, const T* partia
   if (threadIdx.x == 0) finish(sum);
 }
 
-// Memory for `count` partial sums until the next call. All work is on one stream, so that the next sum may
-// have it as soon as it is asked for.
+// Memory for `count` partial sums, valid until the next call. All work is on one stream, so the next sum may
+// reuse it at once.
 template <class T>
 T* memory_for_partial_sums(int64_t count) {
   static thread_local Tensor<T> kept;

@@ -7,15 +7,16 @@
 namespace traceflow {
 
 namespace cuda {
-// The sum of f(i) over [0, n) as kernels. Defined in primitives/sum_kernels.h; the .cu file beside the
+// The sum of f(i) over [0, n) by kernels. Defined in primitives/sum_kernels.h; the .cu file beside the
 // functors instantiates it.
 template <class T, class F, class G>
 TRACEFLOW_WITH_CUDA void sum_each_index(const char* description, int64_t n, const F& f, const G& finish);
 }  // namespace cuda
 
-// Sum of f(i) over [0, n) in a fixed order, on any device. finish(sum) takes it there, once, so that the host
-// need not wait for what stays on the device. f and finish are functors of plain numbers and addresses whose
-// operator() is TRACEFLOW_HD; T is a number, or a struct of such with a += that starts at zeros.
+// Sum of f(i) over [0, n) in a fixed order, on any device. finish(sum) is called once, on that device, so
+// that the host need not wait for results that remain there. f and finish are functors of plain numbers and
+// addresses with a TRACEFLOW_HD operator(). T is a number, or a struct of such that starts at zeros and has a
+// +=.
 template <class T, class F, class G>
 void ordered_sum(Device device, const char* description, int64_t n, const F& f, const G& finish,
                  int64_t grain) {
@@ -28,7 +29,7 @@ void ordered_sum(Device device, const char* description, int64_t n, const F& f, 
   sum(description, n, f, finish);
 }
 
-// A sum, and over how many.
+// A sum and the number of its terms.
 struct CountedSum {
   double sum = 0;
   int64_t count = 0;

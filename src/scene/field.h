@@ -8,7 +8,7 @@
 
 namespace traceflow {
 
-// The shape of a residual field's network (method §1.2). Defaults are the paper's.
+// The shape of a residual field's network (method §1.2). Defaults are those of the paper.
 struct NetworkOptions {
   int depth = 8;
   int width = 256;
@@ -29,14 +29,14 @@ struct NetworkOptions {
   void validate() const;
   // Numbers in the encoding of (x, t): 3·(1 + 2·L_x) + 1 + 2·L_t.
   int encoding_size() const { return 3 + 6 * position_frequencies + 1 + 2 * time_frequencies; }
-  // Inputs of layer l: the encoding for the first, [encoding, hidden] at the skip, else hidden.
+  // Inputs of a layer: the encoding for the first, [encoding, hidden] at the skip, otherwise hidden.
   int layer_inputs(int layer) const {
     return layer == 0 ? encoding_size() : layer == skip ? encoding_size() + width : width;
   }
 };
 
-// The parameters of one residual field F(x, t): R³×[0,1] → R^outputs; also the shape of its gradients and
-// moments. Encoding order: x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x (three numbers each), then the
+// The parameters of one residual field F(x, t): R³×[0,1] → R^outputs, and also their gradients and moments.
+// Order of the encoding: x, sin 2⁰x, cos 2⁰x, …, sin 2^{L-1}x, cos 2^{L-1}x (three numbers each), then the
 // same for t.
 template <class T>
 struct BasicField {
@@ -50,7 +50,7 @@ struct BasicField {
   int outputs() const { return head_bias.empty() ? 0 : static_cast<int>(head_bias.dim(0)); }
 
   Device device() const { return head_weight.device(); }
-  // The same parameters on a device.
+  // A copy on a device.
   BasicField on(Device device) const {
     BasicField result;
     result.shape = shape;
@@ -61,7 +61,7 @@ struct BasicField {
     return result;
   }
 
-  // The shapes of another field, on its device, in the memory that is there.
+  // Takes the shapes and the device of another field, and reuses the memory.
   void resize_like(const BasicField& other) {
     const auto resize = [](Tensor<T>& tensor, const Tensor<T>& like) {
       tensor.place(like.device()).resize(like.shape());
@@ -75,7 +75,7 @@ struct BasicField {
     resize(head_bias, other.head_bias);
   }
 
-  // f(name, tensor) for every parameter tensor: "weight0", "bias0", …, "head_weight", "head_bias".
+  // Calls f(name, tensor) for every parameter tensor: "weight0", "bias0", …, "head_weight", "head_bias".
   template <class F>
   void for_each(F&& f) {
     visit(*this, f);
@@ -124,7 +124,7 @@ BasicField<To> convert(const BasicField<From>& field) {
   return result;
 }
 
-// Where each residual stands in a field's output row (method §1.2). The environment has no tint.
+// Index of each residual in a field's output row (method §1.2). The environment has no tint.
 namespace residual {
 inline constexpr int position = 0;
 inline constexpr int rotation = 3;

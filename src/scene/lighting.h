@@ -4,19 +4,19 @@
 
 namespace traceflow {
 
-// How light changes over time. On what no body carries, as where a body's shadow moves over a table: a grid
-// of the logarithm of the brightness, in space and time. The logarithm is trilinear between points; it is 0
-// on the box's faces and outside. On a body, which turns in the light and passes lamps: a logarithm that is
-// linear in space, b₀ + b · (p − m)/r with the body's middle m and radius r; at a fixed time, Lambert's
-// reflection of distant light is much like it. All of it is linear between times; beyond the first time and
-// the last it stands still. Also the shape of gradients and of Adam's moments. T is float in the program,
-// double in references.
+// How light changes over time. For surfels of no body, such as a table that a body's shadow crosses, it is a
+// grid of the logarithm of the brightness, in space and time. The logarithm is trilinear between points, and
+// 0 on the faces of the box and outside. On a body, which turns in the light and passes lamps, it is a
+// logarithm that is linear in space, b₀ + b · (p − m)/r with the body's middle m and radius r. At a fixed
+// time it approximates Lambertian reflection of distant light. Everything is linear between times, and
+// constant before the first and after the last. Also holds gradients and Adam's moments. T is float in the
+// program, double in references.
 template <class T>
 struct BasicLighting {
   Tensor<T> box;   // 2×3, the corners with the lowest and the highest coordinates, scene units. Not trained
   Tensor<T> time;  // L, ascending, in [0, 1]. Not trained
   Tensor<T> brightness;  // L×Z×Y×X, logarithms; Z, Y, X of 3 or more, evenly spaced over the box
-  // Of each of B bodies; all are empty where light on bodies does not change.
+  // For each of B bodies; all are empty if the light on bodies is constant.
   Tensor<T> middle;           // B×L×3, where the body is, scene units. Not trained
   Tensor<T> radius;           // B, scene units, above 0. Not trained
   Tensor<T> body_brightness;  // B×L×4: b₀, and b along the axes of the world
@@ -26,13 +26,13 @@ struct BasicLighting {
   int64_t bodies() const { return radius.size(); }
 
   Device device() const { return brightness.device(); }
-  // The same on a device.
+  // A copy on a device.
   BasicLighting on(Device device) const {
     return {box.on(device),    time.on(device),   brightness.on(device),
             middle.on(device), radius.on(device), body_brightness.on(device)};
   }
 
-  // The shapes of another, on its device, in the memory that is there.
+  // Takes the shapes and the device of another, and reuses the memory.
   void resize_like(const BasicLighting& other) {
     const Device device = other.device();
     box.place(device).resize(other.box.shape());
@@ -43,7 +43,7 @@ struct BasicLighting {
     body_brightness.place(device).resize(other.body_brightness.shape());
   }
 
-  // f(name, tensor) for every group that is trained.
+  // Calls f(name, tensor) for every group that is trained.
   template <class F>
   void for_each(F&& f) {
     f("brightness", brightness);

@@ -4,14 +4,14 @@
 
 namespace traceflow {
 
-// How B rigid bodies of a set of surfels move: each a pose at each of K times. At time t a point x of body b
-// is at R_b(t) (x − c_b) + c_b + s_b(t). Between two keys the rotation turns evenly about one axis and the
-// shift runs straight; before the first key and behind the last one both stand still. Also the shape of
-// gradients and of Adam's moments. T is float in the program, double in references.
+// How B rigid bodies of a set of surfels move: each has a pose at each of K times (keys). At time t a point x
+// of body b is at R_b(t) (x − c_b) + c_b + s_b(t). Between two keys the rotation turns at a constant rate
+// about one axis, and the shift is linear; before the first key and after the last both are constant. Also
+// holds gradients and Adam's moments. T is float in the program, double in references.
 template <class T>
 struct BasicMotion {
   Tensor<T> time;      // K, ascending, in [0, 1]
-  Tensor<T> centre;    // B×3, what a body turns about, where it is at rest; scene units. Not trained
+  Tensor<T> centre;    // B×3, the point that a body rotates about, at rest; scene units. Not trained
   Tensor<T> rotation;  // B×K×4, quaternion (w, x, y, z), any length
   Tensor<T> shift;     // B×K×3, scene units
 
@@ -19,12 +19,12 @@ struct BasicMotion {
   int64_t keys() const { return time.size(); }
 
   Device device() const { return centre.device(); }
-  // The same motion on a device.
+  // A copy on a device.
   BasicMotion on(Device device) const {
     return {time.on(device), centre.on(device), rotation.on(device), shift.on(device)};
   }
 
-  // The shapes of another motion, on its device, in the memory that is there.
+  // Takes the shapes and the device of another motion, and reuses the memory.
   void resize_like(const BasicMotion& other) {
     const Device device = other.device();
     time.place(device).resize(other.time.shape());
@@ -33,7 +33,7 @@ struct BasicMotion {
     shift.place(device).resize(other.shift.shape());
   }
 
-  // f(name, tensor) for every group that is trained.
+  // Calls f(name, tensor) for every group that is trained.
   template <class F>
   void for_each(F&& f) {
     f("rotation", rotation);
@@ -47,7 +47,7 @@ struct BasicMotion {
 };
 using Motion = BasicMotion<float>;
 
-// Bodies that stand still at their centres (B×3) at each of the times (K).
+// Bodies that are at rest at their centres (B×3) at each of the times (K).
 inline Motion still_motion(const Tensor<float>& centre, const Tensor<float>& time) {
   const int64_t bodies = centre.dim(0), keys = time.size();
   Motion motion{time, centre, Tensor<float>({bodies, keys, 4}), Tensor<float>({bodies, keys, 3})};

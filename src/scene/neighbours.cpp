@@ -38,7 +38,7 @@ Neighbours nearest_neighbours(const Tensor<float>& points, int k) {
   const Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));
 
   parallel_for("scene: nearest neighbours", count, [&](int64_t i) {
-    // Ask for one more, since the point itself is among its neighbours.
+    // One more, since the point itself is among its neighbours.
     const auto wanted = static_cast<size_t>(k) + 1;
     std::vector<size_t> index(wanted);
     std::vector<float> distance2(wanted);

@@ -4,11 +4,12 @@
 
 namespace traceflow {
 
-// How bodies bend (scene/motion.h): N nodes, each of one body, where the body is at rest, and each with a
-// turn and a shift at each of L times. A point p of a body at rest bends to Σ w_n (R_n (p − c_n) + c_n + s_n)
-// over the body's nodes, w_n ∝ exp(−|p − c_n|²/2r_n²) with Σ w_n = 1, before the body's pose moves it.
-// Between two times turns and shifts run straight; beyond the first and the last they stand still. Also the
-// shape of gradients and of Adam's moments. T is float in the program, double in references.
+// How bodies bend (scene/motion.h). Each of N nodes belongs to one body, has a position c_n where the body is
+// at rest, and has a turn and a shift at each of L times. A point p of a body at rest bends to
+//   Σ w_n (R_n (p − c_n) + c_n + s_n) over the body's nodes, w_n ∝ exp(−|p − c_n|²/2r_n²) with Σ w_n = 1,
+// before the body's pose moves it. Turns and shifts are linear between times, and constant before the first
+// and after the last. Also holds gradients and Adam's moments. T is float in the program, double in
+// references.
 template <class T>
 struct BasicNodes {
   Tensor<int32_t> body;  // N, 0 to bodies − 1
@@ -17,20 +18,20 @@ struct BasicNodes {
   Tensor<T> radius;      // N, above 0, scene units. Not trained
   Tensor<T> turn;        // N×L×3, rotation vectors, radians
   Tensor<T> shift;       // N×L×3, scene units
-  Tensor<T> anchor;  // N×L×3, where training would keep nodes (ops/motion/nodes.h), in world, scene units.
+  Tensor<T> anchor;  // N×L×3, where training tries to keep nodes (ops/motion/nodes.h), world, scene units.
                      // Not trained
 
   int64_t count() const { return body.size(); }
   int64_t times() const { return time.size(); }
 
   Device device() const { return centre.device(); }
-  // The same nodes on a device.
+  // A copy on a device.
   BasicNodes on(Device device) const {
     return {body.on(device), time.on(device),  centre.on(device), radius.on(device),
             turn.on(device), shift.on(device), anchor.on(device)};
   }
 
-  // The shapes of others, on their device, in the memory that is there.
+  // Takes the shapes and the device of others, and reuses the memory.
   void resize_like(const BasicNodes& other) {
     const Device device = other.device();
     body.place(device).resize(other.body.shape());
@@ -44,7 +45,7 @@ struct BasicNodes {
     }
   }
 
-  // f(name, tensor) for every group that is trained.
+  // Calls f(name, tensor) for every group that is trained.
   template <class F>
   void for_each(F&& f) {
     f("turn", turn);

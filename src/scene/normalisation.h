@@ -4,8 +4,8 @@
 
 namespace traceflow {
 
-// Between a capture's own lengths and axes and the scene's: x_in_scene = (x_in_capture - centre) · scale, as
-// scene.json says (method §2).
+// Converts a capture's own coordinates to those of the scene: x_in_scene = (x_in_capture - centre) · scale,
+// as in scene.json (method §2).
 struct SceneNormalisation {
   Vec3<double> centre{0};
   double scale = 1;

@@ -55,7 +55,7 @@ float load_scalar(PlyScalar type, const std::byte* p) {
   throw InputError(path, "property " + name, "none", "every attribute of 2DGS", ply_remedy);
 }
 
-// Where one property of a row goes: rows[row · stride + number]. rows: null where there are none.
+// Where one property of a row is stored: rows[row · stride + number]. rows: null if nowhere.
 struct Column {
   PlyScalar type;
   int64_t offset;
@@ -67,7 +67,7 @@ class ColumnPlan {
  public:
   ColumnPlan(std::string path, const PlyHeader& header) : path_(std::move(path)), header_(header) {}
 
-  // Maps properties to consecutive numbers of a tensor's row; empty names are left out.
+  // Maps properties to consecutive numbers of a tensor's row; skips empty names.
   void add(std::span<const std::string_view> names, Tensor<float>& tensor) {
     for (size_t i = 0; i < names.size() && !names[i].empty(); ++i)
       add_one(std::string(names[i]), tensor, static_cast<int64_t>(i));
@@ -85,7 +85,7 @@ class ColumnPlan {
   std::vector<Column> columns_;
 };
 
-// Before memory is taken: a header that lacks an attribute could promise any number of rows.
+// Checked before memory is allocated: a header that lacks an attribute could promise any number of rows.
 void require_attributes(const std::string& path, const PlyHeader& header) {
   for_each_field([&](const SurfelField& field) {
     for (const std::string_view name : field.ply) {

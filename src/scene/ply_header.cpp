@@ -35,14 +35,14 @@ int64_t bytes_of(PlyScalar type) {
   return sizes[static_cast<size_t>(type)];
 }
 
-// What was found, cut to a length that keeps the message one line.
+// Text for a message, cut so that it fits in one line.
 std::string one_line(std::string_view text) {
   std::string clean;
   for (const char c : text.substr(0, 60)) clean += c >= 32 && c < 127 ? c : '?';
   return "\"" + clean + (text.size() > 60 ? "…\"" : "\"");
 }
 
-// The header's text, up to and with the end_header line.
+// The header's text, up to and including the end_header line.
 std::string read_header_text(const InputFile& file) {
   std::string text(static_cast<size_t>(std::min(file.size(), header_cap)), '\0');
   file.read_at(0, std::as_writable_bytes(std::span(text.data(), text.size())));
@@ -61,7 +61,7 @@ std::string read_header_text(const InputFile& file) {
                    fmt::format("one within the first {} bytes", header_cap), ply_remedy);
 }
 
-// Reads the header line by line, strictly: a line that it does not know is an error.
+// Parses the header line by line; an unknown line is an error.
 class HeaderParser {
  public:
   explicit HeaderParser(const InputFile& file) : path_(file.path().string()) {

@@ -22,19 +22,19 @@ struct PlyProperty {
 struct PlyHeader {
   int64_t rows = 0;  // vertices
   int64_t row_bytes = 0;
-  int64_t bytes = 0;  // of the header itself, where the rows begin
+  int64_t bytes = 0;  // of the header itself; the rows follow
   std::vector<PlyProperty> properties;
-  std::map<std::string, std::string> notes;  // of lines "comment traceflow KEY VALUE"
+  std::map<std::string, std::string> notes;  // from lines "comment traceflow KEY VALUE"
 
-  // Null where there is none of this name.
+  // Null if there is no property with this name.
   const PlyProperty* find(const std::string& name) const;
 };
 
-// What to do about a .ply that cannot be used.
+// Advice for a .ply that cannot be used.
 inline constexpr const char* ply_remedy = "write it with 2DGS or `traceflow export`";
 
-// Reads the header strictly: binary little endian, vertices first, scalar properties, no line that the format
-// does not know, and caps on everything. The rows are all in the file. Throws InputError otherwise.
+// Reads the header strictly: binary little endian, vertices first, scalar properties, no unknown lines,
+// limits on everything, and all rows within the file. Throws InputError otherwise.
 PlyHeader read_ply_header(const InputFile& file);
 
 }  // namespace traceflow

@@ -6,8 +6,8 @@
 
 namespace traceflow {
 
-// How a set of surfels becomes another: row i of the new set is a copy of row source[i] of the old one; a
-// fresh row is a new surfel, whose optimiser and statistics start from zero.
+// How a set of surfels becomes another: row i of the new set is a copy of row source[i] of the old one. A
+// fresh row is a new surfel, whose optimiser state and statistics start at zero.
 struct RowEdit {
   std::vector<int32_t> source;
   std::vector<uint8_t> fresh;
@@ -23,7 +23,7 @@ struct RowEdit {
   }
 };
 
-// An edit where the tensors that it is applied to are.
+// An edit on the device of the tensors that it is applied to.
 struct PlacedEdit {
   Tensor<int32_t> source;
   Tensor<uint8_t> fresh;
@@ -33,13 +33,14 @@ struct PlacedEdit {
   int64_t count() const { return source.size(); }
 };
 
-// A tensor whose first index counts surfels, edited. zero_fresh: fresh rows become zero instead of copies.
+// Applies an edit to a tensor whose first index is the surfel. zero_fresh: fresh rows become zero instead of
+// copies.
 Tensor<float> edited_rows(const Tensor<float>& tensor, const PlacedEdit& edit, bool zero_fresh);
 Surfels edited_rows(const Surfels& surfels, const PlacedEdit& edit);
 inline void edit_rows(Surfels& surfels, const RowEdit& edit) {
   surfels = edited_rows(surfels, PlacedEdit(edit, surfels.device()));
 }
-// Adds the rows of another set, which has the same groups and degree, after those of the first. On the CPU.
+// Appends the rows of another set with the same groups and degree. On the CPU.
 void append_rows(Surfels& surfels, const Surfels& more);
 
 }  // namespace traceflow

@@ -11,7 +11,7 @@ template <class T>
 struct TakeRow {
   const int32_t* source;
   const uint8_t* zeroed;  // rows that become zero instead of copies; null: none
-  uint32_t row;           // numbers a row
+  uint32_t row;           // numbers per row
   const T* from;
   T* to;
 

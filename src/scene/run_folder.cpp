@@ -19,7 +19,7 @@ bool stands(const fs::path& path) {
   return found;
 }
 
-// One whose every section is as it was written.
+// Reads a checkpoint and verifies its checksums, which are required from version 2 on.
 Safetensors read_sound(const fs::path& path) {
   Safetensors file = Safetensors::read(path);
   if (file.number("version") > 1 && !file.has_checksums()) {
@@ -41,8 +41,8 @@ std::string iteration_of(const Safetensors& file) {
   return found == file.metadata.end() ? "" : ", of iteration " + found->second;
 }
 
-// The current checkpoint, or the one before it and why. One that may be sound and cannot be read now is no
-// reason to go back.
+// The current checkpoint, or the previous one and the reason. A checkpoint that cannot be read at the moment
+// may be intact, so it is no reason to fall back.
 Safetensors newest_sound(const RunFolder& run, std::string& note) {
   std::string trouble;
   try {
@@ -64,15 +64,15 @@ Safetensors newest_sound(const RunFolder& run, std::string& note) {
   }
 }
 
-// Gives the current checkpoint the name of the one before it beside its own, which it keeps until the new one
-// takes it. Where the file system has no second names, it loses its own.
+// Gives the current checkpoint the name of the previous one as a second name (a hard link), so that it keeps
+// its own until the new one takes it. On file systems without hard links, it loses its own.
 void name_previous(const RunFolder& run, std::error_code& error) {
   const fs::path second = run.folder / "checkpoint.previous.safetensors.link";
   std::error_code refused;
   fs::remove(second, refused);
   fs::create_hard_link(run.checkpoint(), second, refused);
   fs::rename(refused ? run.checkpoint() : second, run.previous_checkpoint(), error);
-  // It stays where the one before was this file already: then renaming does nothing.
+  // If the previous checkpoint is already this file, rename does nothing and the link remains.
   fs::remove(second, refused);
 }
 
@@ -94,8 +94,8 @@ void write_checkpoint(const RunFolder& run, Safetensors file, Current current) {
   file.metadata["version"] = std::to_string(checkpoint_version);
   std::error_code error;
   make_folder(run.folder);
-  // Write the new one beside the old before either changes its name, so that at every moment a whole one
-  // stands.
+  // The new file is complete before either old one changes its name, so that there is a whole checkpoint at
+  // every moment.
   const fs::path fresh = run.folder / "checkpoint.new.safetensors";
   file.write(fresh);
   if (current == Current::becomes_previous && stands(run.checkpoint())) name_previous(run, error);

@@ -14,36 +14,37 @@
 
 namespace traceflow {
 
-// Where reflections come from (method §9).
+// Source of the reflections (method §9).
 enum class Specular { none, environment_gaussians, environment_map };
 constexpr std::array<std::string_view, 3> enum_names(Specular) {
   return {"none", "environment-gaussians", "environment-map"};
 }
 
-// What is reconstructed (method §1): two sets of surfels and a residual field for each, or a cube map in the
-// place of the second set. A field that is absent is F ≡ 0; a motion that is absent carries nothing.
+// What is reconstructed (method §1): two sets of surfels with a residual field each, or a cube map instead of
+// the second set. An absent field is F ≡ 0; an absent motion moves nothing.
 struct Scene {
   Surfels main;
   Surfels environment;
   std::optional<Field> main_field;
-  std::optional<Motion> main_motion;  // of the bodies that main.body names
-  std::optional<Nodes> main_nodes;    // of those of them that bend
-  std::optional<Lighting> lighting;   // of main surfels that no body carries
+  std::optional<Motion> main_motion;  // of the bodies in main.body
+  std::optional<Nodes> main_nodes;    // of those bodies that bend
+  std::optional<Lighting> lighting;   // of main surfels that belong to no body, and of bodies
   std::optional<Field> environment_field;
   std::optional<EnvironmentMap> environment_map;
   Specular specular = Specular::environment_gaussians;
   SceneNormalisation normalisation;
   float extent =
       1;  // 1.1 · the largest distance of a training camera from their mean (method §7.6), scene units
-  // Smallest focal length of the photographs that it was trained on, pixels; 0 where nobody knows.
+  // Smallest focal length of the photographs that the scene was trained on, pixels; 0 if unknown.
   float focal = 0;
-  // One number: the largest distance by which the main field lately moved a surfel, what view culling must
-  // allow for. Those that bodies carry are never culled.
+  // One number: the largest recent distance by which the main field moved a surfel, the margin of view
+  // culling. Surfels of bodies are never culled.
   Tensor<float> main_max_displacement{Shape{1}};
 
-  // Where all of it lives.
+  // The device of all parts.
   Device device() const { return main.device(); }
-  // Takes all of it to a device. What cannot go there stays where it is, whole (memory::OutOfMemory).
+  // Moves all parts to a device. A part that does not fit there stays where it is, complete
+  // (memory::OutOfMemory).
   void move_to(Device device);
 };
 

@@ -13,7 +13,7 @@ using Json = nlohmann::json;
 
 constexpr const char* specular_names[] = {"none", "environment-gaussians", "environment-map"};
 
-// Visitors that carry a network's shape into JSON and back.
+// Visitors that convert a network's shape to JSON and back.
 struct ToJson {
   Json& json;
   template <class T>
@@ -40,7 +40,8 @@ Json put_field(const Field& field, const std::string& prefix, Safetensors& file)
   return json;
 }
 
-// A tensor that must have this shape: no memory is taken for more than the file has.
+// A tensor that must have this shape. The shape from the file is checked, so no more memory is allocated than
+// the file has data.
 Tensor<float> take(const Safetensors& file, const std::string& name, const Shape& shape) {
   Tensor<float> stored = file.tensor<float>(name);
   if (stored.shape() != shape)
@@ -86,7 +87,7 @@ Surfels get_surfels(const std::string& prefix, const Safetensors& file) {
   for_each_field(
       [&](const SurfelField& field, Tensor<float>& tensor) {
         const std::string name = prefix + std::string(field.name);
-        if (field.name == "position" || field.name == "sh") return;  // above
+        if (field.name == "position" || field.name == "sh") return;  // read above
         if (field.is_optional && !file.has(name)) return;
         tensor = take(file, name, field.width == 1 ? Shape{n} : Shape{n, field.width});
       },
@@ -224,7 +225,7 @@ Specular specular_from(const JsonField& name) {
 }
 
 Scene scene_from(const JsonField& json, const Safetensors& file) {
-  // Lengths on either side of these are held by single precision.
+  // Limits of lengths, so that single precision can hold them.
   constexpr double largest = 1e12, smallest = 1e-12;
   Scene scene;
   scene.specular = specular_from(json["specular"]);

@@ -9,14 +9,14 @@ namespace traceflow {
 // A trained field of a surfel (method §1.1).
 struct SurfelField {
   std::string_view name;  // of the member, in checkpoints and in messages
-  int64_t width;          // numbers of a surfel; of the harmonics 0: 3 (degree + 1)²
+  int64_t width;          // numbers per surfel; 0 for the harmonics, which have 3 (degree + 1)²
   // Properties of a 2DGS .ply. The harmonics also have f_rest_0, f_rest_1, …
   std::array<std::string_view, 4> ply;
-  bool is_optional = false;  // sets may have none: the environment has neither tint nor roughness
+  bool is_optional = false;  // sets may lack it: the environment has neither tint nor roughness
 };
 
-// Calls f(field, set.position, …) for each field, with the members of that name of all sets. The one list of
-// a surfel's fields: copies, conversions, checkpoints, .ply files and the optimiser's moments follow from it.
+// Calls f(field, set.position, …) for each field, with that member of all sets. This is the only list of a
+// surfel's fields; copies, conversions, checkpoints, .ply files and the optimiser's moments use it.
 template <class F, class... Sets>
 void for_each_field(F&& f, Sets&... sets) {
   f(SurfelField{"position", 3, {"x", "y", "z"}}, sets.position...);

@@ -5,15 +5,15 @@
 #include "math/surfel_hit.h"
 #include "scene/surfels.h"
 
-// The addresses of a set of posed surfels, for steps that run on either device.
+// Addresses of a set of posed surfels, for steps that run on either device.
 namespace traceflow {
 
 template <class T>
 struct BasicPosedSurfelsView {
   T *position, *scale, *rotation, *opacity, *sh;
-  T *tint, *carried, *roughness;  // null: there is none
+  T *tint, *carried, *roughness;  // null if absent
   int64_t count;
-  int64_t sh_row;  // numbers of harmonics a surfel
+  int64_t sh_row;  // numbers of harmonics per surfel
   int sh_degree;
 };
 using PosedSurfelsView = BasicPosedSurfelsView<const float>;

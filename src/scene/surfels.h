@@ -7,11 +7,11 @@
 
 namespace traceflow {
 
-// Of a surfel that no body carries: the field may move it, or it stands still.
+// Values of `body` for surfels of no body: the field may move it, or it is static.
 inline constexpr int32_t moved_by_field = -1, stands_still = -2;
 
-// A set of N surfels as they are stored and trained, before activation (method §1.1). Also the shape of their
-// gradients and of Adam's moments. T is float in the program, double in references.
+// A set of N surfels as stored and trained, before activation (method §1.1). Also holds gradients and Adam's
+// moments. T is float in the program, double in references.
 template <class T>
 struct BasicSurfels {
   Tensor<T> position;       // N×3, world (normalised scene units)
@@ -20,17 +20,17 @@ struct BasicSurfels {
   Tensor<T> opacity_logit;  // N
   Tensor<T> sh;             // N×K×3, spherical harmonics, K = (degree + 1)²
   Tensor<T> tint_logit;     // N, specular tint; empty for the environment
-  // N, the body that carries it (scene/motion.h), or one of the two above; empty where there are no bodies.
+  // N, the body of the surfel (scene/motion.h), or one of the two values above; empty if there are no bodies.
   // Not trained: gradients and moments have none.
   Tensor<int32_t> body{};
-  Tensor<T> roughness_logit{};  // N, of what it mirrors; empty: all are perfect mirrors, or none mirrors
+  Tensor<T> roughness_logit{};  // N, of its reflection; empty: all mirrors are perfect, or nothing reflects
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
   bool has_tint() const { return !tint_logit.empty(); }
   bool has_roughness() const { return !roughness_logit.empty(); }
 
   Device device() const { return position.device(); }
-  // The same set on a device.
+  // A copy on a device.
   BasicSurfels on(Device device) const {
     BasicSurfels result;
     for_each_field([&](const SurfelField&, const Tensor<T>& from, Tensor<T>& to) { to = from.on(device); },
@@ -39,14 +39,14 @@ struct BasicSurfels {
     return result;
   }
 
-  // The shapes of another set, on its device, in the memory that is there.
+  // Takes the shapes and the device of another set, and reuses the memory.
   void resize_like(const BasicSurfels& other) {
     for_each_field([&](const SurfelField&, const Tensor<T>& like,
                        Tensor<T>& field) { field.place(other.device()).resize(like.shape()); },
                    other, *this);
   }
 
-  // f(name, tensor) for each field that the set has, in the order of for_each_field.
+  // Calls f(name, tensor) for each field that the set has, in the order of for_each_field.
   template <class F>
   void for_each(F&& f) {
     visit(*this, f);
@@ -68,8 +68,8 @@ struct BasicSurfels {
 };
 using Surfels = BasicSurfels<float>;
 
-// M surfels at one time, activated (method §1.3): what the rasteriser and the tracer see. A subset of the
-// stored ones in ascending order. Also the shape of the gradients by these values.
+// M surfels at one time, activated (method §1.3): the input of the rasteriser and the tracer. They are a
+// subset of the stored ones in ascending order. Also holds the gradients by these values.
 template <class T>
 struct BasicPosedSurfels {
   Tensor<T> position;  // M×3, world
@@ -78,10 +78,10 @@ struct BasicPosedSurfels {
   Tensor<T> opacity;   // M, in (0, 1)
   Tensor<T> sh;        // M×K×3, only the degrees in use: K = (active degree + 1)²
   Tensor<T> tint;      // M, in (0, 1); empty for the environment
-  Tensor<T> carried;   // M, 1 where a body carries the surfel, else 0; empty where no silhouette is drawn.
+  Tensor<T> carried;   // M, 1 if the surfel belongs to a body, otherwise 0; empty if no silhouette is drawn.
                        // Has no gradient
-  // M, in (0, ¼): standard deviation of the directions that a surfel mirrors one into, as a tangent (method
-  // §4.5); empty where all are 0.
+  // M, in (0, ¼): standard deviation, as a tangent, of the directions that a surfel reflects a ray into
+  // (method §4.5); empty if all are 0.
   Tensor<T> roughness{};
 
   int64_t count() const { return position.empty() ? 0 : position.dim(0); }
@@ -89,13 +89,13 @@ struct BasicPosedSurfels {
   bool has_roughness() const { return !roughness.empty(); }
 
   Device device() const { return position.device(); }
-  // The same set on a device.
+  // A copy on a device.
   BasicPosedSurfels on(Device device) const {
     return {position.on(device), scale.on(device), rotation.on(device), opacity.on(device),
             sh.on(device),       tint.on(device),  carried.on(device),  roughness.on(device)};
   }
 
-  // Zeros in the shapes of another set and on its device: how a gradient starts. Without `carried`.
+  // Sets zeros in the shapes of another set, on its device, to start a gradient. Without `carried`.
   template <class U>
   void reset_like(const BasicPosedSurfels<U>& other) {
     const Device device = other.device();

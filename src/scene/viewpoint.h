@@ -5,22 +5,22 @@
 
 namespace traceflow {
 
-// A camera that anybody can place, in the capture's own lengths and axes: square pixels, the principal point
-// in the middle.
+// A camera that a user can place, in the capture's own coordinates: square pixels, the principal point in the
+// middle.
 struct Viewpoint {
   Vec3<double> position{0};
   Mat3<double> world_from_camera{1};  // rotation
-  double fov_y = 45;                  // whole vertical angle, degrees
+  double fov_y = 45;                  // full vertical angle, degrees
 };
 
-// The camera there, in the scene's units.
+// The camera at this viewpoint, in scene units.
 Camera<float> camera_at(const Viewpoint& viewpoint, int width, int height,
                         const SceneNormalisation& normalisation);
 
-// Where a camera of the scene is; its principal point is taken to the middle.
+// The viewpoint of a camera of the scene; its principal point is assumed in the middle.
 Viewpoint viewpoint_of(const Camera<float>& camera, const SceneNormalisation& normalisation);
 
-// A camera in the units of `from` in those of `to`, another scene of the same capture.
+// Converts a camera from the units of `from` to those of `to`, another scene of the same capture.
 Camera<float> carried(Camera<float> camera, const SceneNormalisation& from, const SceneNormalisation& to);
 
 }  // namespace traceflow

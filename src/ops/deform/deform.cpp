@@ -12,7 +12,7 @@ namespace traceflow::deform {
 namespace {
 
 int64_t posed_count(const Surfels& stored, const Tensor<int32_t>& subset) {
-  // A subset on a device is made there by the program's own code and is taken as it is.
+  // Indices on a device are not checked: the program computed them there.
   require(subset.empty() || subset.device() != Device::cpu ||
               (subset[0] >= 0 && subset[subset.size() - 1] < stored.count()),
           "a subset lists stored surfels in ascending order", std::to_string(stored.count()));
@@ -79,8 +79,8 @@ void pose_backward(const Tensor<int32_t>& subset, const PosedSurfels& posed, con
   }
 }
 
-// Leaves the residuals of all posed surfels, zeros where the field does not move them; none where it moves
-// none.
+// Computes the residuals of all posed surfels: zeros for those that the field does not move, and an empty
+// tensor if it moves none.
 void evaluate(const Surfels& stored, const Field* field, float time, const Tensor<int32_t>& subset,
               int64_t count, field::Precision precision, Saved& kept, bool keep_for_backward) {
   const Device device = stored.device();

@@ -7,12 +7,12 @@
 #include "scene/field.h"
 #include "scene/surfels.h"
 
-// The steps of posing, one surfel or one spherical-harmonics number each. The latter are nine tenths of a
-// surfel and only copied: on the CUDA device they have threads of their own, so that neighbours read
-// neighbours.
+// The steps of posing, each for one surfel or for one number of its harmonics. The harmonics are nine tenths
+// of a surfel and only copied: on the CUDA device they have their own threads, so that neighbouring threads
+// read neighbouring numbers.
 namespace traceflow::deform {
 
-// What the steps read and write of stored surfels, of posed ones, and of their gradients. T may be const.
+// Addresses of stored surfels, posed surfels, and their gradients. T may be const.
 template <class T>
 struct StoredAddresses {
   template <class Surfels>
@@ -27,7 +27,7 @@ struct StoredAddresses {
         sh_row(s.sh.row_size()) {}
 
   T *position, *log_scale, *rotation, *opacity_logit, *sh;
-  T *tint_logit, *roughness_logit;  // null: the environment has neither
+  T *tint_logit, *roughness_logit;  // null for the environment; roughness_logit also if the set has none
   int64_t sh_row;
 };
 template <class T>
@@ -44,18 +44,18 @@ struct PosedAddresses {
         sh_row(p.sh.row_size()) {}
 
   T *position, *scale, *rotation, *opacity, *sh;
-  T *tint, *roughness;  // null: the environment has neither
+  T *tint, *roughness;  // null for the environment; roughness also if the set has none
   int64_t sh_row;
 };
 
-// The subset as a list of stored rows: `at(i)` is posed surfel i's.
+// The subset as a list of stored rows: at(i) is the row of posed surfel i.
 struct Rows {
   const int32_t* subset;  // null: all
 
   TRACEFLOW_HD int64_t at(int64_t i) const { return subset == nullptr ? i : subset[i]; }
 };
 
-// A row of the field's output, zero where the field has none (method §1.2).
+// A row of the field's output; zero for outputs that the field lacks (method §1.2).
 struct ResidualRow {
   float value[residual::main_outputs];
 
@@ -82,7 +82,7 @@ struct Residuals {
   }
 };
 
-// True while every number seen was finite: any other makes the sum of v·0 a NaN.
+// True while every number seen was finite: v·0 is NaN for any other v.
 class AllFinite {
  public:
   TRACEFLOW_HD float see(float v) {
@@ -103,7 +103,7 @@ struct IsMovedByField {
   TRACEFLOW_HD bool operator()(int64_t i) const { return body[rows.at(i)] == moved_by_field; }
 };
 
-// Where the field is evaluated. i: a posed surfel that it moves.
+// Copies the points where the field is evaluated. i: a posed surfel that the field moves.
 struct Gather {
   Rows rows, moved;
   const float* position;
@@ -114,7 +114,7 @@ struct Gather {
   }
 };
 
-// The field's outputs to the rows of the posed surfels that it moves; i: (such a surfel, output).
+// Copies the field's outputs to the rows of the posed surfels that it moves. i: (such a surfel, output).
 struct SpreadResiduals {
   Rows moved;
   const float* from;
@@ -125,7 +125,7 @@ struct SpreadResiduals {
     to[moved.at(i / columns) * columns + i % columns] = from[i];
   }
 };
-// Their gradient back.
+// Copies their gradient back.
 struct CollectResiduals {
   Rows moved;
   const float* from;
@@ -137,12 +137,12 @@ struct CollectResiduals {
   }
 };
 
-// Copies the degrees in use. i: (posed surfel, number).
+// Copies the harmonics of the degrees in use. i: (posed surfel, number).
 struct PoseSh {
   Rows rows;
   StoredAddresses<const float> stored;
   PosedAddresses<float> posed;
-  uint8_t* broken;  // a surfel; set where a number is not finite
+  uint8_t* broken;  // per surfel; set if a number is not finite
 
   TRACEFLOW_HD void operator()(int64_t i) const {
     const auto index = static_cast<uint32_t>(i);
@@ -152,7 +152,7 @@ struct PoseSh {
     posed.sh[i] = finite.see(stored.sh[rows.at(to) * stored.sh_row + index % width]);
     if (!finite.holds()) broken[to] = 1;
   }
-  // All numbers of a surfel; whether they can be used.
+  // Copies all numbers of a surfel and returns whether they are finite.
   bool row(int64_t to) const {
     const float* from = stored.sh + rows.at(to) * stored.sh_row;
     float* copy = posed.sh + to * posed.sh_row;
@@ -162,18 +162,18 @@ struct PoseSh {
   }
 };
 
-// Poses one surfel, all but its spherical harmonics, or hides it.
+// Poses one surfel except its harmonics, or hides it.
 struct Pose {
   Rows rows;
   StoredAddresses<const float> stored;
   Residuals<const float> residuals;
   PosedAddresses<float> posed;
-  const uint8_t* broken;  // of the spherical harmonics
+  const uint8_t* broken;  // of the harmonics
 
   TRACEFLOW_HD void operator()(int64_t i) const {
     if (!values(i) || broken[i] != 0) hide(i);
   }
-  // Whether everything posed here can be used.
+  // Poses the values and returns whether all are finite.
   TRACEFLOW_HD bool values(int64_t i) const {
     const int64_t from = rows.at(i);
     const ResidualRow r = residuals.load(i);
@@ -198,7 +198,7 @@ struct Pose {
       posed.roughness[i] = roughness_of(finite.see(stored.roughness_logit[from]));
     return finite.holds() && extended;
   }
-  // What stands in the place of a surfel that cannot be used: finite everywhere and invisible.
+  // Replaces a surfel that cannot be used: every value finite, opacity 0.
   TRACEFLOW_HD void hide(int64_t i) const {
     for (int k = 0; k < 3; ++k) posed.position[3 * i + k] = 0;
     for (int k = 0; k < 2; ++k) posed.scale[2 * i + k] = 1;
@@ -210,7 +210,7 @@ struct Pose {
   }
 };
 
-// Adds a row of residuals, or of their gradient, to the stored values that they belong to.
+// Adds a row of residuals, or of their gradient, to the corresponding stored values.
 struct AddToStored {
   StoredAddresses<float> stored;
 
@@ -223,7 +223,7 @@ struct AddToStored {
   }
 };
 
-// Adds the residuals of one surfel that the field moves.
+// Adds the residuals to one surfel that the field moves.
 struct Displace {
   Residuals<const float> residuals;
   const int32_t* body;  // null: it moves all
@@ -234,7 +234,7 @@ struct Displace {
   }
 };
 
-// A surfel that is hidden, or so faint that nothing saw it, has no gradient.
+// A surfel that is hidden, or too faint to be seen, has no gradient.
 TRACEFLOW_HD inline bool unseen(const PosedAddresses<const float>& posed, int64_t i) {
   return posed.opacity[i] == 0;
 }
@@ -260,7 +260,7 @@ struct PoseShBackward {
   }
 };
 
-// dL/dresiduals of one surfel, which is also that of the stored values that the residuals add to.
+// dL/dresiduals of one surfel, which is also that of the stored values that they add to.
 struct PoseBackward {
   Rows rows;
   PosedAddresses<const float> posed, grad_posed;
@@ -280,7 +280,7 @@ struct PoseBackward {
       grad[residual::tint] = grad_posed.tint[i] * sigmoid_derivative(posed.tint[i]);
     }
     add_to_grad_stored(grad, rows.at(i));
-    // No field moves it.
+    // Roughness has no residual.
     if (posed.roughness != nullptr) {
       add_to_grad_stored.stored.roughness_logit[rows.at(i)] +=
           grad_posed.roughness[i] * roughness_derivative(posed.roughness[i]);

@@ -5,12 +5,12 @@
 #include "math/spherical_harmonics.h"
 #include "ops/deform/deform.h"
 
-// Posing in double precision, one surfel after another (method §1.3).
+// Poses in double precision, one surfel after another (method §1.3).
 namespace traceflow::deform {
 
 namespace {
 
-// The residuals of one surfel, zero where the field has none.
+// The residuals of one surfel; zero for those that the field lacks.
 struct Residuals {
   explicit Residuals(const double* row, int outputs) {
     for (int i = 0; i < outputs && i < residual::main_outputs; ++i) value[i] = row[i];
@@ -18,7 +18,7 @@ struct Residuals {
   double value[residual::main_outputs] = {};
 };
 
-// What a surfel is at time t before activation.
+// A surfel at time t before activation.
 struct Moved {
   double position[3];
   double rotation[4];

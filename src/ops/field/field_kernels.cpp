@@ -14,7 +14,8 @@ namespace traceflow::field {
 
 inline constexpr int64_t max_encoding_columns = 112;  // 3·(1 + 2·16), rounded up
 
-// Column j of an encoding is sin(2π·(scale[j]·x/2π + phase[j])) of one coordinate: the others have scale 0.
+// Column j of an encoding is sin(2π·(scale[j]·x/2π + phase[j])) of one coordinate; the scales of the others
+// are 0.
 struct EncodingTable {
   std::array<std::array<float, max_encoding_columns>, 3> scale{};
   std::array<float, max_encoding_columns> phase{};
@@ -30,7 +31,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, 16>;
 using Vector = hn::Vec<Floats>;
 
-// sin(2πr) for |r| ≤ 1/2: folded to a quarter turn, then the series to θ¹¹; error under 1e-7.
+// sin(2πr) for |r| ≤ 1/2: folded to a quarter turn, then the series up to θ¹¹; error below 1e-7.
 HWY_INLINE Vector sin_turns(Floats d, Vector r) {
   const Vector magnitude = hn::Abs(r);
   const Vector folded = hn::Min(magnitude, hn::Sub(hn::Set(d, 0.5F), magnitude));
@@ -44,8 +45,9 @@ HWY_INLINE Vector sin_turns(Floats d, Vector r) {
   return hn::MulAdd(hn::Mul(series, square), angle, angle);
 }
 
-// The columns of one point's encoding. The point comes in turns, x/2π = high + low: powers of two scale both
-// without error, so that taking whole turns off the high part is exact however many there are.
+// The columns of one point's encoding. The point is given in turns, x/2π = high + low. Scaling by powers of
+// two has no error in either, so that removing the whole turns of the high part is exact, however many there
+// are.
 HWY_INLINE void encode_row(const float* high, const float* low, const EncodingTable& table, int64_t columns,
                            float* row) {
   const Floats d;
@@ -99,14 +101,14 @@ void round_values(const float* from, int64_t count, uint16_t* to) {
 HWY_INLINE hn::Mask<Floats> is_positive(Floats d, const float* activation) {
   return hn::Gt(hn::LoadU(d, activation), hn::Zero(d));
 }
-// The bits of a bf16 read as an integer have the sign of the number.
+// The bits of a bf16, read as an integer, have the sign of the number.
 HWY_INLINE hn::Mask<Floats> is_positive(Floats d, const int16_t* activation) {
   const hn::RebindToSigned<Floats> integers;
   const auto bits = hn::PromoteTo(integers, hn::LoadU(hn::Rebind<int16_t, Floats>(), activation));
   return hn::RebindMask(d, hn::Gt(bits, hn::Zero(integers)));
 }
 
-// Masks a strip of vectors vectors' width down all rows, the columns' sums in registers.
+// Masks a strip of `vectors` vectors' width in all rows, with the column sums in registers.
 template <int vectors, class Activation>
 HWY_INLINE void mask_strip(const Activation* activation, int64_t rows, int64_t columns, float* gradient,
                            uint16_t* rounded, float* column_sum) {

@@ -7,11 +7,11 @@
 #include "ops/field/field.h"
 #include "ops/field/gemm.h"
 
-// The element-wise steps between the network's matrix products, with SIMD. Matrices are dense and row-major,
-// and have a multiple of 16 columns.
+// The element-wise steps between the network's matrix products, with SIMD. Matrices are dense and row-major;
+// their number of columns is a multiple of 16.
 namespace traceflow::field {
 
-// Whether the network is evaluated at a point: every coordinate finite and within coordinate_limit.
+// Whether the network is evaluated at a point: every coordinate is finite and within coordinate_limit.
 TRACEFLOW_HD inline bool evaluated(const float* point) {
   for (int c = 0; c < 3; ++c) {
     if (!(std::abs(point[c]) <= coordinate_limit)) return false;
@@ -19,16 +19,16 @@ TRACEFLOW_HD inline bool evaluated(const float* point) {
   return true;
 }
 
-// γ(point) of `count` points into rows of `columns` numbers, zero-padded on the right; rows up to `rows` are
-// filled as if with points that are not evaluated, which enter as the origin.
+// Writes γ(point) of `count` points into rows of `columns` numbers, zero-padded on the right. Rows up to
+// `rows`, and points that are not evaluated, enter as the origin.
 void encode_points(const float* points, int64_t count, int64_t rows, int octaves, int64_t columns,
                    float* encoding);
 
-// To the nearest bf16, ties to even.
+// Rounds to the nearest bf16, ties to even.
 void round_to_bf16(const float* from, int64_t count, uint16_t* to);
 
-// Backward of ReLU, in place: gradient = 0 where the activation is not > 0. Adds the columns' sums to
-// column_sum. With bf16 activations the result is also written, rounded, to `rounded`.
+// Backward of ReLU, in place: gradient = 0 unless the activation is > 0. Adds the column sums to column_sum.
+// With bf16 activations the rounded result is also written to `rounded`.
 void mask_by_activation(const void* activation, DType number, int64_t rows, int64_t columns, float* gradient,
                         uint16_t* rounded, float* column_sum);
 

@@ -18,7 +18,7 @@ bool evaluated(const double* point) {
   });
 }
 
-// What one point goes through: the encoding, the inputs of every layer and the last hidden values.
+// Intermediate values of one point: the encoding, the inputs of every layer and the last hidden values.
 struct Trace {
   Row encoding;
   std::vector<Row> input;
@@ -53,7 +53,7 @@ Trace trace_point(const BasicField<double>& field, const double* point, double t
   return trace;
 }
 
-// Adds the gradients of `linear` to grad_weight and grad_bias, and returns that by its input.
+// Adds the gradients of `linear` to grad_weight and grad_bias, and returns the gradient of its input.
 Row linear_backward(const Tensor<double>& weight, const Row& input, const Row& grad_output,
                     Tensor<double>& grad_weight, Tensor<double>& grad_bias) {
   Row grad_input(input.size(), 0.0);
@@ -80,7 +80,7 @@ void backward_point(const BasicField<double>& field, const double* point, double
     const Row& input = trace.input[layer];
     grad =
         linear_backward(field.weight[layer], input, grad, grad_field.weight[layer], grad_field.bias[layer]);
-    // The hidden values stand last in the input, after the encoding at the skip.
+    // The hidden values come last in the input, after the encoding at the skip.
     if (layer > 0) grad.erase(grad.begin(), grad.end() - field.shape.width);
     hidden = &input;
   }

@@ -14,8 +14,8 @@ namespace traceflow::field {
 
 namespace {
 
-// oneDNN asks OpenMP how many threads it may start, both when it compiles and when it runs. While one of
-// these lives the answer is one.
+// oneDNN asks OpenMP for the number of threads that it may use, when it compiles and when it runs. While an
+// object of this class exists the answer is one.
 class OneThread {
  public:
   OneThread() : before_(omp_get_max_threads()) { omp_set_num_threads(1); }
@@ -78,7 +78,7 @@ dnnl::matmul::primitive_desc describe(const GemmShape& shape) {
 #endif
 }
 
-// A product that B is packed for may choose the order; the others take it as it is.
+// A product with a packed B may choose its order; other products take it as it is.
 dnnl::memory::desc operand_b(const GemmShape& shape) {
   if (shape.packed_for == 0) return matrix(shape.k, shape.n, shape.operands);
   if (shape.packed_for == shape.m) {
@@ -98,7 +98,7 @@ dnnl::stream& stream() {
   return own;
 }
 
-// Each thread's own working memory, as large as the largest product has needed.
+// Each thread's own working memory, as large as the largest product so far needed.
 void* scratchpad(size_t bytes) {
   thread_local Tensor<std::byte> memory;
   memory.resize({static_cast<int64_t>(bytes)});
@@ -142,8 +142,8 @@ void Gemm::pack(const float* b, int64_t row_stride, int64_t column_stride, void*
   stream().wait();
 }
 
-// The operands of a product as oneDNN's objects. Each thread has its own, made once: they cost more than a
-// small product.
+// The operands of a product as oneDNN's objects. Each thread creates its own once, because creation costs
+// more than a small product.
 struct Gemm::Arguments {
   explicit Arguments(const Compiled& p)
       : a(view(p.a, nullptr)),

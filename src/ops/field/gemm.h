@@ -6,31 +6,31 @@
 
 #include "primitives/dtype.h"
 
-// Matrix products on one thread, by oneDNN. All matrices are dense and row-major, but for a B that is used
-// often: it can be packed into the order in which the product reads it.
+// Matrix products on one thread, by oneDNN. All matrices are dense and row-major, except that a B that is
+// used often can be packed into the order in which the product reads it.
 namespace traceflow::field {
 
-// What a product computes: C = A·B, then the parts that are asked for, in this order. A is m×k, or stored k×m
-// and read transposed; B is k×n; C is m×n. Sums are fp32.
+// What a product computes: C = A·B, then the requested steps, in this order. A is m×k, or stored k×m and read
+// transposed; B is k×n; C is m×n. Sums are fp32.
 struct GemmShape {
   int64_t m, k, n;
   DType operands = DType::fp32;  // of A and B
   DType result = DType::fp32;    // of C
   bool transposed = false;       // A is stored k×m
-  int64_t packed_for = 0;        // B is packed as the same product with this m wants it; 0: not packed
+  int64_t packed_for = 0;        // B is packed for this product with this m; 0: not packed
   bool bias = false;             // C += bias, one fp32 number per column
   bool accumulate = false;       // C += what C held before
   bool relu = false;             // C = max(C, 0)
 
-  // All of it, so that shapes can be compared.
+  // All members, so that shapes can be compared.
   auto key() const {
     return std::tie(m, k, n, operands, result, transposed, packed_for, bias, accumulate, relu);
   }
   friend bool operator<(const GemmShape& left, const GemmShape& right) { return left.key() < right.key(); }
 };
 
-// One compiled product. run() may be called from any number of threads at once and never starts others; its
-// result does not depend on how many the program uses.
+// One compiled product. run() may be called by any number of threads at once and never starts others. Its
+// result does not depend on the program's number of threads.
 class Gemm {
  public:
   ~Gemm();
@@ -39,7 +39,7 @@ class Gemm {
 
   // Bytes of a packed B.
   int64_t packed_bytes() const;
-  // Packs B(i, j) = b[i·row_stride + j·column_stride], rounding it to the operands' type.
+  // Packs B(i, j) = b[i·row_stride + j·column_stride], rounded to the operands' type.
   void pack(const float* b, int64_t row_stride, int64_t column_stride, void* packed) const;
 
   void run(const void* a, const void* b, const float* bias, void* c) const;
@@ -53,7 +53,7 @@ class Gemm {
   std::unique_ptr<const Compiled> compiled_;
 };
 
-// The product of a shape, compiled when it is first asked for and kept until the program ends.
+// The product for a shape, compiled on first use and kept until the program ends.
 const Gemm& gemm(const GemmShape& shape);
 
 }  // namespace traceflow::field

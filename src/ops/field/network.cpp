@@ -16,26 +16,26 @@ int padded(int columns) { return (columns + 15) / 16 * 16; }
 // fp32.
 constexpr int64_t block_values = 65536;
 
-// Packs a product's B = weightᵀ, or `weight` itself, from `columns` columns of a row-major matrix.
+// Packs a product's B, weightᵀ or `weight`, from `columns` columns of a row-major matrix.
 void pack(const Gemm& gemm, const float* weight, int64_t columns, bool transposed,
           Tensor<std::byte>& packed) {
   packed.resize({gemm.packed_bytes()});
   gemm.pack(weight, transposed ? 1 : columns, transposed ? columns : 1, packed.data());
 }
 
-// The first columns of a matrix, with zeros around them where the new shape is larger.
+// The first columns of a matrix, zero-padded to the new shape.
 Tensor<float> padded_copy(const Tensor<float>& from, int64_t columns, const Shape& shape) {
   Tensor<float> to(shape);
   for (int64_t i = 0; i < from.dim(0); ++i) std::copy_n(from.row(i), columns, to.row(i));
   return to;
 }
 
-// The first column of the hidden values' weights in a layer.
+// The first column of a layer's weights that multiplies hidden values.
 int64_t hidden_column(const Layout& layout, int layer) {
   return layout.sees_encoding(layer) ? layout.encoding + layout.time_encoding : 0;
 }
 
-// bias += W_t γ(t), W_t the columns of the time's encoding.
+// bias += W_t γ(t); W_t is the columns of the time's encoding.
 void add_time(const Layout& layout, const Tensor<float>& weight, const std::vector<double>& time_encoding,
               Tensor<float>& bias) {
   for (int64_t o = 0; o < layout.width; ++o) {

@@ -8,10 +8,10 @@
 #include "ops/field/field.h"
 #include "ops/field/gemm.h"
 
-// How the fast path sees a network (method §1.2). Points go through all layers in blocks small enough that a
+// Layout of a network on the CPU (method §1.2). Points pass through all layers in blocks so small that a
 // block's hidden values stay in a core's second-level cache. The time's encoding is the same for every point,
-// so its product is part of the biases; what remains of the encoding, the point's, is padded with zeros to a
-// multiple of 16 columns, as are the outputs.
+// so its product is part of the biases. The point's encoding is zero-padded to a multiple of 16 columns, as
+// are the outputs.
 namespace traceflow::field {
 
 struct Layout {
@@ -20,15 +20,15 @@ struct Layout {
   int depth, width, skip, outputs;
   int octaves;          // of the point
   int encoding;         // numbers of the point's encoding
-  int time_encoding;    // and of the time's, behind them
+  int time_encoding;    // numbers of the time's encoding, which follows
   int padded_encoding;  // multiples of 16
   int padded_outputs;
-  DType hidden;        // number type of the hidden values
+  DType hidden;        // type of the hidden values
   int64_t block_rows;  // points in a block
 
   bool sees_encoding(int layer) const { return layer == 0 || layer == skip; }
   int64_t blocks(int64_t points) const { return (points + block_rows - 1) / block_rows; }
-  // Rows that a block of the given number of points is padded to: few different ones, so that few products
+  // Padded rows of a block with this number of points. There are few different values, so that few products
   // are compiled.
   int64_t padded_rows(int64_t points) const { return (points + 63) / 64 * 64; }
   int64_t hidden_bytes(int64_t rows) const { return rows * width * (hidden == DType::fp32 ? 4 : 2); }
@@ -52,35 +52,35 @@ struct BackwardGemms {
 
   const Gemm& head;           // gradient of the outputs → of the last hidden values, fp32
   const Gemm& hidden;         // gradient of a layer's values → of those before it, fp32
-  const Gemm& grad_encoding;  // the three add to a weight's gradient, fp32
+  const Gemm& grad_encoding;  // these three add to a weight's gradient, fp32
   const Gemm& grad_hidden;
   const Gemm& grad_head;
 };
 
-// The parameters as the products read them, packed anew by each pass over the points.
+// The parameters in the format of the products, packed again by each pass over the points.
 struct ForwardWeights {
   void fill(const Layout& layout, const Field& field, float time);
 
-  std::vector<Tensor<float>> bias;          // layer: width; the time's part included
-  std::vector<Tensor<std::byte>> encoding;  // layer that sees it: padded_encoding × width
-  std::vector<Tensor<std::byte>> hidden;    // layer > 0: width × width, transposed
+  std::vector<Tensor<float>> bias;          // per layer: width; includes the time's part
+  std::vector<Tensor<std::byte>> encoding;  // per layer that sees it: padded_encoding × width
+  std::vector<Tensor<std::byte>> hidden;    // per layer > 0: width × width, transposed
   Tensor<std::byte> head;                   // width × padded_outputs
   Tensor<float> head_bias;                  // padded_outputs
 };
 struct BackwardWeights {
   void fill(const Layout& layout, const Field& field);
 
-  std::vector<Tensor<std::byte>> hidden;  // layer > 0: width × width
+  std::vector<Tensor<std::byte>> hidden;  // per layer > 0: width × width
   Tensor<std::byte> head;                 // padded_outputs × width
 };
 
-// A block of points on its way through the layers, and where its hidden values are.
+// A block of points on its way through the layers, and the memory of its hidden values.
 struct Block {
-  int64_t points;  // in the block
-  int64_t rows;    // with padding
+  int64_t points;  // number of its points
+  int64_t rows;    // padded
   const float* encoding;
   std::byte* activations;  // layer after layer, each rows × width
-  bool keep_all;           // else only the last two layers, in turns
+  bool keep_all;           // otherwise only the last two layers, alternating
   float* fp32;             // rows × width, working memory
 
   std::byte* layer(const Layout& layout, int index) const {
@@ -88,7 +88,7 @@ struct Block {
   }
 };
 
-// Fills the hidden values of all layers of a block.
+// Computes the hidden values of all layers of a block.
 void forward_hidden(const Layout& layout, const ForwardWeights& weights, const Block& block);
 
 }  // namespace traceflow::field

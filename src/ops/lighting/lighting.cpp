@@ -12,7 +12,7 @@ namespace traceflow::lighting {
 
 struct Saved {
   Tensor<Place> places;
-  // Memory of backward.
+  // Working memory of backward.
   Tensor<float> pulls;
   Tensor<int32_t> cells;
   cuda::KeyGroups lists;
@@ -33,7 +33,7 @@ Bodies bodies_of(const Lighting& lighting) {
   return {lighting.middle.data(), lighting.radius.data(), lighting.body_brightness.data(), lighting.bodies()};
 }
 
-// Lists 0 to n − 1 by their keys, as cuda::group_by_key does.
+// Lists 0 to n − 1 by their keys, like cuda::group_by_key.
 void group_by_key_on_host(const Tensor<int32_t>& key, int64_t keys, cuda::KeyGroups& lists) {
   lists.begin.reset({keys + 1});
   for (const int32_t k : key.values()) {

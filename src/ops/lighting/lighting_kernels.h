@@ -7,10 +7,10 @@
 #include "ops/motion/key_span.h"
 #include "ops/motion/motion_kernels.h"
 
-// The steps of lighting; on either device.
+// The steps of lighting, on either device.
 namespace traceflow::lighting {
 
-// A colour is half above what its harmonics sum to.
+// A colour is the sum of its harmonics plus a half.
 inline constexpr float half_in_harmonics = static_cast<float>(0.5 / sh_c0);
 
 struct GridSize {
@@ -20,18 +20,18 @@ struct GridSize {
   TRACEFLOW_HD int64_t at(int64_t column, int64_t row, int64_t layer) const {
     return (layer * y + row) * x + column;
   }
-  // Of the eight corners of a cell, from the one with the lowest coordinates.
+  // Offset of corner k of a cell, of eight, from the corner with the lowest coordinates.
   TRACEFLOW_HD int64_t corner(int k) const { return at(k & 1, (k >> 1) & 1, k >> 2); }
 };
 
-// Where a surfel lies in the grid, or on a body.
+// Where a surfel is in the grid or on a body.
 struct Place {
-  int32_t cell = -1;  // its corner with the lowest coordinates; −2 − b on body b; −1 where neither is
-  Vec3<float> share{0};  // from that corner to the opposite one; of the body's radius, from its middle
+  int32_t cell = -1;  // the cell's corner with the lowest coordinates; −2 − b on body b; −1 if neither
+  Vec3<float> share{0};  // position in the cell, 0 to 1; on a body: offset from its middle, in radii
   float gain = 1;
 
   TRACEFLOW_HD static int32_t cell_of_body(int32_t body) { return -2 - body; }
-  // Negative: of none.
+  // Negative if on no body.
   TRACEFLOW_HD int32_t body() const { return -2 - cell; }
 
   TRACEFLOW_HD float weight(int corner) const {
@@ -62,7 +62,7 @@ struct Grid {
     return (1 - share) * brightness[span.from * size.points() + point] +
            share * brightness[span.to * size.points() + point];
   }
-  // Cells in a unit of length.
+  // Cells per unit of length.
   TRACEFLOW_HD Vec3<float> density() const {
     return Vec3<float>(static_cast<float>(size.x - 1), static_cast<float>(size.y - 1),
                        static_cast<float>(size.z - 1)) /
@@ -88,9 +88,9 @@ struct Grid {
 // The bodies at one time.
 struct Bodies {
   const float *middle, *radius, *brightness;
-  int64_t count;  // 0: light on them does not change
+  int64_t count;  // 0: the light on bodies is constant
 
-  // Of body b at key k.
+  // Index of body b at key k.
   TRACEFLOW_HD static int64_t at(int64_t b, int64_t keys, int64_t k) { return b * keys + k; }
   TRACEFLOW_HD Vec3<float> slope(const Grid& grid, const motion::KeySpan<float>& span, int32_t b) const {
     const auto share = static_cast<float>(span.share);
@@ -116,10 +116,10 @@ struct Bodies {
 struct LightSurfel {
   Grid grid;
   Bodies bodies;
-  motion::CarrierOf carrier;  // body null: none is carried
+  motion::CarrierOf carrier;  // body null: there are no bodies
   const float* position;
   float* sh;
-  int64_t numbers;  // of a surfel's harmonics
+  int64_t numbers;  // of harmonics per surfel
   Place* places;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
@@ -127,7 +127,7 @@ struct LightSurfel {
     const Vec3<float> point = load3<float>(position + 3 * i);
     const Place place = body >= 0 ? bodies.place_of(grid, body, point) : grid.place_of(point);
     places[i] = place;
-    if (place.gain == 1) return;  // as it is, to the bit
+    if (place.gain == 1) return;  // unchanged, to the bit
     float* const harmonics = sh + i * numbers;
     for (int64_t k = 0; k < numbers; ++k) {
       const float half = k < 3 ? half_in_harmonics : 0;
@@ -136,7 +136,8 @@ struct LightSurfel {
   }
 };
 
-// Takes surfel i's gradient back; what goes to the logarithm at its place goes to pulls.
+// Turns surfel i's gradient into that before lighting, and writes the gradient of the logarithm there to
+// pulls.
 struct LightBack {
   Grid grid;
   Bodies bodies;
@@ -172,7 +173,7 @@ struct LightBack {
   }
 };
 
-// Collects at a point what the surfels in the cells around it send there.
+// Sums at a point the gradients from the surfels in the cells around it.
 struct CollectAtPoint {
   Grid grid;
   const int32_t *begin, *entry;  // the surfels of each cell
@@ -197,7 +198,7 @@ struct CollectAtPoint {
   }
 };
 
-// What goes to a body's four numbers.
+// The gradient of a body's four numbers.
 struct BodyPull {
   double at_middle = 0;
   Vec3<double> slope{0};
@@ -234,7 +235,7 @@ struct AddBodyPull {
   }
 };
 
-// A row of points along x, so that indices are divided once a row and not at each point.
+// A row of points along x, so that indices are divided once per row and not per point.
 struct ResistAlongRow {
   GridSize size;
   int64_t keys;
@@ -251,7 +252,7 @@ struct ResistAlongRow {
       return;
     }
     gradient[begin] = gradient[end - 1] = 0;
-    // At the first and at the last time a point is its own neighbour, which adds nothing.
+    // At the first and the last time a point is its own neighbour, which adds nothing.
     const int64_t before = key > 0 ? size.points() : 0, after = key + 1 < keys ? size.points() : 0;
     const int64_t across = size.at(0, 1, 0), up = size.at(0, 0, 1);
     for (int64_t at = begin + 1; at + 1 < end; ++at) {

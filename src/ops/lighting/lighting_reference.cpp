@@ -19,7 +19,7 @@ void light_surfel(BasicPosedSurfels<double>& posed, int64_t i, double logarithm)
 
 }  // namespace
 
-// By its definition: the interpolant of the grid's points by products of hats.
+// Follows the definition: interpolates the grid's points by products of hat functions.
 void forward_reference(const BasicLighting<double>& lighting, const Tensor<int32_t>& body, double time,
                        BasicPosedSurfels<double>& posed) {
   const motion::KeySpan<double> span(lighting.time.data(), lighting.times(), time);

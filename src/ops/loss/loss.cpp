@@ -8,8 +8,8 @@ namespace traceflow::loss {
 
 namespace {
 
-// Σ |x − y| over a block and its gradient. Sixteen sums side by side, so that the compiler may use wide
-// registers without changing the order of any of them.
+// Σ |x − y| over a block, and its gradient. Sixteen parallel sums, so that the compiler may use wide
+// registers without changing the order of any sum.
 double l1_block(const float* x, const float* y, int64_t n, float scale, float* gradient) {
   constexpr int64_t lanes = 16;
   std::array<float, lanes> sums{};

@@ -10,7 +10,8 @@
 #include "ops/loss/mean.h"
 #include "primitives/sums.h"
 
-// What the loss terms share, and their steps: one pixel or number each, which return what it adds to the sum.
+// What the loss terms share, and their steps. Each step handles one pixel or number and returns what it adds
+// to the sum.
 namespace traceflow::loss {
 
 inline constexpr int64_t block_pixels = 4096;
@@ -28,7 +29,7 @@ void check_is_image(const Tensor<T>& image) {
           image.shape().to_string());
 }
 
-// −1, 0 or 1; 0 for what is not a number.
+// −1, 0 or 1; 0 for NaN.
 template <class T>
 TRACEFLOW_HD T sign(T x) {
   return static_cast<T>(x > T(0)) - static_cast<T>(x < T(0));
@@ -44,7 +45,7 @@ TRACEFLOW_HD bool is_finite(const Vec3<T>& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// SSIM's window as the fast paths take it: the middle tap and the five beside it.
+// SSIM's window for the fast paths: the middle tap and the five beside it.
 using HalfWindow = std::array<float, ssim_radius + 1>;
 inline HalfWindow half_window() {
   const auto window = ssim_window();
@@ -53,7 +54,7 @@ inline HalfWindow half_window() {
   return half;
 }
 
-// What becomes of a sum: the mean over a number of things that is known, or that was found with it.
+// Turns a sum into a mean, over a known count or over the count found with the sum.
 struct MeanOver {
   double count;
   Mean* mean;
@@ -88,7 +89,7 @@ struct SquaredError {
   }
 };
 
-// Of one pixel.
+// For one pixel.
 struct KnownSquaredError {
   SquaredError error;
   const uint8_t* known;
@@ -129,7 +130,7 @@ struct Silhouette {
   }
 };
 
-// Of one row.
+// For one row.
 struct RowNorm {
   static constexpr float soft = 1e-3F;  // ε
 
@@ -149,7 +150,7 @@ struct RowNorm {
   }
 };
 
-// Method §7.4, L_norm: a pixel is compared with the geometry around it.
+// Method §7.4, L_norm: compares a pixel's normal with the geometry around it.
 template <class T>
 struct NormalConsistency {
   const T *normal, *pseudo;
@@ -167,12 +168,12 @@ struct NormalConsistency {
   }
 };
 
-// Method §7.4, L_tc-norm: a pixel is compared with the capture's prior.
+// Method §7.4, L_tc-norm: compares a pixel's normal with the capture's prior.
 template <class T>
 struct NormalPrior {
   const T *normal, *prior;
-  const T* tint;  // or null
-  T more;         // on a mirror
+  const T* tint;  // may be null
+  T more;         // additional weight on a mirror
 
   TRACEFLOW_HD bool compared(const Vec3<T>& n, const Vec3<T>& p) const {
     return !is_zero(p) && dot(n, n) != T(0);
@@ -185,7 +186,7 @@ struct NormalPrior {
   }
 };
 
-// After NormalPrior, whose mean says how many pixels were compared.
+// Runs after NormalPrior, whose mean has the number of compared pixels.
 template <class T>
 struct NormalPriorBackward {
   NormalPrior<T> forward;

@@ -4,7 +4,7 @@
 #include "ops/loss/loss.h"
 #include "ops/loss/normal_terms.h"
 
-// The plain truth in double precision: direct sums, the two-dimensional window as it is written.
+// The reference in double precision: direct sums over the two-dimensional window.
 namespace traceflow::loss {
 
 namespace {
@@ -13,7 +13,7 @@ struct Pixel {
   int64_t row, column, channel;
 };
 
-// Calls f(weight, neighbour) for the neighbours in the image within the window of a pixel.
+// Calls f(weight, neighbour) for the neighbours of a pixel that are within the window and in the image.
 template <class F>
 void over_window(const Tensor<double>& image, const Pixel& centre, F&& f) {
   static const auto window = ssim_window();

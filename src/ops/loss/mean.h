@@ -4,19 +4,19 @@
 
 namespace traceflow::loss {
 
-// A term as it was computed: its value, and how many things it is the mean of.
+// The value of a term, and the count that it is the mean over.
 struct Mean {
   double value;
   double count;
 };
 
-// Where a term leaves its mean: a place in a list that lies on the device of the term's inputs. Nobody waits
-// for it until the list is read.
+// Where a term writes its mean: an entry of a list on the device of the term's inputs. The host does not wait
+// until it reads the list.
 struct MeanSlot {
   Tensor<Mean>& list;
   int64_t place;
 
-  // Its address there.
+  // The entry's address on that device.
   Mean* on(Device device) const {
     require(list.device() == device && place >= 0 && place < list.size(),
             "a term's slot lies where its inputs are", list.shape().to_string());
@@ -24,7 +24,7 @@ struct MeanSlot {
   }
 };
 
-// The value of one term at once, for which the host waits. term(slot) computes it on the device.
+// Returns the value of one term, for which the host waits. term(slot) computes it on the device.
 template <class F>
 double value_of(Device device, F&& term) {
   Tensor<Mean> list({1}, device);
@@ -32,7 +32,7 @@ double value_of(Device device, F&& term) {
   return list.on(Device::cpu)[0].value;
 }
 
-// Leaves a value that the host has.
+// Writes a mean that the host knows.
 inline void put(const Mean& mean, const MeanSlot& slot) {
   const Device device = slot.list.device();
   memory::copy(device, slot.on(device), Device::cpu, &mean, sizeof(mean));

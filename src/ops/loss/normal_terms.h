@@ -3,7 +3,7 @@
 #include "ops/loss/loss_kernels.h"
 #include "primitives/sums.h"
 
-// The terms on normals, for single precision on any device and for the reference.
+// The terms on normals, in single precision on any device and for the reference.
 namespace traceflow::loss {
 
 template <class T>

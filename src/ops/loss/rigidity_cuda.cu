@@ -7,15 +7,15 @@
 #include "primitives/group_by_key.h"
 #include "primitives/sum_kernels.h"
 
-// Edges are measured twice: once for the term's mean, which weighs the gradient, and once by either end,
-// which collects what its edges send it, those that it is the far end of as well as its own, in the order
-// of the edges. To that end the edges that count are listed by their far end.
+// Each edge is measured once for the term's mean, which scales the gradient, and once by each of its ends. An
+// end sums the gradients of its own edges and of those whose far end it is, in the order of the edges. For
+// this the edges that count are listed by their far end.
 namespace traceflow::loss::cuda {
 
 using traceflow::cuda::for_each_index;
 using traceflow::cuda::sum_each_index;
 
-// The steps, which a weak function takes: they need names that are known outside.
+// Named namespace: the steps are parameters of a weak function, which needs types with external linkage.
 namespace rigidity_steps {
 
 struct Cloud {
@@ -23,13 +23,13 @@ struct Cloud {
   const int32_t* subset;  // null: all
   const int32_t* neighbour;
   const float* distance2;
-  int32_t* posed_at;  // 1 + the place of a stored surfel among the posed; 0 for one that is not
-  int32_t* far;       // the place of an edge's far end among the posed; −1 where the edge does not count
+  int32_t* posed_at;  // 1 + the posed index of a stored surfel; 0 if it is not posed
+  int32_t* far;       // the posed index of an edge's far end; −1 if the edge does not count
   int32_t k;
   float strain2;
 
   __device__ int64_t stored(int64_t i) const { return subset == nullptr ? i : int64_t{subset[i]}; }
-  // Edge e, whose far end is at j.
+  // Edge e, whose far end is j.
   __device__ Edge edge(int32_t e, int32_t j) const {
     const int64_t i = e / k, near = stored(i);
     const Ends ends{load3<float>(rest + 3 * stored(j)) - load3<float>(rest + 3 * near),

@@ -8,7 +8,7 @@
 // One edge of the rigidity term.
 namespace traceflow::loss {
 
-// What one edge adds: its value, and the pull of its far end on its near end at rest and posed.
+// The contribution of one edge: its value, and the force from its far end on its near end, at rest and posed.
 struct Edge {
   bool counts = false;
   float value = 0;
@@ -16,7 +16,7 @@ struct Edge {
 };
 
 struct Ends {
-  Vec3<float> rest, posed;  // far end less near end
+  Vec3<float> rest, posed;  // far end minus near end
 };
 
 TRACEFLOW_HD inline Edge measure(const Ends& ends, float radius, float strain2) {

@@ -4,7 +4,7 @@
 #include "math/types.h"
 #include "ops/loss/rigidity.h"
 
-// The plain truth in double precision.
+// The reference in double precision.
 namespace traceflow::loss {
 
 double rigidity_reference(const Tensor<double>& rest, const Tensor<double>& posed,
@@ -14,7 +14,8 @@ double rigidity_reference(const Tensor<double>& rest, const Tensor<double>& pose
   const auto finite = [](const Vec3<double>& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
   };
-  // Calls f(near, far, their places among the posed, reach) for every edge that counts.
+  // Calls f(i, j, p, x, radius) for every edge that counts: the posed indices of its ends, its vectors at
+  // rest and posed, and r_i.
   const auto for_each_edge = [&](auto&& f) {
     for (int64_t i = 0; i < posed.dim(0); ++i) {
       for (int64_t n = 0; n < edges.index.dim(1); ++n) {

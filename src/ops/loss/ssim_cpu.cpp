@@ -13,11 +13,11 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-// SSIM by rows. The window is separable, so each row of a map is first summed down its column of eleven rows
-// into a row buffer, products taken on the way, and then along the buffer. An image's three channels stay
-// interleaved: the next pixel of a channel is three numbers on. Taps come in pairs around the middle.
-// Backward, the adjoint of a symmetric window with zero padding is the window itself: the three derivative
-// maps go through the same two sums.
+// SSIM by rows. The window is separable: each row of a map is first summed over the eleven rows around it
+// into a row buffer, with products formed on the way, and then along the buffer. An image's three channels
+// stay interleaved, so the next pixel of a channel is three numbers further. Taps are used in pairs about the
+// middle. In the backward pass, the adjoint of a symmetric window with zero padding is the window itself: the
+// three derivative maps pass through the same two sums.
 
 #ifndef TRACEFLOW_OPS_LOSS_SSIM_CPU_ONCE
 #define TRACEFLOW_OPS_LOSS_SSIM_CPU_ONCE
@@ -50,7 +50,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Wide = hn::ScalableTag<float>;
 using Single = hn::CappedTag<float, 1>;
 
-// One vector of the moments, summed down the columns.
+// One vector of the moments, summed over the window's rows.
 template <class D>
 HWY_INLINE void sum_columns_of_moments_at(D d, const Rows& x, const Rows& y, const HalfWindow& window,
                                           int64_t i, const MomentRows& out) {
@@ -85,7 +85,7 @@ void sum_columns_of_moments(const Rows& x, const Rows& y, const HalfWindow& wind
   for (; i < n; ++i) sum_columns_of_moments_at(Single(), x, y, window, i, out);
 }
 
-// The middle element weighs window[0]; those k away on either side are at a(k) and b(k).
+// The middle element has the weight window[0]; those at distance k on either side are at a(k) and b(k).
 template <class D, class Above, class Below>
 HWY_INLINE hn::Vec<D> windowed(D d, const HalfWindow& window, const float* middle, Above a, Below b) {
   auto sum = hn::Mul(hn::Set(d, window[0]), hn::LoadU(d, middle));
@@ -132,7 +132,8 @@ HWY_INLINE float finite_or_zero(float v) {
   return std::abs(v) <= std::numeric_limits<float>::max() ? v : 0.0F;
 }
 
-// The compiler vectorises these two for the target at hand. What is not finite has no derivative.
+// The compiler vectorises this function and the next for the target. Values that are not finite have no
+// derivative.
 void compare_row(const MomentRows& m, int64_t n, const DerivativeRows& out) {
 #pragma omp simd
   for (int64_t i = 0; i < n; ++i) {
@@ -182,7 +183,7 @@ class PaddedRows {
   std::vector<float> values_;
 };
 
-// A row of the map and its neighbours; outside the map a row of zeros.
+// A row of the map and its neighbours; rows outside the map are zeros.
 Rows rows_around(const Tensor<float>& map, int64_t row, const float* zeros) {
   Rows rows{};
   for (int64_t k = 0; k < taps; ++k) {
@@ -192,7 +193,7 @@ Rows rows_around(const Tensor<float>& map, int64_t row, const float* zeros) {
   return rows;
 }
 
-// Scratch memory of one block and the SSIM of one row at a time.
+// Working memory of one block; computes the SSIM of one row at a time.
 class RowComparison {
  public:
   RowComparison(const Tensor<float>& image, const Tensor<float>& target)
@@ -219,7 +220,7 @@ class RowComparison {
   PaddedRows summed_down_, summed_, zeros_;
 };
 
-// Eight sums side by side, so that none waits for another.
+// Eight parallel sums, so that none waits for another.
 double sum_of(const float* values, int64_t n) {
   constexpr int64_t lanes = 8;
   std::array<double, lanes> sums{};
@@ -235,7 +236,7 @@ double sum_of(const float* values, int64_t n) {
   return sum;
 }
 
-// Derivatives of every pixel's SSIM by its moments, all H×W×3.
+// Derivatives of every pixel's SSIM by its moments, each H×W×3.
 struct DerivativeMaps {
   Tensor<float> by_mean_x, by_squares, by_product;
 };
@@ -293,7 +294,7 @@ void ssim_loss(const Tensor<float>& image, const Tensor<float>& target, double w
   *mean = {0, 0};
   if (image.empty()) return;
   const auto count = static_cast<double>(image.size());
-  static thread_local DerivativeMaps maps;  // kept, so that an iteration does not ask for fresh pages
+  static thread_local DerivativeMaps maps;  // kept between calls, so that an iteration allocates no new pages
   const double sum = compare_images(image, target, window, maps);
   add_gradient(image, target, window, maps, static_cast<float>(-weight / count), grad_image);
   *mean = {1 - sum / count, count};

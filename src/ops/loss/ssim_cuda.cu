@@ -2,10 +2,10 @@
 
 #include "primitives/sum_kernels.h"
 
-// SSIM by tiles of one channel. A block loads its tile with the border that the window reaches into (zeros
-// outside the picture), sums along the rows into shared memory and from there down the columns: the window is
-// separable. Forward that is done for the four moments, and the derivatives by them are left in planes.
-// Backward, the adjoint of a symmetric window with zero padding is the window itself, so the three planes go
+// SSIM by tiles of one channel. A block loads its tile with the border that the window covers (zeros outside
+// the image), sums along the rows into shared memory and then down the columns: the window is separable. The
+// forward pass does so for the four moments and writes the derivatives by them to planes. In the backward
+// pass, the adjoint of a symmetric window with zero padding is the window itself, so the three planes pass
 // through the same two sums.
 namespace traceflow::loss::cuda {
 
@@ -20,7 +20,7 @@ using traceflow::cuda::sum_threads;
 constexpr int channels = 3;
 constexpr int taps = 2 * ssim_radius + 1;
 constexpr int tile_columns = 32, tile_rows = 16;
-constexpr int rows_each = 2;  // that a thread sums down to
+constexpr int rows_each = 2;  // rows that a thread sums
 constexpr int loaded_columns = tile_columns + 2 * ssim_radius, loaded_rows = tile_rows + 2 * ssim_radius;
 constexpr int ssim_threads = static_cast<int>(sum_threads);
 static_assert(tile_columns * tile_rows == ssim_threads * rows_each);
@@ -43,8 +43,8 @@ struct DerivativePlanes {
   float *by_mean_x, *by_squares, *by_product;
 };
 
-// A block's channel and its first pixel. The channels of a tile follow each other, so that they find its
-// pixels in the cache.
+// A block's channel and first pixel. The channels of a tile follow each other, so that they find its pixels
+// in the cache.
 struct Tile {
   int channel, row, column;
 };
@@ -55,7 +55,7 @@ __device__ Tile tile_of_block(const Size& size) {
           tile % size.tiles_across() * tile_columns};
 }
 
-// value(pixel) for every pixel of a tile and its border.
+// Stores value(pixel) for every pixel of a tile and its border.
 template <class F>
 __device__ void load(const Tile& tile, const Size& size, F value,
                      float (&into)[loaded_rows][loaded_columns]) {
@@ -75,11 +75,11 @@ __device__ float finite_or_zero(float v) {
   return std::abs(v) <= std::numeric_limits<float>::max() ? v : 0.0F;
 }
 
-// The middle of a tile's rows, summed along them: one map for each moment or derivative.
+// The middle columns of a tile's rows, summed along the rows: one map per moment or derivative.
 template <int maps>
 using Along = float[maps][loaded_rows][tile_columns];
 
-// Sums the maps down a column to the thread's rows_each rows, which begin at `first`.
+// Sums the maps down a column for the thread's rows_each rows, which begin at `first`.
 template <int maps>
 __device__ void sum_down(const Along<maps>& along, const HalfWindow& window, int first, int column,
                          float (&sum)[rows_each][maps]) {
@@ -96,8 +96,8 @@ __device__ void sum_down(const Along<maps>& along, const HalfWindow& window, int
   }
 }
 
-// Σ SSIM over the pixels that count and their number, one of each for every block; and the derivatives,
-// unless their planes are null. What is not finite has no derivative.
+// Σ SSIM over the pixels that count, and their number, per block; and the derivatives, unless their planes
+// are null. Values that are not finite have no derivative.
 __global__ void __launch_bounds__(sum_threads)
     compare_tiles(Pictures p, HalfWindow window, const uint8_t* mask, DerivativePlanes planes,
                   CountedSum* partial) {
@@ -190,7 +190,7 @@ Pictures pictures_of(const Tensor<float>& image, const Tensor<float>& target) {
   return {image.data(), target.data(), {static_cast<int>(image.dim(0)), static_cast<int>(image.dim(1))}};
 }
 
-// The term of the loss is one less the mean.
+// The term of the loss is 1 − mean.
 struct OneLessMean {
   double count;
   Mean* mean;

@@ -4,7 +4,7 @@
 
 namespace traceflow::loss::cuda {
 
-// As loss::ssim_loss and loss::ssim, for pictures of one size on the device. mask: null, or H×W.
+// Like loss::ssim_loss and loss::ssim, for images of one size on the device. mask: null, or H×W.
 TRACEFLOW_WITH_CUDA void ssim_loss(const Tensor<float>& image, const Tensor<float>& target,
                                    const HalfWindow& window, double weight, Tensor<float>& grad_image,
                                    Mean* mean);

@@ -11,11 +11,12 @@ namespace traceflow::lpips {
 
 namespace {
 
-// What the way back needs of the way forward: the weights are constants, so no activations.
+// What the backward pass needs of the forward pass. The weights are constants, so activations are not needed.
 struct Trail {
   std::vector<Tensor<uint8_t>> gates;        // of each convolution
-  std::vector<Tensor<uint8_t>> places;       // of the halving after each stage but the last
-  std::vector<Tensor<float>> grad_features;  // dL/d(a stage's last features) by its own share of the distance
+  std::vector<Tensor<uint8_t>> places;       // of the pooling after each stage except the last
+  std::vector<Tensor<float>> grad_features;  // dL/d(a stage's last features) from its own share of the
+                                             // distance
 };
 
 void check_images(const Network& network, const Tensor<float>& image, const Tensor<float>& target) {
@@ -40,7 +41,7 @@ Tensor<float> scaled_input(const Tensor<float>& image, Input input) {
 
 double forward(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
                double weight, Trail* trail) {
-  // An infinity could hide behind a gate.
+  // A closed gate could hide an infinity.
   if (!all_finite(image) || !all_finite(target)) return std::numeric_limits<double>::quiet_NaN();
   Tensor<float> a = scaled_input(image, input), b = scaled_input(target, input);
   double total = 0;

@@ -4,11 +4,11 @@
 
 #include "base/device.h"
 
-// How two images' features at one pixel are compared (method §8): Σ linear · (a/|a| − b/|b|)². Shared by the
-// fast paths.
+// Compares two images' features at one pixel (method §8): Σ linear · (a/|a| − b/|b|)². Shared by the fast
+// paths.
 namespace traceflow::lpips {
 
-// Added to the length that a pixel's features are divided by.
+// Added to the length by which a pixel's features are divided.
 inline constexpr double length_epsilon = 1e-10;
 
 // Both features divided by their lengths.
@@ -24,8 +24,8 @@ struct Directions {
   }
 };
 
-// The gradient by a, times a scale: a longer a changes its direction less. along: Σ linear · difference · a.
-// Features of no length have closed gates and need none.
+// The gradient by a, times a scale: the longer a is, the less it changes its direction. along: Σ linear ·
+// difference · a. Features of length zero have closed gates and need no gradient.
 struct Bend {
   double outer, bend;
 

@@ -13,13 +13,13 @@ namespace traceflow::lpips {
 
 namespace {
 
-// Channels run fastest, so that the three pixels under one row of a 3×3 kernel lie side by side and gathering
+// Channels vary fastest, so that the three pixels under one row of a 3×3 kernel are contiguous, and gathering
 // a pixel's neighbourhood is three copies. A convolution is then one matrix product per block of pixels.
 constexpr int64_t pixels_per_block = 128;
 constexpr int64_t rows_per_block = 8;
 
-// Keeps the matrix library on the calling thread: blocks are what is dealt to threads, and a product that is
-// not split has the same bytes at any thread count.
+// Keeps the matrix library on the calling thread. Threads share the blocks, and a product that is not split
+// has the same bytes at any thread count.
 class OneThread {
  public:
   OneThread() : before_(omp_get_max_threads()) { omp_set_num_threads(1); }
@@ -31,7 +31,7 @@ class OneThread {
   int before_;
 };
 
-// The 3×3 neighbourhood of pixel (i, j), zero outside the image.
+// Copies the 3×3 neighbourhood of pixel (i, j), zero outside the image.
 void gather(const Tensor<float>& x, int64_t i, int64_t j, float* out) {
   const int64_t h = x.dim(0), w = x.dim(1), channels = x.dim(2);
   const int64_t first = j == 0 ? 1 : 0;
@@ -48,7 +48,7 @@ void gather(const Tensor<float>& x, int64_t i, int64_t j, float* out) {
   }
 }
 
-// f(patches, begin, end): the neighbourhoods of pixels [begin, end) of x, one a row.
+// Calls f(patches, begin, end) with the neighbourhoods of pixels [begin, end) of x, one per row.
 template <class F>
 void for_patches(const char* description, const Tensor<float>& x, F&& f) {
   const int64_t w = x.dim(1);
@@ -98,7 +98,7 @@ struct Pixel {
   }
 };
 
-// f(the four values of each 2×2 pixels, in reading order), channel by channel.
+// Calls f with the four values of each 2×2 pixels, in reading order, for each channel.
 template <class T, class F>
 Tensor<T> reduce_fours(const Tensor<float>& x, const F& f) {
   const int64_t h = x.dim(0) / 2, w = x.dim(1) / 2, channels = x.dim(2);
@@ -133,7 +133,7 @@ Tensor<float> convolve_relu(const Tensor<float>& x, const Network::Convolution& 
     }
     check(dnnl_sgemm('N', 'N', end - begin, outputs, k, 1.0F, patches, k, matrix.data(), outputs, 1.0F, out,
                      outputs));
-    // In this order a NaN stays one.
+    // With this order of arguments a NaN stays NaN.
     for (float* v = out; v < out_end; ++v) *v = std::max(*v, 0.0F);
   });
   return y;
@@ -159,7 +159,7 @@ Tensor<float> convolve_relu_backward(Tensor<float>& grad_y, const Tensor<uint8_t
       1 << 16);
   Tensor<float> grad_x;
   grad_x.resize({grad_y.dim(0), grad_y.dim(1), inputs});
-  // The neighbour that lies at place k of a pixel saw that pixel at place 8 − k.
+  // The neighbour at place k of a pixel has that pixel at its place 8 − k.
   for_patches("lpips: convolve backward", grad_y, [&](const float* patches, int64_t begin, int64_t end) {
     for (int64_t k = 0; k < 9; ++k) {
       check(dnnl_sgemm('N', 'T', end - begin, inputs, outputs, 1.0F, patches + k * outputs, 9 * outputs,

@@ -11,7 +11,7 @@ namespace traceflow::lpips {
 
 namespace {
 
-// Activations are channels×H×W here, as the network is usually written down.
+// Activations are channels×H×W here, the usual notation.
 Tensor<double> scaled_input(const Tensor<double>& image, Input input) {
   const int64_t h = image.dim(0), w = image.dim(1);
   Tensor<double> x(Shape{3, h, w});
@@ -43,7 +43,7 @@ Tensor<double> convolve_relu(const Tensor<double>& x, const BasicWeights<double>
   return y;
 }
 
-// dL/dx from dL/dy, y being what convolve_relu made of x.
+// dL/dx from dL/dy, with y = convolve_relu of x.
 Tensor<double> convolve_relu_backward(const Tensor<double>& grad_y, const Tensor<double>& y,
                                       const BasicWeights<double>::Convolution& convolution) {
   const int64_t inputs = convolution.weight.dim(1), h = y.dim(1), w = y.dim(2), outputs = y.dim(0);

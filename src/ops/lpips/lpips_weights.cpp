@@ -10,7 +10,7 @@ namespace traceflow::lpips {
 namespace {
 
 constexpr const char* remedy = "write the file with scripts/export_lpips.py";
-// Places of the convolutions in torchvision's vgg16().features; the numbers between are ReLU and pooling.
+// Indices of the convolutions in torchvision's vgg16().features; those between are ReLU and pooling.
 constexpr int places[] = {0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28};
 
 Tensor<float> read_finite(const Safetensors& file, const std::string& where, const std::string& name) {

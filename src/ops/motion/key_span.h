@@ -3,14 +3,14 @@
 #include "math/rotation_group.h"
 #include "scene/motion.h"
 
-// Where a body is between two keys, and how that differentiates (scene/motion.h).
+// The pose of a body between two keys, and its derivatives (scene/motion.h).
 namespace traceflow::motion {
 
-// The two keys that a time lies between.
+// The two keys around a time.
 template <class T>
 struct KeySpan {
   int64_t from = 0, to = 0;
-  double share = 0;  // of `to`
+  double share = 0;  // weight of `to`
 
   TRACEFLOW_HD KeySpan(const T* times, int64_t keys, double time) {
     int64_t low = 0, high = keys - 1;
@@ -36,7 +36,7 @@ struct BodyPose {
   Vec3<double> shift;
 };
 
-// rotation, shift: of one body's keys.
+// rotation, shift: the keys of one body.
 template <class T>
 TRACEFLOW_HD BodyPose body_pose(const T* rotation, const T* shift, const KeySpan<T>& span) {
   const Vec4<double> from = unit_quaternion(load4<double>(rotation + 4 * span.from));
@@ -46,7 +46,7 @@ TRACEFLOW_HD BodyPose body_pose(const T* rotation, const T* shift, const KeySpan
   return {quaternion_product(quaternion_exp(span.share * turn), from), a + span.share * (b - a)};
 }
 
-// dL/d a body's pose: by its shift, and by a turn δ of the body about its centre.
+// dL/d(a body's pose): by its translation, and by a rotation δ of the body about its centre.
 struct Pull {
   Vec3<double> force{0}, torque{0};
 
@@ -58,7 +58,7 @@ struct Pull {
 };
 
 // Adds to the gradients of one body's keys. With W = log(q₁ q₀⁻¹) and u the share of q₁, q = exp(u W) q₀
-// turns by u J(uW) (J⁻¹(W) δ₁ − J⁻¹(−W) δ₀) + exp(u W) δ₀.
+// rotates by u J(uW) (J⁻¹(W) δ₁ − J⁻¹(−W) δ₀) + exp(u W) δ₀.
 template <class T>
 TRACEFLOW_HD void body_pose_backward(const T* rotation, const KeySpan<T>& span, const Pull& pull,
                                      T* grad_rotation, T* grad_shift) {

@@ -7,13 +7,13 @@
 #include "ops/motion/key_span.h"
 #include "scene/surfel_views.h"
 
-// The steps of moving what bodies carry; on either device.
+// The steps of moving the surfels of bodies, on either device.
 namespace traceflow::motion {
 
 // A body at one time.
 struct PosedBody {
   Vec4<float> rotation;   // unit
-  Vec3<float> rest, now;  // its centre
+  Vec3<float> rest, now;  // its centre, at rest and now
   ShRotation<float> harmonics;
 };
 
@@ -33,7 +33,7 @@ struct PoseBody {
   }
 };
 
-// Which body carries posed surfel i; −1: none.
+// The body of posed surfel i; −1: none.
 struct CarrierOf {
   const int32_t* body;
   const int32_t* subset;  // null: all
@@ -72,7 +72,7 @@ struct MoveSurfel {
   }
 };
 
-// What surfel i adds to the pull on one body.
+// The contribution of surfel i to the gradient by the pose of one body.
 struct PullOfSurfel {
   CarrierOf carrier;
   int32_t which;
@@ -144,7 +144,7 @@ struct HoldOpacity {
 // i: a body's key.
 struct SpreadOverKeys {
   const float* from;
-  const float* rotation;  // of the motion, where these are gradients by it; else null
+  const float* rotation;  // of the motion, if these are gradients by it; otherwise null
   int64_t keys, numbers;
   float width;
   float* to;
@@ -168,7 +168,7 @@ struct SpreadOverKeys {
   }
 };
 
-// The gradient by a surfel as it was; i: a surfel.
+// The gradient by a surfel before the motion. i: a surfel.
 struct TurnGradientBack {
   CarrierOf carrier;
   const PosedBody* bodies;

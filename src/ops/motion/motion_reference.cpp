@@ -2,7 +2,7 @@
 #include "ops/motion/key_span.h"
 #include "ops/motion/motion.h"
 
-// Moving in double precision, one surfel after another.
+// Moves in double precision, one surfel after another.
 namespace traceflow::motion {
 
 namespace {

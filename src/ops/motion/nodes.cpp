@@ -10,7 +10,7 @@ struct Saved {
   Tensor<PosedNode> nodes;
   Tensor<float> weights;  // N×M
   Tensor<RestSurfel> rest;
-  // Memory of backward.
+  // Working memory of backward.
   Tensor<Vec3<float>> turns;
   Tensor<PullOnNode> pulls;
 };

@@ -7,7 +7,7 @@
 #include "ops/motion/motion_kernels.h"
 #include "ops/motion/nodes.h"
 
-// The steps of bending; on either device.
+// The steps of bending, on either device.
 namespace traceflow::nodes {
 
 using motion::CarrierOf;
@@ -44,13 +44,13 @@ struct PoseNode {
   }
 };
 
-// A surfel before it was bent.
+// A surfel before bending.
 struct RestSurfel {
   Vec3<float> position, turn;  // turn: Σ w_n ω_n
   Vec4<float> rotation;
 };
 
-// Weights are kept node by node: of surfel i at weights[n·count + i].
+// Weights are stored node by node: that of surfel i is weights[n·count + i].
 struct BendSurfel {
   CarrierOf carrier;
   const PosedNode* nodes;
@@ -94,7 +94,7 @@ struct BendSurfel {
   }
 };
 
-// The gradient by Σ w_n ω_n of surfel i; it goes to turns.
+// Writes the gradient by Σ w_n ω_n of surfel i to turns.
 struct PullOnTurn {
   const RestSurfel* rest;
   const float* grad_rotation;
@@ -108,7 +108,8 @@ struct PullOnTurn {
   }
 };
 
-// What surfels add to a node: by its shift, by a turn from the left of what it carries, and by Σ w_n ω_n.
+// The sum of the surfels' gradients at a node: by its shift, by a rotation from the left of the offsets of
+// its surfels, and by Σ w_n ω_n.
 struct PullOnNode {
   Vec3<double> force{0}, torque{0}, turn{0};
 
@@ -122,7 +123,7 @@ struct PullOnNode {
 
 struct PullOfSurfel {
   const PosedNode* node;
-  const float* weights;  // of the node
+  const float* weights;  // of this node
   const RestSurfel* rest;
   const Vec3<float>* turns;
   const float* grad_position;
@@ -166,7 +167,7 @@ struct PullKeys {
   }
 };
 
-// The gradient by a surfel as it was; i: a surfel.
+// The gradient by a surfel before bending. i: a surfel.
 struct BendGradientBack {
   const PosedNode* nodes;
   int64_t node_count, count;
@@ -177,7 +178,7 @@ struct BendGradientBack {
 
   TRACEFLOW_HD void operator()(int64_t i) const {
     const Vec3<float> force = load3<float>(position + 3 * i), p = rest[i].position;
-    // Weights change with the place: ∂w_n/∂p = w_n (a_n − Σ w a), a_n = −(p − c_n)/r_n².
+    // Weights depend on the position: ∂w_n/∂p = w_n (a_n − Σ w a), a_n = −(p − c_n)/r_n².
     Vec3<float> direct(0), lean(0), by_weights(0);
     float mean = 0, sum = 0;
     for (int64_t n = 0; n < node_count; ++n) {
@@ -185,7 +186,8 @@ struct BendGradientBack {
       if (weight == 0) continue;
       const PosedNode& node = nodes[n];
       const Vec3<float> arm = p - node.rest;
-      // What it carries the surfel by, else the mean of large numbers is subtracted from them.
+      // The displacement of the surfel, not its position: otherwise the mean of large numbers would be
+      // subtracted from them.
       const Vec3<float> carried = node.rotation * arm - arm + node.shift;
       const float by_weight = dot(force, carried) + dot(turns[i], node.turn);
       const Vec3<float> a = -node.per_radius2 * arm;
@@ -202,14 +204,14 @@ struct BendGradientBack {
   }
 };
 
-// Where bodies take a point at a time.
+// Where bodies move a point at a time.
 struct BodyPoses {
   const float *times, *centre, *rotation, *shift;
   int64_t keys;
 
   struct Pose {
     Mat3<double> rotation;
-    Vec3<double> rest, now;  // the body's centre
+    Vec3<double> rest, now;  // the body's centre, at rest and now
 
     TRACEFLOW_HD Vec3<double> operator()(const Vec3<double>& p) const { return rotation * (p - rest) + now; }
   };
@@ -221,7 +223,7 @@ struct BodyPoses {
   }
 };
 
-// How nodes resist.
+// The stiffness of the nodes.
 struct Resistance {
   BodyPoses poses;
   const int32_t* body;
@@ -236,7 +238,7 @@ struct Resistance {
     return 1 / (static_cast<double>(radius[n]) * radius[n]);
   }
 
-  // a_nm before it is normalised; 0 where they do not touch.
+  // a_nm before normalisation; 0 for different bodies and for n = m.
   TRACEFLOW_HD double touch(int64_t n, int64_t m) const {
     if (n == m || body[n] != body[m]) return 0;
     const Vec3<double> arm = load3<double>(centre + 3 * m) - load3<double>(centre + 3 * n);
@@ -249,7 +251,8 @@ struct Resistance {
   }
   TRACEFLOW_HD double share() const { return 1 / static_cast<double>(count * keys); }
 
-  // Where n's turn and shift take m's centre, and how far from where m's take it.
+  // c_m − c_n rotated by n's turn. apart() is the position of m's centre as moved by n, minus that as moved
+  // by m.
   TRACEFLOW_HD Vec3<double> arm(int64_t n, int64_t m, int64_t k) const {
     return rotation_from_quaternion(quaternion_exp(at(turn, n, k))) *
            (load3<double>(centre + 3 * m) - load3<double>(centre + 3 * n));
@@ -273,7 +276,7 @@ struct ResistanceGradient {
   Resistance of;
   float *grad_turn, *grad_shift;
 
-  // i: node n at time k; everything that depends on its turn and shift.
+  // i: node n at time k. Adds the gradient of everything that depends on its turn and shift.
   TRACEFLOW_HD void operator()(int64_t i) const {
     const int64_t n = i / of.keys, k = i % of.keys;
     const double all = of.touches(n);

@@ -5,12 +5,12 @@
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
 
-// Bending in double precision, one surfel after another. Gradients are those of central differences.
+// Bends in double precision, one surfel after another. Gradients are central differences.
 namespace traceflow::nodes {
 
 namespace {
 
-// Turn or shift of a node at a time.
+// The turn or shift of a node at a time.
 Vec3<double> value_at(const BasicNodes<double>& nodes, const Tensor<double>& values, int64_t n, double time) {
   const int64_t last = nodes.times() - 1;
   if (time <= nodes.time[0]) return load3<double>(&values(n, 0, 0));
@@ -33,7 +33,7 @@ Vec3<double> carried(const BasicNodes<double>& nodes, int64_t n, const Vec3<doub
   return rotation_from_quaternion(quaternion_exp(turn)) * (p - centre) + centre + shift;
 }
 
-// Squared distance of a node from its anchor, once its body's pose has moved it.
+// Squared distance from a node's anchor to the node as moved by its body's pose.
 double travelled2(const BasicNodes<double>& nodes, const BasicMotion<double>& motion, int64_t n, int64_t k) {
   const Vec3<double> rest = load3<double>(nodes.centre.row(n));
   BasicPosedSurfels<double> point;

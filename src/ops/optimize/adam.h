@@ -17,7 +17,7 @@ struct AdamOptions {
 };
 
 // First and second moment of one parameter tensor and the number of steps taken. New rows (new surfels) start
-// with zero moments: whoever resizes the parameter resizes these.
+// with zero moments: code that resizes the parameter must resize these.
 template <class T>
 struct BasicAdamState {
   Tensor<T> first;
@@ -36,21 +36,21 @@ struct AdamTask {
 };
 inline constexpr int most_rates = 64;
 
-// What a step left alone, since its gradient is not finite: how many entries, and which is the first. All
-// zeros mean none.
+// The entries that a step skipped because their gradient is not finite: their number, and the first of them.
+// All zeros mean none.
 struct LeftAlone {
   int32_t count;
-  int32_t inverted_first;  // largest_index less the lowest index
+  int32_t inverted_first;  // largest_index minus the lowest index
   static constexpr int32_t largest_index = std::numeric_limits<int32_t>::max();
   int64_t first() const { return largest_index - inverted_first; }
 };
 
-// parameter −= rate · m̂ / (√v̂ + ε) for all tasks, whose tensors are on one device. Increments their step. A
-// gradient entry that is not finite, or whose square is not, leaves its parameter and moments alone and is
-// noted: left_alone gets one entry a task there, for which nobody waits until it is read. Where there is no
-// memory for those, nothing has changed.
+// parameter −= rate · m̂ / (√v̂ + ε) for all tasks, whose tensors are on one device. Increments their step.
+// If a gradient entry or its square is not finite, its parameter and moments are unchanged and it is
+// recorded: left_alone gets one entry per task on that device, without a wait until it is read. If memory for
+// that list runs out, nothing has changed.
 void adam_step(std::span<const AdamTask> tasks, const AdamOptions& options, Tensor<LeftAlone>& left_alone);
-// The same for one tensor. Returns how many entries were left alone, for which the host waits.
+// The same for one tensor. Returns the number of skipped entries, for which the host waits.
 int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
                   std::span<const float> learning_rates, const AdamOptions& options);
 inline int64_t adam_step(Tensor<float>& parameter, const Tensor<float>& gradient, AdamState& state,
@@ -61,7 +61,7 @@ int64_t adam_step_reference(Tensor<double>& parameter, const Tensor<double>& gra
                             BasicAdamState<double>& state, std::span<const double> learning_rates,
                             const AdamOptions& options);
 
-// Log-linear from `start` to `end` over `steps`, constant after (method §7.6).
+// Log-linear from `start` to `end` over `steps`, then constant (method §7.6).
 double log_linear(double start, double end, int64_t step, int64_t steps);
 
 }  // namespace traceflow::optimize

@@ -1,7 +1,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "ops/optimize/adam_cpu.cpp"
 #include <hwy/foreach_target.h>
-// Highway wants its own header after foreach_target.
+// Highway's own header must follow foreach_target.
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ struct Constants {
         epsilon(hn::Set(d, b.epsilon)) {}
 };
 
-// A whole vector's entries, at any address. Returns how many gradients are not finite.
+// Updates one vector of entries, at any address. Returns how many gradients are not finite.
 HWY_INLINE int64_t update_lanes(const Constants& c, const float* gradient, const float* rates,
                                 float* parameter, float* first, float* second) {
   const auto g = hn::LoadU(c.d, gradient);
@@ -46,7 +46,8 @@ HWY_INLINE int64_t update_lanes(const Constants& c, const float* gradient, const
   return static_cast<int64_t>(hn::Lanes(c.d)) - static_cast<int64_t>(hn::CountTrue(c.d, finite));
 }
 
-// Fewer entries than a vector has, in memory of their own: before AVX no vector reads or writes a part.
+// Updates fewer entries than a vector has, by way of a buffer: before AVX no instruction reads or writes a
+// partial vector.
 HWY_INLINE int64_t update_rest(const Constants& c, const AdamBlock& b, int64_t begin) {
   constexpr size_t most = hn::MaxLanes(hn::ScalableTag<float>());
   const auto count = static_cast<size_t>(b.count - begin);
@@ -108,13 +109,13 @@ void note(const Tensor<float>& gradient, int64_t count, LeftAlone& left_alone) {
                 LeftAlone::largest_index - static_cast<int32_t>(bad - values.begin())};
 }
 
-// Asks for no memory: whoever finds none has changed no tensor.
+// Allocates no memory, so that running out of memory cannot leave a tensor half updated.
 void step_on_host(const AdamTask& task, const AdamOptions& options, LeftAlone& left_alone) {
   Tensor<float>& parameter = *task.parameter;
   const Tensor<float>& gradient = *task.gradient;
   AdamState& state = *task.state;
   const std::vector<float>& learning_rates = task.learning_rates;
-  // Blocks begin at multiples of the row, so that one block's rates serve them all.
+  // Blocks begin at multiples of the row, so that the same rates serve all blocks.
   const auto columns = static_cast<int64_t>(learning_rates.size());
   const int64_t grain = block_size / columns * columns;
   std::array<float, block_size> rates;

@@ -1,15 +1,15 @@
 #include "base/kernel.h"
 #include "ops/optimize/adam_kernels.h"
 
-// Adam on the device: bound by memory, so a thread takes whole groups of neighbouring entries, which travel
-// in one piece. Tensors begin at aligned addresses.
+// Adam on the device. It is bound by memory bandwidth, so a thread processes groups of neighbouring entries,
+// each read and written at once. Tensors begin at aligned addresses.
 namespace traceflow::optimize::cuda {
 
 namespace {
 
 constexpr int adam_threads = 256;
 constexpr int group_entries = 4;
-constexpr int groups_each = 4;  // so that a tensor is not looked up for a handful of entries
+constexpr int groups_each = 4;  // so that a thread looks up its tensor for more than a few entries
 constexpr int block_entries = adam_threads * group_entries * groups_each;
 
 struct alignas(16) Group {
@@ -39,8 +39,8 @@ __global__ void __launch_bounds__(adam_threads) step(const __grid_constant__ Ada
   __shared__ float rates[most_rates];
   const auto thread = static_cast<int>(threadIdx.x), block = static_cast<int>(blockIdx.x);
   const int k = traceflow::cuda::part_of_block(table.tensor.data(), table.tensors, block);
-  // A copy: what the compiler reads through the table it does not know apart from what it writes, and then it
-  // stores number by number.
+  // A copy: through the table the compiler could not rule out aliasing with what it writes, and would store
+  // number by number.
   const AdamTensor t = table.tensor[static_cast<size_t>(k)];
   const Setting setting{table.options, t.inverse_correction1, t.inverse_correction2, table.left_alone + k};
   if (thread < t.columns) rates[thread] = table.rate[static_cast<size_t>(t.first_rate + thread)];

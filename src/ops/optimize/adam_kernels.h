@@ -8,13 +8,13 @@
 
 namespace traceflow::optimize {
 
-// A run of consecutive entries of one parameter tensor, as the vector kernel takes it.
+// A range of consecutive entries of one parameter tensor, as input of the vector kernel.
 struct AdamBlock {
   float* parameter;
   const float* gradient;
   float* first;
   float* second;
-  const float* rates;  // one for each entry
+  const float* rates;  // one per entry
   int64_t count;
   float beta1, beta2, epsilon;
   float inverse_correction1, inverse_correction2;  // 1 / (1 − β^step)
@@ -29,18 +29,18 @@ struct AdamTensor {
   float* first;
   float* second;
   int32_t count;
-  int32_t columns, first_rate;                     // its rates, one for each column, in the table's
+  int32_t columns, first_rate;                     // its rates, one per column, in the table's
   float inverse_correction1, inverse_correction2;  // 1 / (1 − β^step)
-  int32_t first_block;                             // of the kernel's blocks, the first that works on it
+  int32_t first_block;                             // the first of the kernel's blocks that works on it
 };
 
-// Parameter tensors that one kernel steps: a kernel each would cost more than most of them take. As large as
-// the parameters of a kernel may be.
+// Parameter tensors that one kernel steps: most are so small that a kernel each would take longer to launch.
+// As large as a kernel's parameters may be.
 struct AdamTable {
   static constexpr int most_tensors = 48, room_for_rates = 3 * most_rates;
   AdamOptions options;
   int32_t tensors = 0, rates = 0;
-  LeftAlone* left_alone = nullptr;  // one for each tensor
+  LeftAlone* left_alone = nullptr;  // one per tensor
   std::array<AdamTensor, most_tensors> tensor{};
   std::array<float, room_for_rates> rate{};
 

@@ -11,7 +11,7 @@ namespace traceflow::field {
 
 namespace {
 
-// Where each parameter's gradient stands in a group's sums, fp32 and dense.
+// Offset of each parameter's gradient in a group's sums, which are fp32 and dense.
 struct GradientLayout {
   explicit GradientLayout(const Layout& l) {
     for (int layer = 0; layer < l.depth; ++layer) {
@@ -34,8 +34,8 @@ struct GradientLayout {
   int64_t size = 0;
 };
 
-// Consecutive blocks are summed in one go; the sums of these groups are added in their order. Their number
-// depends on the points alone, and bounds the memory.
+// A group of consecutive blocks shares one set of sums; the groups' sums are added in order. The number of
+// groups depends only on the points, and bounds the memory.
 struct Groups {
   explicit Groups(int64_t all_blocks)
       : blocks(all_blocks), count(std::clamp<int64_t>(all_blocks / 4, 1, 16)) {}
@@ -71,7 +71,7 @@ struct BackwardScratch {
   Tensor<std::byte> activations;
 };
 
-// The rows of dL/doutput that count, padded; adds their sum to grad_bias.
+// Copies the valid rows of dL/doutput, padded, and adds their sum to grad_bias.
 void load_grad_output(const Layout& layout, const float* points, const float* grad_output, int64_t count,
                       Tensor<float>& padded, float* grad_bias) {
   padded.zero();
@@ -84,7 +84,7 @@ void load_grad_output(const Layout& layout, const float* points, const float* gr
   }
 }
 
-// The activations of a block, from forward's memory or computed again.
+// The activations of a block, kept by forward or recomputed.
 Block restore(const Pass& pass, int64_t index, int64_t count, int64_t rows, BackwardScratch& scratch) {
   const Layout& layout = pass.layout;
   Block block{.points = count,
@@ -96,7 +96,7 @@ Block restore(const Pass& pass, int64_t index, int64_t count, int64_t rows, Back
   if (index < pass.saved.kept_blocks) {
     const int64_t offset = index * layout.depth * layout.hidden_bytes(layout.block_rows);
     block.activations =
-        const_cast<std::byte*>(pass.saved.activations.data()) + offset;  // only read from here on
+        const_cast<std::byte*>(pass.saved.activations.data()) + offset;  // read-only from here on
   } else {
     scratch.activations.resize({layout.depth * layout.hidden_bytes(rows)});
     block.activations = scratch.activations.data();
@@ -144,7 +144,7 @@ void backward_block(const Pass& pass, int64_t index, const float* points, const 
 }
 
 // Adds the groups' sums of row `o` of a layer to the field's gradient. The time's encoding is the same for
-// all points: its columns have the gradient (dL/dbias) γ(t).
+// all points, so the gradient of its columns is (dL/dbias) γ(t).
 void add_row(const Pass& pass, const Tensor<float>& sums, int layer, int64_t o,
              const std::vector<double>& time, Field& grad_field) {
   const Layout& layout = pass.layout;

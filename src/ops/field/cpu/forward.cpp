@@ -18,7 +18,7 @@ struct ForwardScratch {
   Tensor<std::byte> activations;
 };
 
-// Room for the activations of as many whole blocks as fit.
+// Allocates the activations of as many whole blocks as fit.
 void reserve(const Layout& layout, int64_t points, Precision precision, Saved& saved) {
   const int64_t block_bytes = layout.depth * layout.hidden_bytes(layout.block_rows);
   saved.precision = precision;
@@ -69,7 +69,7 @@ void forward(const Field& field, const Tensor<float>& points, float time, Precis
   if (saved != nullptr) reserve(layout, count, used, *saved);
   if (count == 0) return;
 
-  ForwardWeights& filled = weights;  // the caller's, whichever thread reads it
+  ForwardWeights& filled = weights;  // the calling thread's; all threads read it
   filled.fill(layout, field, time);
   parallel_blocks("field forward", count, layout.block_rows, [&](int64_t begin, int64_t end) {
     const int64_t block = begin / layout.block_rows;

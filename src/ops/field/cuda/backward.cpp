@@ -10,9 +10,9 @@ namespace traceflow::field::device {
 
 namespace {
 
-// Where each parameter's gradient stands in the sums. The points of every segment are dealt to slots, each a
-// product of its own, so that small gradients of many points keep the whole device busy; the slots are added
-// in their order. Their number depends on the points alone.
+// Offset of each parameter's gradient in the sums. The points of every segment are divided among slots, each
+// a product of its own, so that small gradients of many points keep the whole device busy. The slots are
+// added in order. Their number depends only on the points.
 struct Sums {
   explicit Sums(const DeviceLayout& layout) {
     while (slots < 32 && slots * 1024 <= layout.rows_in(0)) slots *= 2;
@@ -32,7 +32,7 @@ struct Sums {
   float* bias_sums(float* sums, int layer) const { return sums + slots * slot_size + bias[layer]; }
 
   int slots = 1, bias_slots = 0;
-  std::vector<int64_t> weight, bias;  // layer, the heads last; in a slot
+  std::vector<int64_t> weight, bias;  // per layer, the heads last; offsets in a slot
   int64_t slot_size = 0, bias_slot_size = 0;
 };
 
@@ -42,7 +42,7 @@ struct Pass {
   const Activations& activations;
   const Sums& sums;
   const std::byte* weights;
-  float* values;  // of the sums
+  float* values;  // the sums themselves
 };
 
 // Working memory, kept between calls.
@@ -60,7 +60,7 @@ struct Scratch {
   Tensor<float> exact_grad_output, values;
 };
 
-// Adds the gradient of a layer's weights, or of the heads', from that of its output.
+// Adds the gradient of the weights of a layer, or of the heads, given the gradient of its output.
 void add_weight_gradient(const Pass& pass, int layer, const Segment& segment, const std::byte* gradient) {
   const DeviceLayout& layout = pass.layout;
   const int64_t outputs = layer == layout.depth ? layout.padded_outputs : layout.width;
@@ -86,7 +86,7 @@ void add_weight_gradient(const Pass& pass, int layer, const Segment& segment, co
                              .c = pass.values + pass.sums.weight[layer]});
 }
 
-// Adds the columns' sums of a gradient to those of a layer's bias.
+// Adds the column sums of a gradient to those of a layer's bias.
 template <class T>
 void add_bias_gradient(const Pass& pass, int layer, const Segment& segment, const T* gradient) {
   const int outputs = layer == pass.layout.depth ? pass.layout.padded_outputs : pass.layout.width;
@@ -106,7 +106,7 @@ void backward_segment(const Pass& pass, const Segment& segment, const float* gra
     const std::byte* gradient = scratch.grad_output.data();
     for (int layer = layout.depth; layer >= 0; --layer) {
       add_weight_gradient(pass, layer, segment, gradient);
-      // Where the encoding is seen, the bias stands among the weights.
+      // In layers that see the encoding the bias is one of the weights.
       if (layer < layout.depth && !layout.sees_encoding(layer)) {
         add_bias_gradient(pass, layer, segment, reinterpret_cast<const T*>(gradient));
       }
@@ -170,7 +170,7 @@ void backward(const Field& field, const Tensor<float>& points, float time, const
         .count = layout.points_in(s),
         .rows = rows,
         .points = points.row(s * layout.segment_rows),
-        // Only read where it was kept.
+        // Kept activations are only read.
         .memory = kept ? const_cast<std::byte*>(saved.activations.data()) + s * activations.bytes
                        : passing_memory().data(),
         .masks = masks_supported(layout, rows)};

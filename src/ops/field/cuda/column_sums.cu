@@ -11,8 +11,7 @@ using device::Numbers;
 
 constexpr int sum_threads = 256;
 
-// A block is a slot. Its threads stand side by side over the columns and, as far as they last, over several
-// rows.
+// One block per slot. Its threads cover the columns and, if there are enough threads, several rows.
 template <class T>
 __global__ void column_sums_kernel(const T* values, int64_t rows, int columns, float* sums,
                                    int64_t sums_stride) {

@@ -9,18 +9,18 @@ namespace traceflow::field::device {
 
 namespace {
 
-// Room for the activations of as many whole segments as fit.
+// Allocates the activations of as many whole segments as fit.
 void reserve(const DeviceLayout& layout, Precision precision, Saved& saved) {
   const int64_t bytes = Activations(layout, true).bytes;
   saved.precision = precision;
   saved.kept_blocks = std::min(layout.segments(), saved.memory_limit / bytes);
   const int64_t wanted = saved.kept_blocks * bytes;
-  // A tensor that grows takes a quarter more, which may go over the limit; a new one takes what it needs.
+  // A growing tensor allocates a quarter more, which may exceed the limit; a new one allocates exactly.
   if (wanted > saved.activations.size() && wanted + wanted / 4 > saved.memory_limit) saved.activations = {};
   saved.activations.place(Device::cuda).resize({wanted});
 }
 
-// The heads' product.
+// The product of the heads.
 void forward_heads(const DeviceLayout& layout, const Segment& segment, const std::byte* hidden,
                    const std::byte* weights, float* sums) {
   traceflow::cuda::multiply({.m = segment.rows,
@@ -53,7 +53,7 @@ void forward(const Field& field, const Tensor<float>& points, float time, Precis
   pack_weights(layout, field, time, weights);
   const int64_t kept = saved != nullptr ? saved->kept_blocks : 0;
   const Activations all(layout, true), two(layout, false);
-  // What is computed again by backward is computed in the same way: only the places differ.
+  // backward recomputes activations by this same path; only their places in memory differ.
   const Activations& passing = saved != nullptr ? all : two;
   if (kept < layout.segments()) passing_memory().resize({passing.bytes});
   sums.place(Device::cuda).resize({layout.rows_in(0), layout.padded_outputs});

@@ -6,17 +6,17 @@
 #include "math/encoding.h"
 #include "ops/field/field_kernels.h"
 
-// The element-wise steps between the network's products on the CUDA device. T is the hidden values' number
-// type. With bf16 a number of the encoding, e, stands three times in a row, as [h, h, l]: h its nearest bf16
-// and l that of what remains; its weight w stands as [l, h, h], so that the product e·w comes to within 2⁻¹⁶
-// of fp32's. The encoding's first spare column is 1: its weight is the bias, whose gradient stands in that
-// column of the weight's.
+// The element-wise steps between the network's products on the CUDA device. T is the type of the hidden
+// values. With bf16 a number e of the encoding is stored as three, [h, h, l]: h is its nearest bf16 and l
+// that of the remainder. Its weight w is stored as [l, h, h], so that the product e·w is within 2⁻¹⁶ of that
+// in fp32. The first padding column of the encoding is 1: its weight is the bias, and that column of the
+// weight's gradient is the bias's gradient.
 namespace traceflow::field::device {
 
 inline constexpr int max_layers = 32;
 inline constexpr int max_time_encoding = 33;
 
-// What a thread reads or writes at once. Every row of a matrix is whole ones of these, and starts at one.
+// What a thread reads or writes at once. Every matrix row is aligned to it and holds a whole number of them.
 template <class T>
 struct alignas(16) Numbers {
   static constexpr int count = 16 / sizeof(T);
@@ -28,12 +28,12 @@ struct alignas(16) Numbers {
   }
 };
 
-// γ(points) into rows of `parts` times `columns` numbers. i: (row, column).
+// Writes γ(points) into rows of `parts` times `columns` numbers. i: (row, column).
 template <class T>
 struct Encode {
   const float* points;
   int64_t
-      count;  // rows beyond are filled as if with points that are not evaluated, which enter as the origin
+      count;  // rows beyond are filled like those of points that are not evaluated, which enter as the origin
   int columns, encoding;
   int64_t stride;
   T* rows;
@@ -62,19 +62,19 @@ struct Encode {
   }
 };
 
-// Where one layer's weights are, and where the products want them.
+// The weights of one layer, and where the products read them.
 template <class T>
 struct PackedLayer {
   const float *weight, *bias;
   T* to;                 // width × (parts·encoding columns + hidden), row-major
-  T* to_bias;            // width; null where the bias is in the encoding's column
-  int64_t end;           // of its numbers among those of all layers
-  int encoding_columns;  // of one part; 0 where it does not see the encoding
-  int hidden;            // hidden values that it sees
-  int rows;              // stored; rows beyond are zero
+  T* to_bias;            // width; null if the bias is in the encoding's column
+  int64_t end;           // end of its numbers among those of all layers
+  int encoding_columns;  // of one part; 0 if the layer does not see the encoding
+  int hidden;            // hidden values that the layer sees
+  int rows;              // stored rows; rows beyond are zero
 };
 
-// Fills the weights of all layers. i: (layer, row, column), the bias standing as one more column.
+// Fills the weights of all layers. i: (layer, row, column); the bias is one more column.
 template <class T>
 struct Pack {
   static constexpr int parts = sizeof(T) == sizeof(float) ? 1 : 3;
@@ -110,7 +110,7 @@ struct Pack {
     if (e > encoding) return rounded_to<T>(0.0F);
     return e < encoding ? of_weight(weight[e], part) : of_bias(bias_at_time(at, row, weight), part);
   }
-  // bias + W_t γ(t), W_t the columns of the time's encoding, which is the same for every point.
+  // bias + W_t γ(t). W_t is the columns of the time's encoding, which is the same for every point.
   TRACEFLOW_HD float bias_at_time(const PackedLayer<T>& at, int64_t row, const float* weight) const {
     double sum = static_cast<double>(at.bias[row]);
     for (int j = 0; j < time_encoding; ++j) {
@@ -122,7 +122,7 @@ struct Pack {
     const T high = rounded_to<T>(w);
     return parts == 3 && part == 0 ? rounded_to<T>(w - to_float(high)) : high;
   }
-  // All three columns are 1: a bias has three bf16 numbers' digits.
+  // All three columns are 1, so that the three bf16 weights together hold the bias more exactly.
   TRACEFLOW_HD static T of_bias(float b, int part) {
     const T first = rounded_to<T>(b);
     if (parts == 1 || part == 1) return first;
@@ -131,12 +131,12 @@ struct Pack {
   }
 };
 
-// What stands in for a product's bias and ReLU where the library has no code for them. i: (row, group).
+// Replaces a product's bias and ReLU where the library does not support them. i: (row, group).
 template <class T>
 struct AddBiasAndRelu {
   T* values;
   const T* bias;  // null: none
-  int groups;     // of a row
+  int groups;     // per row
   int64_t stride;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
@@ -152,12 +152,12 @@ struct AddBiasAndRelu {
   }
 };
 
-// And for the derivative of that ReLU: gradient = 0 where the activation is not > 0. i: (row, group).
+// Replaces the derivative of that ReLU: gradient = 0 unless the activation is > 0. i: (row, group).
 template <class T>
 struct MaskByActivation {
   T* gradient;  // dense
   const T* activation;
-  int groups;      // of a row
+  int groups;      // per row
   int64_t stride;  // of the activation
 
   TRACEFLOW_HD void operator()(int64_t i) const {
@@ -173,7 +173,7 @@ struct MaskByActivation {
   }
 };
 
-// The heads' sums with their bias, as rows of the output. i: (point, output).
+// Adds the heads' bias to their sums and writes the output rows. i: (point, output).
 struct FinishOutput {
   const float *points, *sums, *bias;
   int outputs, padded_outputs;
@@ -188,8 +188,8 @@ struct FinishOutput {
   }
 };
 
-// The rows of dL/doutput that count, padded with zeros: as the products read them, and as the bias's gradient
-// adds them. i: row.
+// Copies the valid rows of dL/doutput, padded with zeros: in the format of the products, and in that of the
+// sums of the bias's gradient. i: row.
 template <class T>
 struct LoadGradient {
   const float *points, *gradient;
@@ -210,18 +210,18 @@ struct LoadGradient {
   }
 };
 
-// Where the sums of one layer's gradients are, and what they are added to.
+// The sums of one layer's gradients, and what they are added to.
 struct SummedLayer {
   float *grad_weight, *grad_bias;
   const float* sums;       // slots of rows × (high, low, hidden columns)
-  const float* bias_sums;  // slots of rows; null where the bias's gradient is in the encoding's column
-  int64_t end;             // of its parameters among those of all layers
-  int encoding_columns;    // of one part; 0 where it does not see the encoding
+  const float* bias_sums;  // slots of rows; null if the bias's gradient is in the encoding's column
+  int64_t end;             // end of its parameters among those of all layers
+  int encoding_columns;    // of one part; 0 if the layer does not see the encoding
   int hidden;
 };
 
-// Adds the slots of every parameter, in their order, to its gradient. i: (layer, row, column), the bias
-// standing as one more column. The time's columns have the gradient (dL/dbias) γ(t).
+// Adds the slots of every parameter, in order, to its gradient. i: (layer, row, column); the bias is one more
+// column. The gradient of the time's columns is (dL/dbias) γ(t).
 struct AddSlots {
   SummedLayer layer[max_layers + 1] = {};  // the heads last
   int parts;                               // of the encoding in the sums: 1, or 2 (high, low)

@@ -17,7 +17,7 @@ using traceflow::cuda::Mask;
 int64_t row_quantum(int64_t points) { return points > 8192 ? 1024 : 128; }
 int64_t rounded_up(int64_t n, int64_t to) { return (n + to - 1) / to * to; }
 
-// The product of a layer: its input by its weights, transposed.
+// The product of a layer: its input times its transposed weights.
 GemmDescription forward_gemm(const DeviceLayout& l, int layer, int64_t rows, bool masks) {
   return {.m = rows,
           .k = l.input_columns(layer),
@@ -34,7 +34,8 @@ GemmDescription forward_gemm(const DeviceLayout& l, int layer, int64_t rows, boo
           .mask_stride = masks ? l.mask_stride() : 0};
 }
 
-// The product that takes the gradient of a layer's output, or of the heads', to its hidden input.
+// The product that turns the gradient of the output of a layer, or of the heads, into that of its hidden
+// input.
 GemmDescription backward_gemm(const DeviceLayout& l, int layer, int64_t rows, bool masks) {
   const int64_t outputs = layer == l.depth ? l.padded_outputs : l.width;
   return {.m = rows,
@@ -49,7 +50,7 @@ GemmDescription backward_gemm(const DeviceLayout& l, int layer, int64_t rows, bo
           .mask_stride = masks ? l.mask_stride() : 0};
 }
 
-// The product alone, where the library has no code for it with what follows.
+// The product without its epilogue, for when the library does not support them together.
 GemmDescription without_epilogue(GemmDescription gemm) {
   gemm.bias = gemm.relu = false;
   gemm.mask = Mask::none;

@@ -12,7 +12,7 @@ using traceflow::cuda::warp_sum;
 
 constexpr int compare_threads = 256;
 
-// A warp is a pixel, and its lanes stand side by side over the channels.
+// One warp per pixel; its lanes share the channels.
 __global__ void __launch_bounds__(compare_threads)
     compare_kernel(Features f, double scale, double* distances, float* grad_a) {
   const int lane = static_cast<int>(threadIdx.x) % warp_lanes;

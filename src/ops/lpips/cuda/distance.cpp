@@ -28,25 +28,26 @@ T* sized(Tensor<T>& tensor, const Shape& shape) {
   return tensor.data();
 }
 
-// Elements, of the steps: four channels each.
+// As elements of the steps: four channels each.
 const Four* fours(const float* values) { return reinterpret_cast<const Four*>(values); }
 Four* fours(float* values) { return reinterpret_cast<Four*>(values); }
 FourBytes* fours(uint8_t* values) { return reinterpret_cast<FourBytes*>(values); }
 
-// Kept from call to call, so that training stops allocating. What the way back needs of the way forward is
-// the first image's.
+// Kept between calls, so that training stops allocating. The backward pass needs only the first image's part
+// of the forward pass.
 struct Memory {
-  Tensor<float> activations[2];  // of two layers, which take turns; of gradients on the way back
+  Tensor<float> activations[2];  // of two layers, alternating; in the backward pass of gradients
   Tensor<float> patches;
   Tensor<float> weights;                            // of one convolution, padded
-  std::array<Tensor<uint8_t>, layers> gates;        // of each convolution but the last of a stage
-  std::array<Tensor<uint8_t>, stages> places;       // of the halving before each stage
-  std::array<Tensor<float>, stages> grad_features;  // dL/d(last features) by its own share, gates closed
+  std::array<Tensor<uint8_t>, layers> gates;        // of each convolution except the last of a stage
+  std::array<Tensor<uint8_t>, stages> places;       // of the pooling before each stage
+  std::array<Tensor<float>, stages> grad_features;  // dL/d(last features) from the stage's own share, with
+                                                    // closed gates applied
   Tensor<double> distances;                         // of the pixels of a stage
-  Tensor<double> check;                             // one number: 0 where the gradient is finite
+  Tensor<double> check;                             // one number: 0 if the gradient is finite
 };
 
-// A convolution as the products see it.
+// A convolution in the format of the products.
 struct Layer {
   const float* matrix;  // (9·inputs)×outputs
   const float* bias;
@@ -68,7 +69,7 @@ Layer layer_of(const Network::Convolution& convolution, Memory& memory) {
   return {padded, padded + rows * padded_outputs, padded_inputs, padded_outputs};
 }
 
-// How large images are in a stage.
+// Size of the images in a stage.
 struct Size {
   int64_t height, width;
 
@@ -79,7 +80,7 @@ struct Size {
   }
 };
 
-// Pixels are taken in blocks of `rows`, the last of which may be shorter.
+// Pixels are processed in blocks of `rows`; the last block may be shorter.
 struct Blocks {
   int64_t rows, count;
 };
@@ -91,9 +92,9 @@ Blocks blocks_of(int64_t pixels, int64_t inputs) {
   return {rounded_up((pixels + count - 1) / count, quantum), count};
 }
 
-// 3×3 convolution of both images with zeros outside them, then max(0, ·). A last block that is shorter is
-// computed as if it were not, behind whose end is what nobody reads: were it another product, which adds up
-// in another way, equal images would differ.
+// 3×3 convolution of both images with zero padding, then max(0, ·). A shorter last block is computed at full
+// size, and nobody reads the rows past its end. A product of another size could sum in another order, so that
+// equal images would differ.
 void convolve(const Layer& layer, const Size& size, const Tensor<float>& x, Tensor<float>& y,
               Memory& memory) {
   const int64_t pixels = 2 * size.pixels();
@@ -130,8 +131,8 @@ void convolve(const Layer& layer, const Size& size, const Tensor<float>& x, Tens
   }
 }
 
-// dL/dx of one image from dL/dy, in which gates are closed already. gates: of the ReLU that made x; null
-// where none is known.
+// Computes dL/dx of one image from dL/dy, to which closed gates have been applied. gates: of the ReLU that
+// computed x; null if there is none.
 void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>& grad_y,
                        const Tensor<uint8_t>* gates, Tensor<float>& grad_x, Memory& memory) {
   const int64_t pixels = size.pixels(), border = size.width + 1;
@@ -158,7 +159,7 @@ void convolve_backward(const Layer& layer, const Size& size, const Tensor<float>
   }
 }
 
-// Both images at half the size; keeps the first one's places where they are wanted.
+// Halves both images by max pooling. places: receives those of the first image; may be null.
 void halve(const Size& size, const Tensor<float>& x, Tensor<float>& halved, Tensor<uint8_t>* places) {
   const int64_t channels = x.dim(1), pixels = size.halved().pixels();
   float* const to = sized(halved, {2 * pixels, channels});

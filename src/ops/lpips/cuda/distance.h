@@ -2,15 +2,15 @@
 
 #include "ops/lpips/lpips.h"
 
-// How the CUDA device runs the network. Activations are pixels × channels, those of both images one below the
-// other, so that a layer is computed for both at once; channels are padded with zeros to a multiple of four.
-// A convolution is one matrix product for each block of pixels, whose 3×3 neighbourhoods are gathered first.
+// How the CUDA device runs the network. Activations are pixels × channels, with the second image below the
+// first, so that a layer is computed for both at once. Channels are zero-padded to a multiple of four. A
+// convolution gathers the 3×3 neighbourhoods of a block of pixels and is one matrix product per block.
 namespace traceflow::lpips::device {
 
-// Most memory for gathered neighbourhoods, in bytes. Tests make it small.
+// Most bytes for gathered neighbourhoods. Tests reduce it.
 inline int64_t patch_bytes = int64_t{64} << 20;
 
-// lpips::distance, with the place of its value on the device.
+// Like lpips::distance; `value` is an address on the device.
 void distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
               loss::Mean* value);
 void distance(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,

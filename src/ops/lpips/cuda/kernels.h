@@ -28,16 +28,16 @@ struct alignas(4) FourBytes {
   uint8_t x, y, z, w;
 };
 
-// 0, or not a number where one of the three is not finite: sums tell whether all were.
+// 0, or NaN if any of the three is not finite, so that a sum shows whether all values were.
 TRACEFLOW_HD inline double zero_if_finite(float a, float b, float c) {
   return std::isfinite(a) && std::isfinite(b) && std::isfinite(c) ? 0
                                                                   : std::numeric_limits<double>::quiet_NaN();
 }
 
-// One image, or several one below the other, as the steps see them.
+// The size of one image, or of several below each other.
 struct Extent {
   uint32_t height, width;  // of one image
-  uint32_t fours;          // elements of a pixel
+  uint32_t fours;          // elements per pixel
 
   // Whether the pixel at (row + down, column + right) is in the same image.
   TRACEFLOW_HD bool holds(uint32_t row, uint32_t column, int down, int right) const {
@@ -45,11 +45,11 @@ struct Extent {
   }
 };
 
-// Both images as the first convolution sees them. i: pixel, the target's behind the image's. Returns 0, or
-// not a number where the pixel is not finite: an infinity could hide behind a gate.
+// Scales both images for the first convolution. i: pixel, those of the target after those of the image.
+// Returns 0, or NaN if the pixel is not finite, since a closed gate could hide an infinity.
 struct ScaleImages {
   const float *image, *target;
-  int64_t pixels;  // of one
+  int64_t pixels;  // of one image
   Input input;
   Four* scaled;
 
@@ -61,8 +61,7 @@ struct ScaleImages {
   }
 };
 
-// A convolution's matrix and, as one more row, its bias, with zeros for the channels that are added. i: (row,
-// column).
+// A convolution's matrix and, as one more row, its bias, with zeros for the added channels. i: (row, column).
 struct PadWeights {
   const float *matrix, *bias;
   uint32_t inputs, outputs, padded_inputs, padded_outputs;
@@ -81,7 +80,8 @@ struct PadWeights {
   }
 };
 
-// The 3×3 neighbourhoods of the pixels from `first` on, zero outside the image. i: (pixel, place, element).
+// Gathers the 3×3 neighbourhoods of the pixels from `first` on, zero outside the image. i: (pixel, place,
+// element).
 struct GatherPatches {
   const Four* x;
   Extent extent;
@@ -100,7 +100,7 @@ struct GatherPatches {
   }
 };
 
-// What stands in for a product's bias and ReLU where the library has no code for them. i: element.
+// Replaces a product's bias and ReLU where the library does not support them. i: element.
 struct AddBiasAndRelu {
   Four* values;
   const Four* bias;
@@ -114,7 +114,7 @@ struct AddBiasAndRelu {
   }
 };
 
-// Which outputs of a ReLU are above zero. i: element.
+// Records which outputs of a ReLU are above zero. i: element.
 struct KeepGates {
   const Four* y;
   FourBytes* gates;
@@ -126,8 +126,9 @@ struct KeepGates {
   }
 };
 
-// The largest of each 2×2 pixels, and which of the four was the first to be it, in reading order; closed
-// where that is not above zero, so that its ReLU's gate is. i: element of the halved images.
+// The largest of each 2×2 pixels, and which of the four is the first with that value, in reading order. The
+// place is marked closed if the value is not above zero, since the gate of its ReLU is closed. i: element of
+// the halved images.
 struct Halve {
   static constexpr uint8_t closed = 4;
 
@@ -135,7 +136,7 @@ struct Halve {
   Extent extent;  // of x
   Four* halved;
   FourBytes* places;
-  int64_t placed;  // elements whose places are kept: the first image's, or none
+  int64_t placed;  // elements with recorded places: those of the first image, or none
 
   struct Largest {
     float value;
@@ -170,7 +171,7 @@ struct Halve {
   }
 };
 
-// Adds dL/d(halved) to dL/dx where the places say. i: element of the halved image.
+// Adds dL/d(halved) to dL/dx at the recorded places. i: element of the halved image.
 struct HalveBackward {
   const Four* grad_halved;
   const FourBytes* places;
@@ -194,8 +195,8 @@ struct HalveBackward {
   }
 };
 
-// Adds to dL/dx what the neighbourhoods of the pixels in [begin, end) send back. gates: of the ReLU that made
-// x; null where it is none. i: (pixel from `first` on, element).
+// Adds to dL/dx the gradient from the neighbourhoods of the pixels in [begin, end). gates: of the ReLU that
+// computed x; null if there is none. i: (pixel from `first` on, element).
 struct AddPatches {
   const Four* grad_patches;
   int64_t begin, end;
@@ -211,7 +212,7 @@ struct AddPatches {
     const uint32_t row = pixel / extent.width, column = pixel % extent.width;
     Four sum = grad_x[int64_t{pixel} * extent.fours + four];
     for (int place = 0; place < 9; ++place) {
-      // The pixel that saw this one at that place.
+      // The pixel that has this one at that place of its neighbourhood.
       const int down = 1 - place / 3, right = 1 - place % 3;
       const int64_t source = int64_t{pixel} + down * int64_t{extent.width} + right;
       if (!extent.holds(row, column, down, right) || source < begin || source >= end) continue;
@@ -226,13 +227,13 @@ struct AddPatches {
   TRACEFLOW_HD static float through(float grad, uint8_t open) { return open != 0 ? grad : 0; }
 };
 
-// The distance at a pixel, to be added up.
+// Reads the distance at a pixel for the sum.
 struct Load {
   const double* values;
   TRACEFLOW_HD double operator()(int64_t i) const { return values[i]; }
 };
 
-// What becomes of a sum: the distance's first part, or one more of them.
+// Writes a sum as the distance's first share, or adds it as a further one.
 struct BeginDistance {
   loss::Mean* distance;
   TRACEFLOW_HD void operator()(double sum) const { *distance = {sum, 1}; }
@@ -247,7 +248,7 @@ struct Keep {
   TRACEFLOW_HD void operator()(double sum) const { *to = sum; }
 };
 
-// 0, or not a number where a pixel's gradient is not finite. i: pixel.
+// 0, or NaN if a pixel's gradient is not finite. i: pixel.
 struct CheckGradient {
   const Four* grad;
   TRACEFLOW_HD double operator()(int64_t i) const { return zero_if_finite(grad[i].x, grad[i].y, grad[i].z); }
