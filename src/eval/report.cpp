@@ -1,8 +1,8 @@
 #include "eval/report.h"
 
 #include <algorithm>
-#include <chrono>
 
+#include "base/clock.h"
 #include "capture/motion_truth.h"
 #include "capture/pixels.h"
 #include "eval/carriers.h"
@@ -20,7 +20,6 @@ Metrics mean_of(const Report& report) {
 
 void evaluate(const viz::Subject& subject, const Capture& capture, const std::vector<View>& views,
               const lpips::Network* network, const ViewListener& listener, Report& report) {
-  using Clock = std::chrono::steady_clock;
   report.main_surfels = subject.scene.main.count();
   report.environment_surfels = subject.scene.environment.count();
   const std::optional<MotionTruth> motion = load_motion_truth(capture);
@@ -37,7 +36,7 @@ void evaluate(const viz::Subject& subject, const Capture& capture, const std::ve
     const Clock::time_point start = Clock::now();
     const Frame& frame = renderer.forward(subject.scene, request);
     memory::synchronise(subject.scene.device());
-    seconds += std::chrono::duration<double>(Clock::now() - start).count();
+    seconds += seconds_since(start);
 
     const std::shared_ptr<const ViewImages> images = load_images(capture, view);
     const ViewTruth truth = capture.has_truth ? load_truth(capture, view) : ViewTruth{};

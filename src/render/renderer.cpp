@@ -25,7 +25,7 @@ const Motion* motion_if(const Scene& scene) { return scene.main_motion ? &*scene
 const Nodes* nodes_if(const Scene& scene) { return scene.main_nodes ? &*scene.main_nodes : nullptr; }
 
 // Sets frame.max_displacement to the largest distance between posed and stored positions.
-void find_reach(const Surfels& stored, Frame& frame) {
+void find_max_displacement(const Surfels& stored, Frame& frame) {
   const SquareOfMove move{stored_row(frame), stored.position.data(), frame.main.position.data()};
   ordered_sum<LargestSquare>(stored.device(), "render: largest move", frame.main.count(), move,
                              KeepRoot{frame.max_displacement.data()}, 4096);
@@ -123,7 +123,7 @@ void Renderer::pose_main(const Scene& scene, const FrameRequest& request, bool k
                     keep_for_backward ? &main_saved_ : nullptr);
   }
   frame_.max_displacement.place(device).reset({1});
-  if (field) find_reach(scene.main, frame_);
+  if (field) find_max_displacement(scene.main, frame_);
   if (const Nodes* nodes = nodes_if(scene))
     nodes::forward(*nodes, scene.main.body, request.time, frame_.subset, frame_.main, *nodes_saved_);
   if (motion)

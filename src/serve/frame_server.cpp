@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "base/clock.h"
 #include "base/machine.h"
 #include "capture/lens/resample.h"
 #include "files/jpeg.h"
@@ -17,7 +18,6 @@ namespace traceflow::serve {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
 
 constexpr const char* about_memory = "memory";  // what a trouble is about
 // That a frame takes with all its layers, and more.
@@ -26,10 +26,6 @@ constexpr int64_t max_previewed_frames = 20'000;  // frames of a camera path
 constexpr int photo_quality = 90;
 // How fast the ranges of depth and distortion follow the picture: settled after some ten frames.
 constexpr float follow = 0.25F;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // The mean over every new pixel's area.
 Tensor<float> fitted(const Tensor<float>& image, int64_t width, int64_t height) {

@@ -1,9 +1,9 @@
 #include "train/trainer.h"
 
-#include <chrono>
 #include <cmath>
 #include <system_error>
 
+#include "base/clock.h"
 #include "base/options.h"
 #include "base/parallel.h"
 #include "base/version.h"
@@ -26,11 +26,6 @@ constexpr int bond_stride = 4;
 constexpr float slower_fields = 0.25F;
 // Relative to the rate of positions, during tracking: a shape that learns fast absorbs the lag of each key.
 constexpr double share_while_tracking = 1.0 / 3;
-
-using Clock = std::chrono::steady_clock;
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // Keeps only edges between surfels that the field moves.
 void leave_others(const Tensor<int32_t>& body, Tensor<int32_t>& edges) {
@@ -355,12 +350,12 @@ events::Finished Trainer::finish(events::Ending ending, const std::string& reaso
   return event;
 }
 
-void Trainer::tell_measured() {
+void Trainer::emit_measured() {
   const Phase phase = schedule_.phase(std::max(0, iteration_ - 1));
   if (const auto measured = meter_.take(iteration_, to_string(phase))) stream_.emit(*measured);
 }
 
-void Trainer::tell_start() {
+void Trainer::emit_start() {
   stream_.emit(events::Started{capture_.name, run_.folder, iteration_, options_.iterations,
                                std::string(name_of(device_)), thread_count(),
                                static_cast<uint64_t>(options_.seed), counts(), memory_.forecast_bytes,
@@ -376,15 +371,15 @@ void Trainer::tell_start() {
   }
 }
 
-void Trainer::tell_density() {
+void Trainer::emit_density() {
   for (const events::DensityChanged& change : density_changes_) stream_.emit(change);
   density_changes_.clear();
 }
 
-std::string Trainer::tell_iteration() {
+std::string Trainer::emit_iteration() {
   const Phase phase = schedule_.phase(iteration_);
   if (iteration_ == 0 || schedule_.phase(iteration_ - 1) != phase) {
-    tell_measured();
+    emit_measured();
     stream_.emit(events::PhaseEntered{iteration_, to_string(phase)});
   }
   before_step_ = Draws{random_, views_, iteration_, {}, {}, {}, {}, {}, bodies_stand_};
@@ -404,7 +399,7 @@ std::string Trainer::tell_iteration() {
   std::string trouble = divergence_.check(terms, non_finite_);
   const double step_seconds = seconds_since(start);
   seconds_ += step_seconds;
-  tell_density();
+  emit_density();
   stream_.emit(step_event(terms, step_seconds));
   return trouble;
 }
@@ -428,9 +423,9 @@ std::string Trainer::when_there_is_room() const {
 
 Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
   try {
-    tell_start();
+    emit_start();
     while (iteration_ < options_.iterations && !stop && !stop_soon_) {
-      const std::string trouble = tell_iteration();
+      const std::string trouble = emit_iteration();
       if (!trouble.empty()) return {events::Ending::diverged, trouble + collapse_advice()};
       if (iteration_ % options_.save_every == 0 && iteration_ < options_.iterations && divergence_.sound())
         save_on_the_way();
@@ -461,7 +456,7 @@ events::Finished Trainer::run(const std::atomic<bool>& stop) {
 }
 
 void Trainer::save() {
-  tell_measured();
+  emit_measured();
   const Clock::time_point start = Clock::now();
   Safetensors file = checkpoint();
   file.metadata["train_seconds"] = std::to_string(seconds_);
@@ -514,7 +509,7 @@ void Trainer::rollback_draws() {
       bodies_stand_ = before_step_.bodies_stand;
     }
   }
-  tell_density();
+  emit_density();
   // Frees the renderer's memory for the copies that saving makes.
   renderer_ = Renderer(options_.render, memory_.kept);
   gradient_ = {};

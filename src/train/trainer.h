@@ -162,12 +162,12 @@ class Trainer {
   // The part of a step after a finite loss.
   void learn(const View& view, const Frame& frame, const FrameRequest& request, const Trainable& trainable);
   void control_density(int done, const Surfels& new_surface);
-  void tell_start();
+  void emit_start();
   void warn(const std::string& text) { stream_.emit(events::Warning{iteration_, text}); }
   void keep_caps(const Safetensors& file);
   // Emits the measurements so far, for the phase of the last iteration.
-  void tell_measured();
-  void tell_density();
+  void emit_measured();
+  void emit_density();
   struct End {
     events::Ending ending;
     std::string reason;
@@ -175,7 +175,7 @@ class Trainer {
   // Iterates until something ends the run.
   End iterate(const std::atomic<bool>& stop);
   // One iteration with its events. Returns what is wrong with its numbers, or an empty string.
-  std::string tell_iteration();
+  std::string emit_iteration();
   // The advice after running out of memory.
   std::string when_there_is_room() const;
   // The advice if the fields made the scene diverge.

@@ -53,10 +53,6 @@ struct Disk {
   PixelBox box;
 };
 
-bool all_finite(const float* values, int64_t n) {
-  return std::all_of(values, values + n, [](float v) { return std::isfinite(v); });
-}
-
 bool is_shown(const PosedSurfelsView& s, int64_t i) {
   return all_finite(s.position + 3 * i, 3) && all_finite(s.scale + 2 * i, 2) &&
          all_finite(s.rotation + 4 * i, 4) && all_finite(s.sh + s.sh_row * i, s.sh_row) &&

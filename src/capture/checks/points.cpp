@@ -55,7 +55,7 @@ Sighting look(const Capture& capture) {
   return result;
 }
 
-void tell_unseen(const Sighting& sighting, Findings& findings) {
+void emit_unseen(const Sighting& sighting, Findings& findings) {
   const auto is_told = [&](const std::string& kind) {
     return std::any_of(findings.begin(), findings.end(), [&](const Finding& f) { return f.kind == kind; });
   };
@@ -77,7 +77,7 @@ void tell_unseen(const Sighting& sighting, Findings& findings) {
   }
 }
 
-void tell_views_with_few(const Capture& capture, const std::vector<double>& in_view, Findings& findings) {
+void emit_views_with_few(const Capture& capture, const std::vector<double>& in_view, Findings& findings) {
   if (in_view.size() < fewest_views) return;
   std::set<std::string> told;
   for (const Finding& finding : findings) {
@@ -105,7 +105,7 @@ void tell_views_with_few(const Capture& capture, const std::vector<double>& in_v
   finding.threshold = limit;
 }
 
-void tell_far(const Tensor<float>& points, Findings& findings) {
+void emit_far(const Tensor<float>& points, Findings& findings) {
   std::vector<double> axis[3];
   for (int64_t i = 0; i < points.size(); ++i) axis[i % 3].push_back(double{points[i]});
   const Vec3<double> middle(median(axis[0]), median(axis[1]), median(axis[2]));
@@ -130,9 +130,9 @@ void tell_far(const Tensor<float>& points, Findings& findings) {
 Inspection::Sight check_points(const Capture& capture, Findings& findings) {
   if (capture.points.empty()) return {};
   const Sighting sighting = look(capture);
-  tell_unseen(sighting, findings);
-  tell_views_with_few(capture, sighting.in_view, findings);
-  tell_far(capture.points, findings);
+  emit_unseen(sighting, findings);
+  emit_views_with_few(capture, sighting.in_view, findings);
+  emit_far(capture.points, findings);
   return {median(sighting.in_view), sighting.unseen, sighting.behind};
 }
 

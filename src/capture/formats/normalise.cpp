@@ -21,10 +21,6 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-bool is_finite(const Vec3<double>& x) {
-  return std::isfinite(x.x) && std::isfinite(x.y) && std::isfinite(x.z);
-}
-
 // Around all but the outermost 2.5 % on either side of each axis.
 void take_inner(Box& box, const std::vector<Vec3<double>>& places) {
   std::vector<double> values;

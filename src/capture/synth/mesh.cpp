@@ -19,8 +19,6 @@ constexpr double overlap = 1e-12;
 // Sine of the angles below which a triangle, or a ray against it, is too thin for its hit to be known.
 constexpr double thinnest = 1e-12;
 
-bool is_finite(const Vector& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
 // Möller and Trumbore (1997). Comparisons are written so that what is not a number misses.
 double distance_to_triangle(const std::array<Vector, 3>& corners, const Ray& ray) {
   const Vector edge_1 = corners[1] - corners[0];

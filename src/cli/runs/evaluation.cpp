@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "base/atomic_file.h"
+#include "base/clock.h"
 #include "base/option_fields.h"
 #include "base/version.h"
 #include "cli/terminal/count_progress.h"
@@ -125,7 +126,6 @@ std::vector<View> Evaluation::aligned_views() {
   Targets targets(device_, 0);
   std::vector<View> views = *views_;
   CountProgress progress = CountProgress::for_stderr();
-  using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   for (size_t i = 0; i < views.size(); ++i) {
     FrameRequest request = subject.request;
@@ -135,7 +135,7 @@ std::vector<View> Evaluation::aligned_views() {
     views[i].camera = carried(aligned_camera(renderer, subject.scene, request, photograph, run_.options.loss),
                               of_scene, of_capture);
     progress.show({"align", "cameras", static_cast<int64_t>(i) + 1, static_cast<int64_t>(views.size())},
-                  std::chrono::duration<double>(Clock::now() - start).count());
+                  seconds_since(start));
   }
   progress.finish();
   return views;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 
+#include "base/clock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
 #include "cli/runs/render_shots.h"
@@ -102,7 +103,7 @@ size_t take(const std::vector<viz::Shot>& shots, const viz::Subject& subject,
                follower != nullptr ? follower->at(subject.scene, request.time) : viz::Tracks());
     ++done;
     progress.show({"", "frames", static_cast<int64_t>(done), static_cast<int64_t>(shots.size())},
-                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+                  seconds_since(start));
   }
   output.finish();
   progress.finish();

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 
-#include <chrono>
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 #include "base/atomic_file.h"
+#include "base/clock.h"
 #include "base/folder_lock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
@@ -158,20 +158,18 @@ std::optional<FoundObjects> objects_for(Capture& capture, const TrainOptions& op
   if (follows_bodies(capture, options)) leave_out_odd_masks(capture);
   const int iterations = iterations_to_find_objects(capture, options);
   if (iterations == 0) return std::nullopt;
-  using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   CountProgress progress = CountProgress::for_stderr();
   std::optional<FoundObjects> found =
       find_objects(capture, options, iterations, [&](int64_t done, int64_t all) {
         if (!arguments.quiet) {
-          progress.show({"masks", "iterations", done, all},
-                        std::chrono::duration<double>(Clock::now() - start).count());
+          progress.show({"masks", "iterations", done, all}, seconds_since(start));
         }
         return !stop;
       });
   progress.finish();
   if (!found) throw Exit{exit_interrupted};
-  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const double seconds = seconds_since(start);
   if (!arguments.quiet) {
     std::cerr << fmt::format(
         "found what moves in {} pictures without masks: {:.1f}% of their pixels, as {} shows ({})\n",

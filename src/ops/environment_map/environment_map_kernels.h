@@ -41,11 +41,6 @@ TRACEFLOW_HD Lookup<T> look_up(const Vec3<T>& direction, int64_t size) {
 }
 
 template <class T>
-TRACEFLOW_HD bool is_finite(const Vec3<T>& d) {
-  return std::isfinite(d.x) && std::isfinite(d.y) && std::isfinite(d.z);
-}
-
-template <class T>
 TRACEFLOW_HD bool usable(const Vec3<T>& direction) {
   return is_finite(direction) && direction != Vec3<T>(T(0));
 }

@@ -40,11 +40,6 @@ TRACEFLOW_HD bool is_zero(const Vec3<T>& v) {
   return v == Vec3<T>(T(0));
 }
 
-template <class T>
-TRACEFLOW_HD bool is_finite(const Vec3<T>& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 // SSIM's window for the fast paths: the middle tap and the five beside it.
 using HalfWindow = std::array<float, ssim_radius + 1>;
 inline HalfWindow half_window() {

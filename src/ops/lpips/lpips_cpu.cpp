@@ -28,10 +28,6 @@ void check_images(const Network& network, const Tensor<float>& image, const Tens
           "the network and both images are on one device");
 }
 
-bool all_finite(const Tensor<float>& x) {
-  return std::all_of(x.data(), x.data() + x.size(), [](float v) { return std::isfinite(v); });
-}
-
 Tensor<float> scaled_input(const Tensor<float>& image, Input input) {
   Tensor<float> x;
   x.resize(image.shape());
@@ -42,7 +38,8 @@ Tensor<float> scaled_input(const Tensor<float>& image, Input input) {
 double forward(const Network& network, const Tensor<float>& image, const Tensor<float>& target, Input input,
                double weight, Trail* trail) {
   // A closed gate could hide an infinity.
-  if (!all_finite(image) || !all_finite(target)) return std::numeric_limits<double>::quiet_NaN();
+  if (!all_finite(image.data(), image.size()) || !all_finite(target.data(), target.size()))
+    return std::numeric_limits<double>::quiet_NaN();
   Tensor<float> a = scaled_input(image, input), b = scaled_input(target, input);
   double total = 0;
   size_t next = 0;
@@ -105,7 +102,7 @@ void distance(const Network& network, const Tensor<float>& image, const Tensor<f
   *mean = {forward(network, image, target, input, weight, &trail), 1};
   if (!std::isfinite(mean->value)) return;
   const Tensor<float> grad = backward(network, trail);
-  if (!all_finite(grad)) return;
+  if (!all_finite(grad.data(), grad.size())) return;
   for (int64_t i = 0; i < grad.size(); ++i) {
     grad_image[i] += static_cast<float>(grad[i] * scale_channel_slope(i % 3, input));
   }

@@ -96,14 +96,6 @@ TRACEFLOW_HD inline void tile_range(double low, double high, int pixels, int32_t
   end = static_cast<int32_t>(last) / tile_edge + 1;
 }
 
-TRACEFLOW_HD inline bool all_finite(const float* values, int64_t count) {
-  uint32_t bad = 0;
-  for (int64_t i = 0; i < count; ++i) {
-    bad |= static_cast<uint32_t>((std::bit_cast<uint32_t>(values[i]) & 0x7f800000U) == 0x7f800000U);
-  }
-  return bad == 0;
-}
-
 // Projects one surfel to its splat and bounds, on either device.
 class ProjectSurfel {
  public:

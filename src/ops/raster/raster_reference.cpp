@@ -62,11 +62,6 @@ struct Pixel {
   double depth() const { return blended.empty() ? 0 : depth_sum / alpha(); }
 };
 
-template <class T>
-bool all_finite(const T* values, int64_t count) {
-  return std::all_of(values, values + count, [](T v) { return std::isfinite(v); });
-}
-
 class Scene {
  public:
   Scene(const Surfels& surfels, const Camera<double>& camera, const Options& options)

@@ -31,11 +31,6 @@ TRACEFLOW_HD Vec3<T> pixel_ray(const Camera<T>& camera, int64_t row, int64_t col
   return camera.ray_in_world(static_cast<T>(column) + T(0.5), static_cast<T>(row) + T(0.5));
 }
 
-template <class T>
-TRACEFLOW_HD bool is_finite(const Vec3<T>& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 // A camera's gradient as a sum over pixels.
 template <class T>
 struct CameraSum : CameraGradient<T> {

@@ -9,14 +9,6 @@
 
 namespace traceflow::trace {
 
-// Returns whether all n numbers are finite, without branches: 0 · x is 0 only for a finite x.
-template <class T>
-TRACEFLOW_HD bool all_finite(const T* values, int64_t n) {
-  T sum(0);
-  for (int64_t i = 0; i < n; ++i) sum += T(0) * values[i];
-  return sum == T(0);
-}
-
 // Addresses of a set of posed surfels, on either device.
 template <class T>
 struct SurfelView {

@@ -31,7 +31,8 @@ struct TileGrid {
 
 // For one lane alone.
 template <class Surfel, class Visit>
-__device__ int walk_alone(const TileGrid& grid, const Splat* splats, const Surfel& mine, const Visit& visit) {
+__device__ int visit_tiles_alone(const TileGrid& grid, const Splat* splats, const Surfel& mine,
+                                 const Visit& visit) {
   int found = 0;
   for (int row = mine.bounds.tile_y0; row < mine.bounds.tile_y1; ++row) {
     for (int column = mine.bounds.tile_x0; column < mine.bounds.tile_x1; ++column) {
@@ -43,8 +44,8 @@ __device__ int walk_alone(const TileGrid& grid, const Splat* splats, const Surfe
 
 // For all lanes of a warp, with the same surfel.
 template <class Surfel, class Visit>
-__device__ int walk_together(const TileGrid& grid, const Splat* splats, const Surfel& shared,
-                             const Visit& visit) {
+__device__ int visit_tiles_together(const TileGrid& grid, const Splat* splats, const Surfel& shared,
+                                    const Visit& visit) {
   const Splat& splat = splats[shared.surfel];
   const int lane = lane_of_thread();
   const unsigned lanes_before = (1U << lane) - 1;
@@ -70,9 +71,9 @@ template <class Surfel, class Visit>
 __device__ int for_each_reached(const TileGrid& grid, const Splat* splats, const Surfel& mine,
                                 const Visit& visit) {
   const bool is_shared = mine.bounds.tiles() > tiles_of_one_lane;
-  int found = is_shared ? 0 : walk_alone(grid, splats, mine, visit);
+  int found = is_shared ? 0 : visit_tiles_alone(grid, splats, mine, visit);
   for_each_shared(is_shared, mine, [&](int owner, const Surfel& shared) {
-    const int of_owner = walk_together(grid, splats, shared, visit);
+    const int of_owner = visit_tiles_together(grid, splats, shared, visit);
     if (lane_of_thread() == owner) found = of_owner;
   });
   return found;

@@ -94,7 +94,7 @@ class PacketTraversal {
   HWY_INLINE void run() {
     farthest_ = farthest_distance;
     const BoxBeam boxes(beam_);
-    walk_tree(bvh_, boxes, farthest_, [this](const BvhLeaf& leaf) HWY_ATTR { meet_leaf(leaf); });
+    traverse_tree(bvh_, boxes, farthest_, [this](const BvhLeaf& leaf) HWY_ATTR { meet_leaf(leaf); });
     for (size_t lane = 0; lane < count_; ++lane) sort(hits_.rays[lane]);
   }
 

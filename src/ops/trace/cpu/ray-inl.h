@@ -48,7 +48,7 @@ HWY_INLINE void find_hits(const Bvh& bvh, const UnitRay& ray, const DiskRules& r
   size_t looked = 0;
   Beam beam(&ray, 1);
   beam.slope = rules.deviations * ray.width;
-  walk_tree(bvh, BoxBeam(beam), far, [&](const BvhLeaf& leaf) HWY_ATTR {
+  traverse_tree(bvh, BoxBeam(beam), far, [&](const BvhLeaf& leaf) HWY_ATTR {
     meet_leaf(leaf, ray, rules, far, hits);
     if (hits.count - looked < rules.hits_per_look) return;
     for (; looked < hits.count; ++looked) transmittance *= 1 - hits.alpha[looked];

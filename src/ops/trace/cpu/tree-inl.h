@@ -117,7 +117,7 @@ HWY_INLINE uint32_t meet_boxes(const BvhNode& node, const BoxBeam& beam, float f
 
 // Calls on_leaf(leaf) for every leaf that the beam may meet up to `far`. on_leaf may reduce `far`.
 template <class OnLeaf>
-HWY_INLINE void walk_tree(const Bvh& bvh, const BoxBeam& beam, const float& far, OnLeaf&& on_leaf) {
+HWY_INLINE void traverse_tree(const Bvh& bvh, const BoxBeam& beam, const float& far, OnLeaf&& on_leaf) {
   struct Entry {
     float near;
     uint32_t child;

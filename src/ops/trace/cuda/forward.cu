@@ -81,7 +81,7 @@ __device__ void keep_ray(const RecordStore& store, int64_t i, const Blending& b)
 
 // One thread per ray. In each pass all lanes of a warp find their next hits, then blend them.
 template <int degree>
-__global__ void __launch_bounds__(walk_threads)
+__global__ void __launch_bounds__(traversal_threads)
     trace_kernel(RayInput input, RayOutput output, RecordStore store) {
   __shared__ HitColumns columns;
   const int64_t i = input.own();
@@ -118,8 +118,8 @@ __global__ void __launch_bounds__(walk_threads)
 void trace_rays(int degree, const RayInput& rays, const RayOutput& output, const RecordStore& store) {
   void (*const kernels[])(RayInput, RayOutput, RecordStore) = {trace_kernel<0>, trace_kernel<1>,
                                                                trace_kernel<2>, trace_kernel<3>};
-  launch("trace: rays", {blocks_for(rays.last - rays.first, walk_threads), walk_threads}, kernels[degree],
-         rays, output, store);
+  launch("trace: rays", {blocks_for(rays.last - rays.first, traversal_threads), traversal_threads},
+         kernels[degree], rays, output, store);
 }
 
 }  // namespace traceflow::trace::cuda

@@ -7,12 +7,12 @@
 // Finds the next hits of one ray, in one thread. Included by .cu files only.
 namespace traceflow::trace::cuda {
 
-inline constexpr int walk_threads = 128;
+inline constexpr int traversal_threads = 128;
 // k: the capacity of the k-buffer. If there are more hits, the ray traverses again from the last one on.
 inline constexpr int held_hits = 16;
 // The tree is at most as deep as its keys have bits: 64, plus 30 of the index for equal keys. Each node on
 // the path leaves at most one child on the stack.
-inline constexpr int walk_stack = 96;
+inline constexpr int traversal_stack = 96;
 
 // A position in a ray's order of hits.
 struct HitPlace {
@@ -23,9 +23,9 @@ struct HitPlace {
 
 // The hits of a block, one column per thread.
 struct HitColumns {
-  float distance[held_hits][walk_threads];
-  uint32_t surfel[held_hits][walk_threads];
-  float alpha[held_hits][walk_threads];
+  float distance[held_hits][traversal_threads];
+  uint32_t surfel[held_hits][traversal_threads];
+  float alpha[held_hits][traversal_threads];
 };
 
 // The nearest hits of this thread's ray behind `after`, in order: at most held_hits, and fewer if the ray
@@ -182,7 +182,7 @@ class TraversalStack {
     float near;  // distance at which the ray enters the box
     uint32_t child;
   };
-  Entry waiting_[walk_stack];
+  Entry waiting_[traversal_stack];
   int depth_ = 0;
 };
 
