@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "base/parallel.h"
+#include "math/types.h"
 #include "ops/lpips/cuda/distance.h"
 #include "ops/lpips/lpips_kernels.h"
 #include "ops/lpips/lpips_scaling.h"
