@@ -16,45 +16,49 @@ endif()
 
 find_package(OpenMP REQUIRED COMPONENTS CXX)
 
+# traceflow_settings: what users of the libraries need too. traceflow_build: how the project itself is compiled.
 add_library(traceflow_settings INTERFACE)
+add_library(traceflow_build INTERFACE)
 # -ffp-contract=off: a sum must not change its bytes because a compiler fused it in one build and not in another.
-target_compile_options(traceflow_settings INTERFACE
+target_compile_options(traceflow_build INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wconversion -Wno-sign-conversion -ffp-contract=off -fno-math-errno)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-  target_compile_options(traceflow_settings INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wduplicated-cond -Wlogical-op -Wsuggest-override>)
+  target_compile_options(traceflow_build INTERFACE $<$<COMPILE_LANGUAGE:CXX>:-Wduplicated-cond -Wlogical-op -Wsuggest-override>)
   # GCC 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
-  target_compile_options(traceflow_settings INTERFACE -Wno-restrict)
+  target_compile_options(traceflow_build INTERFACE -Wno-restrict)
   # GCC 13 sees copies beyond the end in fmt 9's buffers, references that dangle wherever a function that returns one is
   # given a temporary (GCC bug 109642), and vectors of floats in memory that was not allocated.
   if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
-    target_compile_options(traceflow_settings INTERFACE
+    target_compile_options(traceflow_build INTERFACE
       -Wno-array-bounds -Wno-stringop-overflow -Wno-dangling-reference -Wno-free-nonheap-object)
   endif()
 endif()
 # A file's own names would hide those of the files that are compiled with it.
 if(CMAKE_UNITY_BUILD)
-  target_compile_options(traceflow_settings INTERFACE -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+  target_compile_options(traceflow_build INTERFACE -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
 endif()
 if(TRACEFLOW_WERROR)
-  target_compile_options(traceflow_settings INTERFACE -Werror)
+  target_compile_options(traceflow_build INTERFACE -Werror)
 endif()
 target_compile_definitions(traceflow_settings INTERFACE GLM_FORCE_SILENT_WARNINGS GLM_FORCE_XYZW_ONLY)
-target_include_directories(traceflow_settings INTERFACE ${CMAKE_SOURCE_DIR}/src)
-target_link_libraries(traceflow_settings INTERFACE OpenMP::OpenMP_CXX)
+target_compile_features(traceflow_settings INTERFACE cxx_std_20)
+target_include_directories(traceflow_settings INTERFACE
+  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}/src> $<INSTALL_INTERFACE:include/traceflow>)
+target_link_libraries(traceflow_settings INTERFACE OpenMP::OpenMP_CXX $<BUILD_INTERFACE:traceflow_build>)
 if(TRACEFLOW_SANITIZE)
-  target_compile_options(traceflow_settings INTERFACE -fsanitize=${TRACEFLOW_SANITIZE} -fno-omit-frame-pointer
+  target_compile_options(traceflow_build INTERFACE -fsanitize=${TRACEFLOW_SANITIZE} -fno-omit-frame-pointer
     -fno-sanitize-recover=all)
-  target_link_options(traceflow_settings INTERFACE -fsanitize=${TRACEFLOW_SANITIZE})
+  target_link_options(traceflow_build INTERFACE -fsanitize=${TRACEFLOW_SANITIZE})
   # Of Highway's copies of each step, one for each instruction set, AVX2's alone, which all else may use as well: they are
   # one source, and the fallback of which there would be one besides takes Clang minutes a file.
-  target_compile_options(traceflow_settings INTERFACE -mavx2 -mfma -mf16c -mbmi -mbmi2 -mpclmul -maes)
-  target_compile_definitions(traceflow_settings INTERFACE "HWY_DISABLED_TARGETS=(HWY_AVX3|HWY_AVX3_DL)")
+  target_compile_options(traceflow_build INTERFACE -mavx2 -mfma -mf16c -mbmi -mbmi2 -mpclmul -maes)
+  target_compile_definitions(traceflow_build INTERFACE "HWY_DISABLED_TARGETS=(HWY_AVX3|HWY_AVX3_DL)")
 endif()
 
 # traceflow_library(ops_raster LINKS base math scene [SYSTEM packages...])
-# One library per folder: all .cpp files beside the CMakeLists.txt and in its cpu/ and cuda/. LINKS are the rooms below that it may include; SYSTEM
-# are outside packages. A header of a room that is not linked is still found by the compiler, but its code will not link.
-# Its .cu files are noted for the CUDA code, which is one library for all rooms (traceflow_cuda, below): a room's
+# One library per folder: all .cpp files beside the CMakeLists.txt and in its cpu/ and cuda/. LINKS are the libraries that it may include; SYSTEM
+# are outside packages. The compiler still finds the headers of other libraries, but their code does not link.
+# Its .cu files are noted for the CUDA code, which is one library for all (traceflow_cuda): a library's
 # own library calls it by weak names, which stay null in programs that are not linked with it.
 function(traceflow_library name)
   cmake_parse_arguments(ARG "" "" "LINKS;SYSTEM" ${ARGN})
@@ -76,4 +80,6 @@ function(traceflow_library name)
     add_library(traceflow_${name} INTERFACE)
     target_link_libraries(traceflow_${name} INTERFACE traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})
   endif()
+  set_target_properties(traceflow_${name} PROPERTIES EXPORT_NAME ${name})
+  set_property(GLOBAL APPEND PROPERTY TRACEFLOW_LIBRARIES traceflow_${name})
 endfunction()

@@ -1,7 +1,7 @@
 #pragma once
 
 // What a .cu file needs to launch kernels: CUDA's own when compiled by nvcc. Tests compile the same files
-// with the host's compiler and an emulation (tests/emulation).
+// with the host's compiler and an emulation (src/emulation).
 #if defined(__CUDACC__)
 #include <cuda_runtime.h>
 #else
