@@ -14,7 +14,7 @@ namespace traceflow {
 
 namespace {
 
-// The view's grid over an image of the view that is stored at another size.
+// The view's grid over an image of this view that is stored at another size.
 Grid grid_over(const ViewSource& view, const Tensor<float>& image) {
   return {view.width(), view.height(), static_cast<double>(image.dim(1)) / view.lens.width * view.factor,
           static_cast<double>(image.dim(0)) / view.lens.height * view.factor};
@@ -28,13 +28,13 @@ Tensor<float> to_view_grid(const ViewSource& view, Tensor<float> image) {
   return resample(image, grid_over(view, image));
 }
 
-// Normals whose length says nothing become zero, the others unit.
+// Sets normals that are too short or not finite to zero and normalises the others.
 void normalise(Tensor<float>& normals) {
   constexpr float shortest = 0.1F;
   for (int64_t i = 0; i < normals.size(); i += 3) {
     const Vec3<float> n = load3<float>(&normals[i]);
     const float length = glm::length(n);
-    // Also false for a NaN.
+    // Also false for NaN.
     const bool is_direction = length > shortest && std::isfinite(length);
     store3(&normals[i], is_direction ? n / length : Vec3<float>(0));
   }
@@ -67,7 +67,7 @@ Tensor<float> read_depth(const TreeFile& file) {
   return result;
 }
 
-// Mean of the depths that exist, per pixel of the view.
+// Mean of the known depths in each pixel of the view.
 Tensor<float> depth_on_view_grid(const ViewSource& view, Tensor<float> depth, float scale) {
   if (!view.lens.is_pinhole()) {
     const Lens lens = view.lens.resized(static_cast<double>(depth.dim(1)), static_cast<double>(depth.dim(0)));
@@ -84,7 +84,7 @@ Tensor<float> depth_on_view_grid(const ViewSource& view, Tensor<float> depth, fl
 
 bool has_alpha(const Tensor<uint8_t>& pixels) { return pixels.dim(2) == 2 || pixels.dim(2) == 4; }
 
-// RGB of an image of one to four channels, before a background of one grey level where it is transparent.
+// RGB of an image with one to four channels, blended over a grey background.
 Tensor<uint8_t> over(uint8_t background, const Tensor<uint8_t>& pixels) {
   const int64_t stored = pixels.dim(2), step = stored >= 3 ? 1 : 0;
   Tensor<uint8_t> rgb;
@@ -100,7 +100,7 @@ Tensor<uint8_t> over(uint8_t background, const Tensor<uint8_t>& pixels) {
   return rgb;
 }
 
-// Where all that a pixel of the view is made of is opaque; empty where that is everywhere.
+// 1 where all stored pixels below a pixel of the view are opaque; empty if that holds everywhere.
 Tensor<uint8_t> opaque(const ViewSource& view, const Tensor<uint8_t>& pixels) {
   if (!has_alpha(pixels)) return {};
   const int64_t stored = pixels.dim(2);
@@ -120,7 +120,7 @@ Tensor<uint8_t> opaque(const ViewSource& view, const Tensor<uint8_t>& pixels) {
 }  // namespace
 
 Tensor<float> normals_of_picture(const Tensor<uint16_t>& picture, const std::string& name) {
-  // A unit vector never comes near such a length: black and white say "no value".
+  // Longer than any unit vector: black and white mean "no value".
   constexpr float longest = 1.5F, full = 65535;
   const int64_t channels = picture.dim(2);
   if (channels < 3) throw InputError(name, "channels", std::to_string(channels), "3 (normals as 2v - 1)");

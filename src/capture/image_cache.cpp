@@ -101,7 +101,7 @@ std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
       return found->second->pixels;
     }
   }
-  // Outside the lock: two threads may decode the same view, which costs time but nothing else.
+  // Decodes without the lock: two threads may decode the same view, which only costs time.
   auto pixels = std::make_shared<const ViewPixels>(decode(id));
   insert(id, pixels);
   return pixels;

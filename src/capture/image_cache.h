@@ -15,7 +15,7 @@
 
 namespace traceflow {
 
-// Decoded views, the least recently used dropped first. Safe to use from several threads.
+// Cache of decoded views that drops the least recently used first. Safe to use from several threads.
 class ImageCache {
  public:
   ImageCache(std::unordered_map<std::string, ViewSource> views, CaptureSource capture, int64_t limit_bytes)
@@ -23,23 +23,23 @@ class ImageCache {
 
   std::shared_ptr<const ViewPixels> load(const std::string& id);
   ViewTruth load_truth(const std::string& id) const;
-  // Throws InternalError for a view of another capture.
+  // Throws InternalError if the view is not in this capture.
   const ViewSource& source(const std::string& id) const;
   bool has_mask(const std::string& id) const;
-  // A view's mask, or nothing where it has none.
+  // A view's mask, or nothing if it has none.
   std::optional<DecodedMask> mask(const std::string& id) const;
-  // The coverage of its mask on a grid finer than the view's: `fine` is source(id) with a lower factor. Empty
-  // where it has none.
+  // The coverage of the view's mask on a finer grid. `fine` is source(id) with a lower factor. Empty if the
+  // view has no mask.
   Tensor<uint8_t> fine_coverage(const std::string& id, const ViewSource& fine) const;
-  // Empties the cache; the named views have no mask from then on. Not beside other calls.
+  // Empties the cache and removes the masks of these views. Must not run during other calls.
   void leave_masks_out(std::span<const std::string> ids);
-  // Empties the cache; the named views have these masks from then on, in place of their files': H×W as the
-  // views are, 255 where the mask covers all of a pixel. Not beside other calls.
+  // Empties the cache and replaces the masks of these views: H×W like the views, 255 if the mask covers the
+  // whole pixel. Must not run during other calls.
   void give_masks(std::unordered_map<std::string, Tensor<uint8_t>> coverage);
   const CaptureSource& capture() const { return capture_; }
   int64_t bytes() const;
   int64_t limit_bytes() const { return limit_bytes_; }
-  // What a view takes in the cache, from its size alone.
+  // Bytes of a view in the cache, computed from its size.
   int64_t bytes_of(const std::string& id) const;
 
  private:

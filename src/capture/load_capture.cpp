@@ -35,8 +35,7 @@ uint8_t grey_level(Background background) {
   return background == Background::white ? 255 : background == Background::grey ? 128 : 0;
 }
 
-// Makes views of what a reader found, step by step; each step leaves its results and warnings in `capture_`
-// and `sources_`.
+// Makes views of what a reader found. Each step stores its results and warnings in `capture_` and `sources_`.
 class Assembly {
  public:
   Assembly(const std::filesystem::path& path, const CaptureOptions& options)
@@ -64,7 +63,7 @@ class Assembly {
     find_tracks();
     find_truth();
     choose_axes();
-    // They quote names from files.
+    // Warnings quote names from files.
     for (Finding& warning : capture_.warnings) warning.text = printable(warning.text, 1000);
     capture_.images = std::make_shared<ImageCache>(std::move(sources_), std::move(shared_),
                                                    options_.cache_mebibytes * (int64_t{1} << 20));
@@ -76,7 +75,7 @@ class Assembly {
     return capture_.warnings.emplace_back(text, kind, severity);
   }
 
-  // The first of the candidates that exists, or none.
+  // The first candidate that exists, or none.
   TreeFile first_file(std::initializer_list<std::string> candidates) const {
     for (const std::string& path : candidates) {
       if (tree_->has(path)) return {tree_, path};
@@ -103,7 +102,7 @@ class Assembly {
     warn_about_sizes();
   }
 
-  // From the first view at 0 to the last at 1.
+  // Scales times so that the first view has 0 and the last has 1.
   void stretch_times() {
     double first = found_.train.front().time, last = first;
     for (const auto* split : {&found_.train, &found_.test}) {
@@ -193,11 +192,11 @@ class Assembly {
     return {found.id, static_cast<float>(found.time), convert<float>(camera)};
   }
 
-  // That single precision holds it after some arithmetic.
+  // Checks that single precision can hold the position, with some margin for arithmetic.
   static void check_position(const FoundView& found, const Vec3<double>& in_scene) {
     constexpr double farthest = 1e15;
     const double distance = length(in_scene);
-    // Also true for a NaN.
+    // Also true for NaN.
     if (!(distance < farthest)) {
       throw InputError(found.camera_name, "position",
                        fmt::format("{:g} scene units from the scene's centre", distance),
@@ -259,7 +258,7 @@ class Assembly {
     }
   }
 
-  // The share of the points that fall into some training image.
+  // The fraction of the points that project into any training image.
   double share_seen() const {
     const int64_t step = std::max<int64_t>(1, capture_.points.dim(0) / 1000);
     int64_t seen = 0, count = 0;
@@ -271,7 +270,7 @@ class Assembly {
     return static_cast<double>(seen) / static_cast<double>(count);
   }
 
-  // Ids of the split's views whose source lacks something.
+  // The ids of the views whose source fails `has`.
   template <class F>
   static std::vector<std::string> ids_without(const std::vector<View>& views,
                                               const std::unordered_map<std::string, ViewSource>& sources,
@@ -307,7 +306,7 @@ class Assembly {
       }
       capture_.has_masks |= static_cast<bool>(source.mask);
     }
-    // Of one kind for all views, or figures would compare one thing with another.
+    // All views use one kind of mask: metrics must not mix two kinds.
     if (!capture_.has_masks) {
       for (auto& [id, source] : sources_) {
         source.mask = in("motion_mask", id);
@@ -346,8 +345,8 @@ class Assembly {
         });
   }
 
-  // The ids that the elements of an array belong to: one for each training id in the order of the capture's
-  // list, or one for each of all ids. Null where neither fits.
+  // The ids that the elements of an array belong to: training ids in the capture's order, or all ids. Null if
+  // the array fits neither.
   const std::vector<std::string>* ids_of_rows(const Shape& shape) const {
     for (const auto* ids : {&found_.train_ids, &found_.all_ids}) {
       if (shape.rank() > 0 && shape[0] == static_cast<int64_t>(ids->size())) return ids;
@@ -396,8 +395,8 @@ class Assembly {
     capture_.tracks = tracks_of_rows(array.read(), rows);
   }
 
-  // size_of_its: width and height of what belongs to a view, if there is such. It reads the header of every
-  // file: one that is no image ends the loading here, not in the middle of a run.
+  // size_of_its: width and height of the view's file of this kind, if it has one. It reads the header of
+  // every file, so an invalid image fails during loading and not later.
   template <class F>
   void warn_about_proportions(const std::string& what, const std::string& kind, F&& size_of_its) {
     std::vector<std::string> misfits;

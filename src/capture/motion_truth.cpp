@@ -34,7 +34,7 @@ Tensor<int32_t> read_objects(const TreeFile& file, int64_t points) {
     throw InputError(file.name(), "shape", array.shape().to_string(),
                      fmt::format("one number for each of the {} points of points.npy", points));
   }
-  // Single precision, in which arrays are read, holds whole numbers up to here.
+  // Arrays are read in single precision, which holds integers exactly up to here.
   constexpr float largest = 1 << 24;
   const Tensor<float> read = array.read();
   Tensor<int32_t> object({points});

@@ -8,17 +8,18 @@ namespace traceflow {
 
 namespace {
 
-// A coefficient's magnitude is half of a whole number up to 510.
+// A coefficient's magnitude is a multiple of 0.5; twice the magnitude is at most 510.
 using Histogram = std::array<int64_t, 511>;
 
-// The median of whole numbers, each standing for all values that round to it.
+// The median of values that were rounded to whole numbers. Each number represents all values that round to
+// it.
 double median_of(const Histogram& histogram, int64_t count) {
   int64_t below = 0;
   size_t i = 0;
   while (2 * (below + histogram[i]) < count) below += histogram[i++];
   const double within =
       (static_cast<double>(count) / 2 - static_cast<double>(below)) / static_cast<double>(histogram[i]);
-  // Magnitude 0 stands for half as wide a range as the others.
+  // Magnitude 0 represents a range half as wide as the others.
   return i == 0 ? within / 2 : static_cast<double>(i) - 0.5 + within;
 }
 

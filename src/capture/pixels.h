@@ -7,12 +7,12 @@
 
 namespace traceflow {
 
-// A view's pixels as they are kept: small. Tensors that the capture lacks are empty.
+// A view's pixels in their compact, cached form. Tensors that the capture lacks are empty.
 struct ViewPixels {
   Tensor<uint8_t> colour;        // H×W×3
-  Tensor<uint8_t> known;         // H×W, 0 and 1; empty where all is known
+  Tensor<uint8_t> known;         // H×W, 0 and 1; empty if all pixels are known
   Tensor<uint8_t> mask;          // H×W
-  Tensor<uint8_t> coverage;      // H×W, 255 where the mask covers all of a pixel
+  Tensor<uint8_t> coverage;      // H×W, 255 if the mask covers the whole pixel
   Tensor<int16_t> normal_prior;  // H×W×3, unit normals times 32767
 
   int64_t bytes() const {
@@ -25,19 +25,19 @@ struct ViewPixels {
   }
 };
 
-// Numbers of [0, 1] and unit or zero normals again, where the pixels are; `images` is resized and put there.
-// prior_turn: the view's. Without with_coverage its coverage stays empty.
+// Converts the pixels, on their device, to numbers in [0, 1] and to unit or zero normals. Resizes `images`
+// and places them there. prior_turn: the view's. If with_coverage is false, the coverage stays empty.
 void widen(const ViewPixels& pixels, const std::optional<Mat3<float>>& prior_turn, ViewImages& images,
            bool with_coverage = true);
 
-// Where a photograph says nothing it takes the colours that were rendered (H×W×3, where the images are): what
-// is not known is no error.
+// Copies the rendered colours (H×W×3, on the images' device) to unknown pixels of the photograph, so that
+// these have no error.
 void take_unknown(const Tensor<float>& rendered, ViewImages& images);
-// What a gradient by the rendered colours (H×W×3) says of unknown pixels, through their neighbours alone,
-// goes.
+// Sets the gradient by the rendered colours (H×W×3) to zero at unknown pixels, where it comes from
+// neighbouring pixels only.
 void leave_unknown(const ViewImages& images, Tensor<float>& grad_colour);
 
-// As load_images, without widening.
+// Like load_images, but does not widen.
 std::shared_ptr<const ViewPixels> load_pixels(const Capture& capture, const View& view);
 
 }  // namespace traceflow

@@ -32,7 +32,7 @@ struct LeaveUnknown {
 
 struct WidenNormal {
   const int16_t* from;
-  const uint8_t* turned;  // the mask, or null: none is turned
+  const uint8_t* turned;  // the mask, or null if no normal is turned
   Mat3<float> turn;
   float* to;
   TRACEFLOW_HD void operator()(int64_t pixel) const {

@@ -12,7 +12,7 @@ namespace traceflow {
 namespace {
 
 constexpr std::array named_axes = {PriorAxes::opengl, PriorAxes::opencv, PriorAxes::stable_normal};
-constexpr int64_t enough = 100;  // samples that decide
+constexpr int64_t enough = 100;  // samples needed to decide an axis
 
 bool decides(double correlation) { return std::abs(correlation) >= 0.3; }
 

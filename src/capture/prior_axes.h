@@ -7,38 +7,39 @@
 #include "capture/capture.h"
 #include "math/camera.h"
 
-// Which way the axes of normal priors point, read off the geometry (docs/captures.md).
+// Determines the axes of normal priors from the geometry (docs/captures.md).
 namespace traceflow {
 
-Vec3<double> prior_axis_signs(PriorAxes axes);  // of any but `automatic`, against OpenCV's
+Vec3<double> prior_axis_signs(PriorAxes axes);  // relative to OpenCV's; not for `automatic`
 std::string prior_axes_name(PriorAxes axes);
 
-// One view's priors, in their own axes, and the camera that they belong to.
+// One view's priors, in their own axes, with the view's camera.
 struct PriorView {
   Camera<float> camera;
   Tensor<float> normal;  // H×W×3, unit or zero
 };
 
-// Per axis the correlation of the priors, in their own axes, with the geometry's normals in OpenCV's; 0 where
-// nothing is known.
+// For each axis, the correlation of the priors, in their own axes, with the geometry's normals in OpenCV's
+// axes; 0 if unknown.
 struct AxisEvidence {
   Vec3<double> correlation{0};
   int64_t samples = 0;
 };
 
-// The geometry's normals are planes through each point's neighbours, turned to the viewer, at points that no
-// nearer one hides. Without points only z is known: what is seen faces the camera.
+// The geometry's normals belong to planes through each visible point's neighbours and are turned to the
+// viewer. Without points only z is known, since visible surfaces face the camera.
 AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<PriorView>& views);
 
-// A few of the views, those nearest to time 0, when the points were there: what the axes are measured on.
+// The few views, nearest to time 0 (when the points were there), on which the axes are measured.
 std::vector<const View*> views_for_axes(std::vector<const View*> with_priors);
 
-// The known axes in which no axis that the evidence decides points the other way.
+// The known axes that contradict no axis that the evidence decides.
 std::vector<PriorAxes> agreeing_axes(const AxisEvidence& evidence);
-// Whether it decides all three.
+// Whether the evidence decides all three axes.
 bool decides_all(const AxisEvidence& evidence);
 
-// The axes to use for what was asked, and a warning where the evidence speaks against them (empty: none).
+// The axes to use for a requested setting, with a warning if the evidence contradicts them (empty: no
+// warning).
 struct AxisChoice {
   PriorAxes axes = PriorAxes::opengl;
   std::string warning;

@@ -13,7 +13,7 @@ namespace traceflow {
 
 namespace {
 
-constexpr int neighbour_count = 12;  // points that a plane is laid through
+constexpr int neighbour_count = 12;  // points that a plane is fitted to
 constexpr int64_t max_points = 20000;
 
 Tensor<float> every_nth(const Tensor<float>& points) {
@@ -24,9 +24,9 @@ Tensor<float> every_nth(const Tensor<float>& points) {
   return kept;
 }
 
-// Unit normals of either sign; zero where the neighbours do not lie in a plane.
+// Unit normals with arbitrary sign; zero if the neighbours do not lie in a plane.
 Tensor<float> point_normals(const Tensor<float>& points) {
-  constexpr double flat = 0.1;  // thickness² against width²
+  constexpr double flat = 0.1;  // limit of thickness² / width²
   const Neighbours near = nearest_neighbours(points, neighbour_count);
   Tensor<float> normals(points.shape());
   parallel_for("capture: planes through points", points.dim(0), [&](int64_t i) {
@@ -47,8 +47,8 @@ Tensor<float> point_normals(const Tensor<float>& points) {
   return normals;
 }
 
-// The nearest depth in each square of the image, of a size that a few points fall into each: what lies well
-// behind it is taken for hidden.
+// The nearest depth in each cell of the image. Cells are large enough to hold a few points each. A point well
+// behind the nearest depth counts as hidden.
 class DepthCells {
  public:
   DepthCells(const Camera<float>& camera, const Tensor<float>& points) : camera_(camera) {

@@ -25,7 +25,7 @@ namespace traceflow::cli {
 
 namespace {
 
-// What holds for every verb.
+// Arguments that every verb has.
 struct GlobalArguments {
   int threads = 0;
   std::string instructions = "automatic";
@@ -66,12 +66,12 @@ void print_profile() {
   }
 }
 
-// Help and version are no errors; the others become one line.
+// Help and version are not errors. Every error becomes one line.
 int finish_parse(const CLI::App& program, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return program.exit(error);
   const auto verbs = program.get_subcommands();
   const std::string name = verbs.empty() ? "traceflow" : "traceflow " + verbs.front()->get_name();
-  // It quotes what was given.
+  // The message quotes the arguments.
   constexpr size_t longest = 1000;
   std::cerr << "traceflow: " << printable(error.what(), longest) << "; see `" << name << " --help`"
             << std::endl;

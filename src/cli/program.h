@@ -2,7 +2,7 @@
 
 namespace traceflow::cli {
 
-// The whole program: parses the arguments, runs the verb, and returns the exit code (error_boundary.h).
+// Parses the arguments, runs the verb and returns the exit code (error_boundary.h).
 int run(int argc, const char* const* argv);
 
 }  // namespace traceflow::cli

@@ -13,7 +13,7 @@ namespace traceflow::eval {
 
 namespace {
 
-// The chosen stored surfels at a time, on the host.
+// The selected surfels posed at a time, on the host.
 Surfels posed_rows(const viz::Subject& subject, const std::vector<int32_t>& rows, float time) {
   if (rows.empty()) return {};
   RowEdit edit;

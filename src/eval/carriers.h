@@ -5,8 +5,8 @@
 
 namespace traceflow::eval {
 
-// The main surfels of a subject that are finite and, at time 0, opaque (opacity above a half), posed as
-// pictures of it show them. Refers to the subject, which must outlive it.
+// The finite main surfels of a subject that are opaque at time 0 (opacity above 0.5), posed as in renders of
+// it. Refers to the subject, which must outlive it.
 Carriers carriers_of(const viz::Subject& subject);
 
 }  // namespace traceflow::eval

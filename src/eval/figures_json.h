@@ -4,7 +4,7 @@
 
 #include "eval/report.h"
 
-// Figures as metrics.json and the report's page have them: one that cannot be had is null.
+// Metrics as JSON, for metrics.json and the report's page. An unavailable metric is null.
 namespace traceflow::eval {
 
 // The value, or null.
@@ -13,11 +13,11 @@ nlohmann::ordered_json figure_json(const std::optional<double>& value);
 // {"main", "environment", "per_masked_pixel"}.
 nlohmann::ordered_json surfels_json(const Report& report);
 
-// Adds every figure by its name. json: an object, not null. A null that [] turns into an object is left
-// broken by nlohmann-json where there is no memory.
+// Adds every metric by its name. json: an object, not null. When nlohmann-json's [] turns a null into an
+// object and memory runs out, it leaves the value broken.
 void put_figures(const Metrics& metrics, nlohmann::ordered_json& json);
 
-// {"mean", "objects"}; null where the capture has no truth of the motion.
+// {"mean", "objects"}; null if the capture has no true motion.
 nlohmann::ordered_json motion_json(const std::optional<MotionReport>& motion);
 
 }  // namespace traceflow::eval

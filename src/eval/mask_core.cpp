@@ -12,7 +12,7 @@ namespace {
 
 constexpr int64_t rims_in_width = 60;
 
-// For every pixel the distance to the nearest one outside the mask in its column, radius + 1 at most.
+// For every pixel, the distance to the nearest pixel outside the mask in its column, at most radius + 1.
 Tensor<int32_t> distances_in_columns(const Tensor<uint8_t>& mask, int64_t radius) {
   const int64_t height = mask.dim(0), width = mask.dim(1);
   const auto farthest = static_cast<int32_t>(radius + 1);
@@ -40,7 +40,7 @@ int64_t rim_of(int64_t image_width) {
 
 Tensor<uint8_t> eroded(const Tensor<uint8_t>& mask, int64_t radius) {
   const int64_t height = mask.dim(0), width = mask.dim(1);
-  // In a column `dx` aside the disk reaches as far as half_height[dx].
+  // At a horizontal distance of dx the disk's half height is half_height[dx].
   std::vector<int32_t> half_height;
   for (int64_t dx = 0; dx <= radius; ++dx) {
     half_height.push_back(static_cast<int32_t>(std::sqrt(static_cast<double>(radius * radius - dx * dx))));

@@ -7,8 +7,8 @@
 
 namespace traceflow::eval {
 
-// Of numbers that are all numbers, one at least; their order is lost. Of an even count the middle between the
-// two in the middle.
+// The median of at least one number, none of them NaN. Reorders the values. For an even count, the mean of
+// the two middle values.
 template <class T>
 double median(std::span<T> values) {
   require(!values.empty(), "a median is of something");

@@ -16,7 +16,7 @@ namespace {
 
 const uint8_t* address(const Tensor<uint8_t>& mask) { return mask.empty() ? nullptr : mask.data(); }
 
-// The sum of f(pixel), which the host waits for.
+// The sum of f(pixel); the host waits for it.
 template <class F>
 CountedSum sum_of(Device device, const char* description, int64_t pixels, const F& f) {
   Tensor<CountedSum> kept({1}, device);
@@ -29,7 +29,7 @@ std::optional<double> mean_of(const CountedSum& sum) {
   return sum.sum / static_cast<double>(sum.count);
 }
 
-// Empty tensors lie anywhere.
+// Empty tensors may be on any device.
 template <class T>
 void require_beside(const Tensor<float>& picture, const Tensor<T>& other) {
   require(other.empty() || other.device() == picture.device(), "a figure's pictures lie on one device");
@@ -51,7 +51,7 @@ std::optional<double> psnr_of(const CountedSum& squared_error) {
   return -10 * std::log10(*error);
 }
 
-// A tensor on a device: itself where it is there, else a copy in `room`.
+// The tensor on a device: itself if it is there, else a copy in `room`.
 template <class T>
 const Tensor<T>& brought(const Tensor<T>& tensor, Device device, Tensor<T>& room) {
   if (tensor.empty() || tensor.device() == device) return tensor;
@@ -67,7 +67,7 @@ Tensor<float> rounded(const Tensor<float>& image) {
   return result;
 }
 
-// The pixels of both masks; where one is empty, the other.
+// The intersection of both masks; if one is empty, the other.
 const Tensor<uint8_t>& both(const Tensor<uint8_t>& mask, const Tensor<uint8_t>& known,
                             Tensor<uint8_t>& room) {
   if (mask.empty() || known.empty()) return mask;
@@ -78,7 +78,7 @@ const Tensor<uint8_t>& both(const Tensor<uint8_t>& mask, const Tensor<uint8_t>& 
   return room;
 }
 
-// What else a mask says, where it is.
+// The core of a mask and what is outside the mask, on its device.
 struct Masks {
   Tensor<uint8_t> core, outside;
 };
@@ -92,7 +92,7 @@ Masks masks_of(const Tensor<uint8_t>& mask) {
   return masks;
 }
 
-// Of the errors that count, on the host. Of an even number the middle between the two in the middle.
+// The median of the errors that count, on the host. For an even count, the mean of the two middle values.
 std::optional<double> median_error(const Tensor<float>& errors, const Tensor<uint8_t>& mask) {
   std::vector<float> counted;
   for (int64_t i = 0; i < errors.size(); ++i) {

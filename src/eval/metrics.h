@@ -6,21 +6,21 @@
 #include "base/tensor.h"
 #include "ops/lpips/lpips.h"
 
-// How near a rendered view comes to the photograph (method §8). Every figure is absent where it cannot be
-// had. Figures are computed where the pictures are; the host waits for each.
+// Compares a rendered view with the photograph (method §8). A metric that is not available is absent. Metrics
+// are computed on the images' device; the host waits for each.
 namespace traceflow::eval {
 
 struct Metrics {
-  std::optional<double> psnr;  // dB; absent for equal images, whose PSNR has no bound
+  std::optional<double> psnr;  // dB; absent for equal images
   std::optional<double> ssim;
-  std::optional<double> lpips;            // [−1, 1] input, as defined
-  std::optional<double> lpips_published;  // [0, 1] input, as published tables used it
+  std::optional<double> lpips;            // input in [−1, 1], as defined
+  std::optional<double> lpips_published;  // input in [0, 1], as in published tables
   std::optional<double> masked_psnr;
   std::optional<double> masked_ssim;
-  std::optional<double> core_psnr;  // in the mask without its rim (eval/mask_core.h)
+  std::optional<double> core_psnr;  // in the core of the mask (eval/mask_core.h)
   std::optional<double> normal_mae_deg;
   std::optional<double> masked_normal_mae_deg;
-  // Of |rendered z / true z − 1| inside the mask, in its core and outside it.
+  // Errors |rendered z / true z − 1| inside the mask, in its core and outside it.
   std::optional<double> masked_depth_error_median;
   std::optional<double> masked_depth_error_mean;
   std::optional<double> core_depth_error_median;
@@ -28,7 +28,7 @@ struct Metrics {
   std::optional<double> outside_depth_error_median;
   std::optional<double> outside_depth_error_mean;
 
-  // f(name, value) for every figure, in the order of the report.
+  // Calls f(name, value) for every metric, in the order of the report.
   template <class Self, class F>
   static void visit(Self& self, F&& f) {
     f("psnr", self.psnr);
@@ -49,25 +49,25 @@ struct Metrics {
   }
 };
 
-// 10·log10(1 / mean squared error) over all channels of all pixels, or of the pixels where the mask (H×W) is
-// not zero when there is one. Absent when the mask holds no pixel, and when the error is zero or not finite.
+// 10·log10(1 / mean squared error) over all channels of all pixels or, with a mask (H×W), of its nonzero
+// pixels. Absent if the mask is empty, or if the error is zero or not finite.
 std::optional<double> psnr(const Tensor<float>& image, const Tensor<float>& target,
                            const Tensor<uint8_t>& mask);
 
-// Mean angle in degrees between the rendered normal (any length) and the truth (unit) where truth is not
-// zero, within the mask when there is one. Where nothing was rendered the angle is 90: a hole must not
-// improve the figure.
+// Mean angle in degrees between the rendered normal (any length) and the true one (unit), where the true one
+// is not zero and, with a mask, inside it. Pixels where nothing was rendered count as 90°, so that holes do
+// not improve the metric.
 std::optional<double> normal_mae_deg(const Tensor<float>& normal, const Tensor<float>& truth,
                                      const Tensor<uint8_t>& mask);
 
-// |rendered z / true z − 1| of every pixel (H×W each, any units: z_per_truth turns true ones into rendered
-// ones), −1 where there is no truth (0). Where nothing was rendered the error is 1, that of a depth of 0: a
-// hole must not improve the figure. Nothing is a depth that is not positive and finite, and one under an
-// alpha below 0.5, where more is seen through than is seen; alpha may be empty.
+// |rendered z / true z − 1| of every pixel (H×W each, any units: z_per_truth converts true depths to rendered
+// units), −1 if the true depth is unknown (0). Where nothing was rendered the error is 1, as for a depth of
+// 0, so that holes do not improve the metric. Nothing was rendered if the depth is not positive and finite or
+// if alpha is below 0.5, since then most light comes from behind. alpha may be empty.
 Tensor<float> depth_errors(const Tensor<float>& depth, const Tensor<float>& alpha, const Tensor<float>& truth,
                            double z_per_truth);
 
-// What was rendered, all on one device. Depth and alpha may be empty: no depth errors, alpha 1.
+// The rendered layers, all on one device. Depth and alpha may be empty: no depth errors, alpha 1.
 struct Rendered {
   const Tensor<float>& colour;  // H×W×3
   const Tensor<float>& normal;  // H×W×3, any length
@@ -75,22 +75,22 @@ struct Rendered {
   const Tensor<float>& alpha;   // H×W
 };
 
-// What a view is judged against, on any device. Tensors that the capture lacks are empty.
+// The ground truth of a view, on any device. Tensors that the capture lacks are empty.
 struct Truth {
   const Tensor<float>& colour;
   const Tensor<uint8_t>& mask;
   const Tensor<float>& normal;
-  const Tensor<uint8_t>* known = nullptr;  // H×W, where colours count; null or empty: everywhere
-  const Tensor<float>* depth = nullptr;    // H×W, 0 where there is none; null or empty: nowhere
-  double z_per_truth = 1;                  // rendered units in one of the true depth's
+  const Tensor<uint8_t>* known = nullptr;  // H×W, where colours are known; null or empty: everywhere
+  const Tensor<float>* depth = nullptr;    // H×W, 0 if unknown; null or empty: all unknown
+  double z_per_truth = 1;                  // rendered units per unit of true depth
 };
 
-// All figures of one view, computed where its colours are, but for the mask's core and the medians, which the
-// host finds. Colours are rounded to 8 bit first. network may be null: no LPIPS. The mean errors of colours
-// are over known pixels; LPIPS takes the picture as a whole.
+// All metrics of one view, computed on the device of its colours, except the mask's core and the medians,
+// which the host computes. Colours are first rounded to 8 bits. network may be null: no LPIPS. Means of
+// colour errors are over known pixels; LPIPS uses the whole image.
 Metrics measure(const Rendered& rendered, const Truth& truth, const lpips::Network* network);
 
-// Each figure's mean over the views that have it.
+// The mean of each metric over the views that have it.
 Metrics mean(const std::vector<Metrics>& views);
 
 }  // namespace traceflow::eval

@@ -8,11 +8,11 @@
 #include "math/types.h"
 #include "primitives/sums.h"
 
-// The figures' steps: one pixel or number each, which return what it adds to the sum (method §8).
+// Kernels of the metrics (method §8). Each returns the contribution of one pixel or number to the sum.
 namespace traceflow::eval {
 
 inline constexpr int64_t pixels_per_sum = 4096;
-inline constexpr float least_alpha = 0.5F;  // of a depth
+inline constexpr float least_alpha = 0.5F;  // below it nothing was rendered
 inline constexpr float no_error = -1;
 
 struct KeepSum {
@@ -57,11 +57,11 @@ struct SquaredError {
   }
 };
 
-// Between directions of any length; 90 where one has none.
+// Angle between directions of any length; 90 if one has length zero.
 TRACEFLOW_HD inline double angle_deg(const Vec3<double>& normal, const Vec3<double>& truth) {
   const double length = std::sqrt(dot(normal, normal) * dot(truth, truth));
   if (!(length > 0) || !std::isfinite(length)) return 90;
-  // atan2 of sine and cosine keeps small angles exact where acos of a rounded cosine does not.
+  // atan2 of sine and cosine is accurate for small angles; acos of a rounded cosine is not.
   const Vec3<double> sine = cross(normal, truth);
   return std::atan2(std::sqrt(dot(sine, sine)), dot(normal, truth)) * 180 / std::numbers::pi;
 }
@@ -77,7 +77,7 @@ struct NormalError {
   }
 };
 
-// alpha null: everywhere 1.
+// alpha null: 1 everywhere.
 struct DepthErrors {
   const float *depth, *alpha, *truth;
   double z_per_truth;
@@ -93,7 +93,7 @@ struct DepthErrors {
   }
 };
 
-// Errors are not negative; others are none.
+// Errors are not negative; negative values do not count.
 struct MeanError {
   const float* errors;
   const uint8_t* mask;

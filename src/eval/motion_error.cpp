@@ -17,8 +17,8 @@ using Points = std::vector<Vec3<double>>;
 
 constexpr int carriers_of_a_point = 8;
 constexpr double kernel_width = 0.02;  // standard deviation of the weights, capture units
-constexpr double least_weight = 1e-3;  // of all carriers together: nearer than 3.7 standard deviations
-constexpr size_t least_points = 4;     // of a thing that is followed
+constexpr double least_weight = 1e-3;  // of all carriers: the nearest is within 3.7 standard deviations
+constexpr size_t least_points = 4;     // of an object with metrics
 constexpr int sampled_times = 8;
 
 Points points_at(const MotionTruth& truth, int64_t time) {
@@ -28,7 +28,7 @@ Points points_at(const MotionTruth& truth, int64_t time) {
   return points;
 }
 
-// Which surfels carry each point, and how much of it.
+// The surfels that carry each point, with their weights.
 class Hold {
  public:
   Hold(const Points& points, const Carriers& surfels)
@@ -56,7 +56,7 @@ class Hold {
 
   bool holds(size_t point) const { return !carriers_[point].empty(); }
 
-  // Where the points that are held get to; the others stay.
+  // Positions of the points at a time; points without carriers stay.
   Points at(float time) const {
     const Tensor<double> now = surfels_.at(listed_, time);
     Points carried = point_;
@@ -99,7 +99,7 @@ MotionMoment moment_of(double time, const Points& rest, const Points& truth, con
   return m;
 }
 
-// The mean over the sampled times; gives the curve its shares.
+// Means over the sampled times. Also sets the shares of the curve.
 MotionFigures figures_of(std::vector<MotionMoment>& curve) {
   const auto mean_of_sampled = [&](double MotionMoment::*figure) {
     double sum = 0;

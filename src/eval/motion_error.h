@@ -7,28 +7,28 @@
 
 #include "capture/motion_truth.h"
 
-// How far the surfels follow the true motion of a capture's moving things. A point of a thing is carried by
-// the opaque surfels that lie around it at time 0: it moves by the mean of what they move by, with weights
-// that fall with their distance. Where it ends up is compared with where it truly is.
+// Measures how well the surfels follow the true motion of a capture's moving objects. The opaque surfels
+// around a point at time 0 carry it: it moves by the weighted mean of their displacements, with weights that
+// fall with distance. The result is compared with the true position.
 namespace traceflow::eval {
 
-// One thing at one time. Lengths are the capture's own.
+// One object at one time. Lengths are in the capture's units.
 struct MotionMoment {
   double time = 0;                // in [0, 1]
-  double moved = 0;               // median distance of the true points from where they are at time 0
+  double moved = 0;               // median distance of the true points from their positions at time 0
   double missed = 0;              // median distance of the carried points from the true ones
-  std::optional<double> share;    // missed, by what the thing moves in the mean (MotionFigures::moved)
-  double rotation_error_deg = 0;  // between the rotations of the similarities that fit both motions best
-  double scale = 1;               // of the one that fits the carried points
-  double true_scale = 1;          // of the one that fits the true ones
+  std::optional<double> share;    // missed, over the object's mean motion (MotionFigures::moved)
+  double rotation_error_deg = 0;  // between the rotations of the best fits (similarity) to both motions
+  double scale = 1;               // of the transform that fits the carried points
+  double true_scale = 1;          // of the transform that fits the true points
 };
 
-// One thing in the mean over eight times that are evenly spread behind time 0, each figure as in
-// MotionMoment. All are absent for a thing of which fewer than four points have surfels around them; the
-// share is absent too for one that does not move.
+// One object: means over eight evenly spaced times after time 0, each metric as in MotionMoment. All are
+// absent if fewer than four points have surfels around them. The share is also absent for an object that does
+// not move.
 struct MotionFigures {
   std::optional<double> moved, missed;
-  std::optional<double> share;  // 1: not followed at all
+  std::optional<double> share;  // 1: as bad as no motion at all
   std::optional<double> rotation_error_deg, scale, true_scale;
 
   template <class Self, class F>
@@ -44,21 +44,21 @@ struct MotionFigures {
 
 struct ObjectMotion {
   int32_t object = 0;
-  int64_t points = 0;           // that the capture knows
-  int64_t followed_points = 0;  // that have surfels around them; all figures are of these
+  int64_t points = 0;           // in the capture
+  int64_t followed_points = 0;  // with surfels around them; all metrics are over these
   MotionFigures figures;
-  std::vector<MotionMoment> curve;  // all times, the first (0) included; empty where there are no figures
+  std::vector<MotionMoment> curve;  // all times, including the first (0); empty if there are no metrics
 };
 
 struct MotionReport {
-  MotionFigures mean;  // of the things that have the figure, by their followed points
+  MotionFigures mean;  // over the objects that have the metric, weighted by their followed points
   std::vector<ObjectMotion> objects;
 };
 
-// Surfels that points can be carried by.
+// Surfels that carry points.
 struct Carriers {
-  Tensor<double> rest;  // M×3, at time 0, the capture's own coordinates
-  // Positions (K×3) of the listed ones at a time. One that is not finite is taken to stay where it was.
+  Tensor<double> rest;  // M×3, at time 0, the capture's coordinates
+  // Positions (K×3) of the listed surfels at a time. One that is not finite counts as not moved.
   std::function<Tensor<double>(const std::vector<int32_t>& listed, float time)> at;
 };
 

@@ -23,14 +23,14 @@ void evaluate(const viz::Subject& subject, const Capture& capture, const std::ve
   report.main_surfels = subject.scene.main.count();
   report.environment_surfels = subject.scene.environment.count();
   const std::optional<MotionTruth> motion = load_motion_truth(capture);
-  // True depths are in the capture's scene units, which may be others than the run's.
+  // True depths are in the capture's scene units, which may differ from the run's.
   const double z_per_truth = subject.scene.normalisation.scale / capture.normalisation.scale;
   Renderer renderer(subject.render);
   double seconds = 0;
   int64_t masked_surfels = 0, masked_pixels = 0;
   for (const View& view : views) {
     FrameRequest request = subject.request;
-    // The capture may have gained views since, and with them another normalisation than the run's.
+    // If views were added to the capture since training, its normalisation differs from the run's.
     request.camera = carried(view.camera, capture.normalisation, subject.scene.normalisation);
     request.time = view.time;
     const Clock::time_point start = Clock::now();
@@ -40,7 +40,7 @@ void evaluate(const viz::Subject& subject, const Capture& capture, const std::ve
 
     const std::shared_ptr<const ViewImages> images = load_images(capture, view);
     const ViewTruth truth = capture.has_truth ? load_truth(capture, view) : ViewTruth{};
-    // Copied where that is needed alone: at the limit of memory a photograph counts.
+    // Copied only if needed, since memory for a photograph matters near the limit.
     const bool is_all_known = images->known.empty();
     ViewImages filled = is_all_known ? ViewImages{} : *images;
     if (!is_all_known) take_unknown(frame.colour.on(Device::cpu), filled);

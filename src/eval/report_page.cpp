@@ -17,7 +17,7 @@ constexpr size_t page_cap = 15'000'000;
 constexpr std::string_view place = R"(id="report">null</script>)";
 constexpr std::string_view before_data = R"(id="report">)";
 
-// `<` only stands in strings.
+// In JSON, `<` occurs only in strings.
 std::string text_of(const Json& json) {
   const std::string plain = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   std::string text;
@@ -59,7 +59,7 @@ Json picture_json(const ReportPicture& p) {
           {"normal", p.normal},   {"depth", p.depth}};
 }
 
-// Everything but the pictures.
+// Everything except the pictures.
 Json page_json(const ReportPage& page) {
   const Report& report = page.report;
   Json json = {{"version", page.version},
@@ -105,7 +105,7 @@ std::string report_page(const ReportPage& page, std::string_view html) {
           "the report's template has one place for its data");
   const size_t begin = found + before_data.size();
   std::string data = text_of(page_json(page));
-  // Goes on where the object ends.
+  // Continues the object in place of its closing brace.
   data.back() = ',';
   data += R"("pictures":[)";
   size_t room = page_cap - std::min(page_cap, html.size() + data.size());

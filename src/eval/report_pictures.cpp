@@ -19,13 +19,13 @@ constexpr int64_t longest_side = 1280;
 constexpr int64_t narrowest = 32;
 constexpr std::array<int, 5> qualities = {92, 85, 75, 62, 50};
 
-// The view's pictures in the order of ReportPicture.
+// The view's pictures, in the order of ReportPicture.
 using Pictures = std::array<Tensor<uint8_t>, 7>;
 constexpr std::array<std::string ReportPicture::*, 7> places = {
     &ReportPicture::photograph, &ReportPicture::rgb,    &ReportPicture::difference, &ReportPicture::diffuse,
     &ReportPicture::specular,   &ReportPicture::normal, &ReportPicture::depth};
 
-// As data: addresses; the number of their bytes.
+// Encodes as data: URLs and returns their number of bytes.
 size_t encode(const Pictures& pictures, int quality, ReportPicture& result) {
   size_t bytes = 0;
   for (size_t i = 0; i < pictures.size(); ++i) {

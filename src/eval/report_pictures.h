@@ -8,26 +8,26 @@
 
 namespace traceflow::eval {
 
-// One view in a report: each picture a data: address of a JPEG, all of one size.
+// One view in a report: each picture is a JPEG as a data: URL, all of one size.
 struct ReportPicture {
   std::string id;
   int64_t width = 0, height = 0;
   std::string photograph, rgb, difference, diffuse, specular, normal, depth;
 };
 
-// Whether item i of n is among `wanted` that are spread evenly over them.
+// Whether item i of n is one of `wanted` evenly spaced ones.
 bool among_spread(size_t i, size_t n, size_t wanted);
 
-// Makes the pictures of a report, in `budget` bytes of page at most: twelve views, or all where there are
-// fewer, share it evenly. Each view's seven pictures are at most 1280 pixels a side and as good (quality 92
-// down to 50) as its share holds; only what is still too large then gets smaller.
+// Makes the pictures of a report within `budget` bytes of the page. Up to twelve views share it evenly. Each
+// view has seven pictures of at most 1280 pixels a side, with the highest JPEG quality (92 down to 50) that
+// fits its share. If quality 50 is still too large, the pictures are made smaller.
 class ReportPictures {
  public:
   explicit ReportPictures(size_t views, size_t budget = 10'500'000);
 
-  // Whether view i of all is to be added.
+  // Whether view i should be added.
   bool wants(size_t i) const { return among_spread(i, views_, shown_); }
-  // photograph, and what of it is known (H×W, may be empty): on the host; the frame is on any device.
+  // photograph and its known pixels (H×W, may be empty): on the host; the frame is on any device.
   void add(const std::string& id, const Tensor<float>& photograph, const Frame& frame,
            const Tensor<uint8_t>& known = {});
   std::vector<ReportPicture> take() { return std::move(pictures_); }

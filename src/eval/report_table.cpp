@@ -16,7 +16,7 @@ struct Column {
   double factor = 1;
 };
 
-// Depths by their medians alone: the means stand in metrics.json.
+// Depth errors appear only as medians; metrics.json also has the means.
 constexpr std::array<Column, 12> columns = {{
     {"PSNR", &Metrics::psnr, 2},
     {"SSIM", &Metrics::ssim, 4},
@@ -32,7 +32,7 @@ constexpr std::array<Column, 12> columns = {{
     {"odepth%", &Metrics::outside_depth_error_median, 2, 100},
 }};
 
-// A figure that cannot be had is a dash.
+// A dash for a metric that is not available.
 std::string table_line(const std::string& label, size_t width, const std::vector<Column>& shown,
                        const Metrics& m) {
   std::string line = fmt::format("{:<{}}", label, width);
@@ -43,7 +43,7 @@ std::string table_line(const std::string& label, size_t width, const std::vector
   return line + "\n";
 }
 
-// A line for each thing, and the mean.
+// A line for each object, and the mean.
 std::string motion_text(const MotionReport& report) {
   const auto figures = [](const MotionFigures& f) {
     return fmt::format(

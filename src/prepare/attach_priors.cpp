@@ -28,7 +28,8 @@ namespace {
 namespace fs = std::filesystem;
 using Say = std::function<void(const std::string& line)>;
 
-// What is attached in one go: a folder or a file, and all that a reader would take beside or before it.
+// One kind of data: the new folder or file, and the existing ones that a reader would use together with it or
+// before it.
 struct Kind {
   const char* name;
   std::vector<const char*> replaced;
@@ -38,11 +39,12 @@ const std::array<Kind, 3> kinds = {{{"normal", {"normal", "normal.npz", "normal.
                                     {"tracks.npy", {"tracks.npy"}}}};
 const Kind &normals_kind = kinds[0], &masks_kind = kinds[1], &tracks_kind = kinds[2];
 
-// Everything new lies here, until it is whole.
+// Holds new data until it is complete.
 class Staging {
  public:
   explicit Staging(const fs::path& capture) : capture_(capture), folder_(capture / ".attach-priors") {
-    // Killed between putting the old aside and putting the new in its place.
+    // An earlier process may have been killed after it moved the old data away and before it moved the new
+    // data in.
     for (const Kind& kind : kinds) {
       if (fs::exists(folder_ / kind.name)) put_back(kind);
     }
@@ -57,7 +59,7 @@ class Staging {
   Staging& operator=(const Staging&) = delete;
 
   fs::path operator/(const fs::path& name) const { return folder_ / name; }
-  // Puts what was made here in the place of what the capture has: all, or none.
+  // Replaces the capture's data with the new data: all of it, or none.
   void move_in() const {
     std::vector<const Kind*> moved;
     try {
@@ -115,7 +117,7 @@ ViewIds ids_in(const Capture& capture, const CaptureOptions& options) {
   return ids;
 }
 
-// What is asked of a capture is the same at any size, and some keep smaller photographs alone.
+// The requested data does not depend on the size, and some captures only have smaller images.
 CaptureOptions at_largest_size(const fs::path& capture) {
   CaptureOptions options;
   const auto is_there = [&] {
@@ -127,7 +129,7 @@ CaptureOptions at_largest_size(const fs::path& capture) {
   return options;
 }
 
-// f(id, what belongs to it), in the order of the source.
+// Calls f(id, data of this view), in the order of the source.
 template <class Source, class F>
 void for_each_view(const std::map<std::string, int64_t>& matched, Source&& take, F&& f) {
   std::map<int64_t, std::string> by_index;

@@ -36,29 +36,28 @@ struct AttachOptions {
   void validate() const;
 };
 
-// Puts normals, masks and tracks of other programs into the folder of a capture of any format:
-// normal/1x/ID.png with 16 bits and the axes that are the default there (x right, y up, z to the viewer),
-// mask/1x/ID.png.png, tracks.npy. `say` gets a line for everything found. Throws InputError, with the capture
-// as it was, also where another process is at it; and Stopped.
+// Adds normals, masks and tracks of other programs to a capture of any format: normal/1x/ID.png with 16 bits
+// and the default axes (x right, y up, z to the viewer), mask/1x/ID.png.png, tracks.npy. `say` gets a line
+// for each result. Throws InputError, also if another process is changing the capture, and Stopped; the
+// capture is then unchanged.
 void attach_priors(const std::filesystem::path& capture, const AttachOptions& options,
                    const std::function<void(const std::string& line)>& say, const std::atomic<bool>& stop);
 
-// The ids of a capture's views in its own order, and all that it lists, of which some may have no photograph
-// or stand in neither split.
+// The ids of a capture's views in its own order, and all ids that it lists. Some of these may have no
+// photograph or be in neither split.
 struct ViewIds {
   std::vector<std::string> train, all;
   std::vector<std::string> listed_train, listed;
 };
 
-// Which of `count` pictures belongs to which view: by name, where every training view finds its own; else by
-// order, one for each training view, for each view, or for each that is listed so. Throws InputError where
-// none of these fits.
+// Assigns `count` images to views. By name, if each training view has an image of its name. Else by order, if
+// there is one for each training view, for each view or for each listed id. Otherwise throws InputError.
 std::map<std::string, int64_t> match_views(const std::string& origin, const std::vector<std::string>& names,
                                            int64_t count, const ViewIds& ids);
 
-// The signs of the axes of normals against the camera's (x right, y down, z forward), and in words how they
-// were found. automatic: the one of the known axes that the evidence agrees with, else the evidence's own;
-// InputError where several agree, or it does not decide.
+// The signs of the normals' axes relative to the camera's (x right, y down, z forward), and a text on how
+// they were found. automatic: the known axes that the evidence agrees with, else the evidence's own. Throws
+// InputError if several agree, or if the evidence does not decide.
 struct FoundAxes {
   Vec3<double> signs{1};
   std::string text;

@@ -33,12 +33,12 @@ constexpr std::array<const char*, 9> own_names{"rgb",           "camera",       
                                                "motion_mask",   "points.npy",   "scene.json",
                                                "metadata.json", "dataset.json", marker};
 
-// A frame that has a pose.
+// A frame with its pose.
 struct PosedFrame {
   const Frame* frame = nullptr;
   Lens lens;
   double zoom = 1;
-  Camera<double> camera;  // straightened, in COLMAP's coordinates
+  Camera<double> camera;  // undistorted, in COLMAP's coordinates
 };
 
 Camera<double> straightened_camera(const Lens& lens, double zoom, const ColmapImage& image) {
@@ -75,8 +75,8 @@ std::vector<PosedFrame> posed_frames(const CaptureParts& parts) {
   return posed;
 }
 
-// Each size shows the whole picture, also of a side that does not divide: readers scale the camera to what is
-// stored.
+// Each size shows the whole image, even if a side is not divisible: readers scale the camera to the stored
+// size.
 void write_halved(const Tensor<float>& image, const fs::path& folder, const std::string& name) {
   for (const int factor : {1, 2, 4}) {
     const int64_t width = image.dim(1) / factor, height = image.dim(0) / factor;
@@ -121,12 +121,12 @@ PlacedCamera placed(const Camera<double>& camera) {
   Mat3<double> pixels(1);
   pixels[0][0] = camera.focal_x;
   pixels[1][1] = camera.focal_y;
-  // Tracks count pixels from the first one's centre.
+  // Tracks have their origin at the centre of the first pixel.
   pixels[2] = Vec3<double>(camera.centre_x - 0.5, camera.centre_y - 0.5, 1);
   return {pixels, camera.camera_from_world, camera.position};
 }
 
-// Two cameras at nearly one place have no epipolar lines to speak of.
+// Returns nothing for two cameras at nearly one place: they have no useful epipolar lines.
 std::optional<TwoView> lines_between(const PosedFrame& a, const PosedFrame& b, double typical_depth) {
   constexpr double least_parallax = 2;  // pixels, at the typical depth
   const double parallax = length(a.camera.position - b.camera.position) / typical_depth * a.camera.focal_x;
@@ -166,7 +166,7 @@ double typical_depth(const std::vector<Vec3<double>>& points, const std::vector<
   return depths.empty() ? 1 : median(std::move(depths));
 }
 
-// Milliseconds; of pictures without times, their places.
+// Milliseconds or, for images without times, their indices.
 int64_t time_of(const Frame& frame) {
   return std::llround(frame.is_of_film() ? 1000 * frame.time : frame.time);
 }
@@ -248,7 +248,7 @@ void check_place(const fs::path& capture) {
                      "choose another folder, or move what is there away");
   };
   if (!fs::is_directory(capture)) refuse("a file");
-  // It would be another folder afterwards, and this one gone.
+  // Replacing it would leave the process in the moved folder.
   if (fs::equivalent(capture, fs::current_path())) refuse("the folder that you are in");
   if (fs::is_empty(capture)) return;
   if (!fs::exists(capture / marker)) refuse("other files in it");
@@ -261,7 +261,8 @@ void check_place(const fs::path& capture) {
 }
 
 void check_movable(const fs::path& capture, const fs::path& trial) {
-  // A capture is not moved for it: whoever ends this program in between would find none.
+  // An existing capture is not moved for this test: if the program were killed in between, the capture would
+  // be missing.
   if (!fs::is_directory(capture) || !fs::is_empty(capture)) return;
   std::error_code error;
   fs::rename(capture, trial, error);

@@ -8,7 +8,7 @@ namespace traceflow::prepare {
 
 namespace {
 
-// The candidates that --start and --end leave.
+// The candidates from --start to --end.
 std::vector<int64_t> within(const std::vector<Candidate>& candidates, const PrepareOptions& options) {
   std::vector<int64_t> kept;
   for (size_t i = 0; i < candidates.size(); ++i) {
@@ -27,7 +27,7 @@ std::vector<int64_t> choose_frames(const std::vector<Candidate>& candidates, con
   if (usable.empty() || (options.rate == 0 && count <= options.frames)) return usable;
   const auto at = [&](int64_t i) -> const Candidate& { return candidates[static_cast<size_t>(i)]; };
   const double first = at(usable.front()).time, last = at(usable.back()).time;
-  // The last candidate is seen for as long as the others.
+  // The last candidate also lasts one interval between candidates.
   const double duration = (last - first) * count / std::max(1.0, count - 1);
   const double interval = options.rate > 0 ? 1 / options.rate : duration / options.frames;
   if (!(interval > 0)) return {usable.front()};
@@ -35,7 +35,7 @@ std::vector<int64_t> choose_frames(const std::vector<Candidate>& candidates, con
   std::vector<int64_t> chosen;
   int64_t open = -1;
   for (const int64_t i : usable) {
-    // Times that fall on a border up to rounding belong to the interval that begins there.
+    // Times at a border, up to rounding, belong to the interval that starts there.
     const auto here = static_cast<int64_t>(std::floor((at(i).time - first) / interval + 1e-6));
     if (here != open) {
       chosen.push_back(i);
@@ -64,7 +64,7 @@ std::vector<int64_t> nearest_frames(const std::vector<Candidate>& candidates,
   const auto distance = [&](size_t i) {
     return std::abs(candidates[static_cast<size_t>(nearest[i])].time - times[i]);
   };
-  size_t last = 0;  // the last one so far that keeps its candidate
+  size_t last = 0;  // the last time so far that keeps its candidate
   for (size_t i = 1; i < times.size(); ++i) {
     if (nearest[i] < 0) continue;
     const bool shared = nearest[last] == nearest[i];

@@ -27,22 +27,23 @@ std::string filters(const Film& film) {
   return chain + "showinfo=checksum=0";
 }
 
-// What ffmpeg is called with.
+// ffmpeg's command line.
 std::vector<std::string> words_for(const Film& film) {
   const std::string path = std::filesystem::absolute(film.path).string();
   std::vector<std::string> words{"ffmpeg", "-nostdin", "-hide_banner", "-nostats", "-loglevel", "info"};
   const auto add = [&](const std::vector<std::string>& more) {
     words.insert(words.end(), more.begin(), more.end());
   };
-  // The name of a picture, "a%d.png", would else stand for many others; that of a film does not.
+  // An image's name such as "a%d.png" would be taken for a pattern; a video's would not.
   if (film.is_still && path.find('%') != std::string::npos) add({"-f", "image2", "-pattern_type", "none"});
-  // "file:" keeps names from being taken for options and protocols; V is no attached picture, as a cover is.
+  // "file:" prevents names from being read as options or protocols. V excludes attached images such as
+  // covers.
   add({"-i", "file:" + path, "-map", "0:V:0", "-vf", filters(film), "-fps_mode", "passthrough"});
   add({"-f", "image2pipe", "-c:v", film.grey ? "pgm" : "ppm", "-pix_fmt", film.grey ? "gray" : "rgb24", "-"});
   return words;
 }
 
-// The whole number after `key` in the line, which may have spaces before it.
+// The integer after `key` in the line; spaces may precede it.
 std::optional<int64_t> number_after(const std::string& line, const std::string& key) {
   const size_t at = line.find(key);
   if (at == std::string::npos) return std::nullopt;
@@ -54,8 +55,8 @@ std::optional<int64_t> number_after(const std::string& line, const std::string& 
   return number;
 }
 
-// Seconds of the pictures that showinfo has told of, until one has no time. They are counted in the film's
-// own unit of time: showinfo's seconds have six digits, too few late in a long film.
+// Seconds of the images in showinfo's output, up to the first without a time. They are counted in the video's
+// time base: showinfo's seconds have six digits, too few late in a long video.
 std::vector<double> read_times(const std::filesystem::path& log) {
   const std::string unit_key = " config in time_base: ";
   std::vector<double> times;

@@ -9,22 +9,22 @@
 
 namespace traceflow::prepare {
 
-// A film, or one picture, as ffmpeg decodes it: turned as its metadata say, with square pixels.
+// A video, or one image, as ffmpeg decodes it: rotated by its metadata, with square pixels.
 struct Film {
   std::filesystem::path path;
-  int longest_side = 0;  // larger pictures are scaled down to this; 0: as they are
+  int longest_side = 0;  // larger images are scaled down to this; 0: not scaled
   bool grey = false;
-  bool is_still = false;  // one picture, whatever its name looks like
+  bool is_still = false;  // one image, whatever its name looks like
 };
 
-// Hands every picture, H×W×3 or (grey) H×W×1, to `take` in the order shown, until that is false. The
-// pictures' times in seconds, of as many as were taken. Throws InputError for what ffmpeg cannot read, and
-// Stopped. What ffmpeg says goes to `log`.
+// Passes every image, H×W×3 or (grey) H×W×1, to `take` in display order until it returns false. Returns the
+// times in seconds of the images taken. Throws InputError for what ffmpeg cannot read, and Stopped. ffmpeg's
+// output goes to `log`.
 std::vector<double> decode_film(const Film& film, const std::filesystem::path& log,
                                 const std::atomic<bool>& stop,
                                 const std::function<bool(int64_t index, Tensor<uint8_t>&& picture)>& take);
 
-// The first picture.
+// The first image.
 Tensor<uint8_t> decode_picture(const Film& film, const std::filesystem::path& log,
                                const std::atomic<bool>& stop);
 

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// Times and sharpness of all.
+// Times and sharpness of all images.
 std::vector<Candidate> look_at(const PictureSource& source, const Work& work) {
   const auto all = static_cast<int64_t>(source.names().size());
   std::vector<Candidate> found;
@@ -41,7 +41,7 @@ void check_count(const fs::path& input, size_t found) {
                    count > most_frames ? "use --frames, or a smaller --rate" : "");
 }
 
-// Every n-th of the first camera's times, and what the second camera saw then.
+// Selects every n-th time of the first camera and the second camera's images at these times.
 void add_test_camera(const PrepareOptions& options, std::vector<Candidate> second, double first_time,
                      Frames& frames) {
   std::vector<double> times, gaps;

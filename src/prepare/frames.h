@@ -9,16 +9,16 @@
 #include "prepare/choose_frames.h"
 #include "prepare/options.h"
 
-// Pictures taken from a film or a folder of pictures.
+// Images selected from a video or a folder of images.
 namespace traceflow::prepare {
 
-// A picture that was taken. Its file is ID.png in the frames' folder.
+// A selected image. Its file is ID.png in the frames' folder.
 struct Frame {
   std::string id;
-  int camera = 0;      // 0: trains, or is split; 1: of --test-video
-  std::string source;  // of a folder: the name of the file that it comes from
-  int64_t index = 0;   // its place in the film or folder
-  double time = 0;     // seconds since the first picture taken, or its place in the folder
+  int camera = 0;      // 0: for training, or split; 1: of --test-video
+  std::string source;  // for a folder: the name of the original file
+  int64_t index = 0;   // its index in the video or folder
+  double time = 0;     // seconds since the first selected image, or its index in the folder
   double sharpness = 0;
   int64_t width = 0, height = 0;
 
@@ -26,15 +26,15 @@ struct Frame {
 };
 
 struct Frames {
-  std::vector<Frame> frames;           // in the order of time, camera 0 before 1
-  std::vector<int64_t> source_frames;  // by camera: how many pictures there were to choose from
+  std::vector<Frame> frames;           // in time order, camera 0 before 1
+  std::vector<int64_t> source_frames;  // by camera: the number of images to select from
 };
 
-// Fewer make no scene; more are taken by no program that finds poses.
+// Fewer frames make no scene; programs that find poses accept no more.
 constexpr int64_t fewest_frames = 10, most_frames = 10000;
 
-// Takes pictures as the options say, of `input` and of --test-video; writes them as ID.png into `folder`,
-// which is emptied first. Throws InputError, and Stopped.
+// Selects images of `input` and of --test-video by the options and writes them as ID.png into `folder`, which
+// is first emptied. Throws InputError and Stopped.
 Frames take_frames(const std::filesystem::path& input, const PrepareOptions& options,
                    const std::filesystem::path& folder, const std::filesystem::path& log, const Work& work);
 

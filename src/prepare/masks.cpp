@@ -25,7 +25,7 @@ constexpr int64_t estimated_at = 480;  // pixels of the longest side
 
 struct Scaled {
   Tensor<uint8_t> grey;  // H×W×1
-  double factor = 1;     // of the picture's pixels, in its own
+  double factor = 1;     // pixels of the original image per pixel of `grey`
 };
 
 Scaled small_grey(const fs::path& path) {
@@ -39,7 +39,7 @@ Scaled small_grey(const fs::path& path) {
   return {to_8bit(resample(from_8bit(grey), {side(grey.dim(1)), side(grey.dim(0)), factor, factor})), factor};
 }
 
-// f(frame, mask) for every frame that --masks has a mask of.
+// Calls f(frame, mask) for every frame with a mask in --masks.
 void take_supplied(const PrepareOptions& options, const Frames& frames, const fs::path& log, const Work& work,
                    const std::function<void(const Frame& frame, const Tensor<uint8_t>& mask)>& f) {
   const PictureSource source(options.masks, 0, log, work.stop());
@@ -60,7 +60,7 @@ void take_supplied(const PrepareOptions& options, const Frames& frames, const fs
 
 using Matched = std::vector<std::optional<int64_t>>;
 
-// place(frame) of each frame, if all of the first camera have one.
+// place(frame) of each frame, if all frames of the first camera have one.
 template <class Place>
 std::optional<Matched> all_matched(const Frames& frames, Place&& place) {
   Matched matched;

@@ -45,7 +45,7 @@ int NetpbmStream::take() {
   return static_cast<unsigned char>(buffer_[begin_++]);
 }
 
-// A number and the one space after it.
+// Reads a number and the one space after it.
 int64_t NetpbmStream::number() {
   int c = take();
   while (c >= 0 && std::isspace(c) != 0) c = take();

@@ -10,16 +10,15 @@
 
 namespace traceflow::prepare {
 
-// Binary PGM and PPM pictures of 8 bits, one after the other, as a program writes them into a pipe.
+// A stream of binary PGM and PPM images of 8 bits, as a program writes them into a pipe.
 class NetpbmStream {
  public:
-  // source: what errors name. stop: looked at while the pipe is silent.
+  // source: named in errors. stop: checked while the pipe has no data.
   NetpbmStream(Descriptor pipe, std::string source, const std::atomic<bool>& stop)
       : pipe_(std::move(pipe)), source_(std::move(source)), stop_(&stop) {}
 
-  // The next picture, H×W×1 or H×W×3; nothing at the end. Throws InputError for anything else, for sides of
-  // more than 16,384 pixels, and for a stream that ends within a picture. Throws
-  // Stopped.
+  // The next image, H×W×1 or H×W×3; nothing at the end. Throws InputError for other data, for sides above
+  // 16,384 pixels, and for a stream that ends within an image. Throws Stopped.
   std::optional<Tensor<uint8_t>> next();
 
  private:

@@ -68,7 +68,7 @@ Tensor<uint16_t> normal_picture(const Tensor<float>& normals) {
   for (int64_t i = 0; i < normals.size(); i += 3) {
     const Vec3<float> n = load3<float>(&normals[i]);
     const float size = length(n);
-    // Also for what is not finite.
+    // Also skips vectors that are not finite.
     if (!(size > shortest && std::isfinite(size))) continue;
     for (int c = 0; c < 3; ++c)
       picture[i + c] =

@@ -13,8 +13,8 @@
 
 namespace traceflow::prepare {
 
-// Normals of many views, as another program left them, in its own axes: an array T×H×W×3 (.npz, .npy), or a
-// film or folder of pictures whose values 0 … 1 mean 2v − 1.
+// Normals of many views from another program, in its own axes: an array T×H×W×3 (.npz, .npy), or a video or
+// folder of images whose values 0 … 1 mean 2v − 1.
 class NormalSource {
  public:
   // Throws InputError.
@@ -22,21 +22,21 @@ class NormalSource {
                const std::atomic<bool>& stop);
 
   int64_t count() const { return count_; }
-  // Of a folder's pictures; else none.
+  // Of a folder's images; empty for others.
   std::vector<std::string> names() const;
-  // Those of the given indices, which rise; `take` gets the place in `indices` and H×W×3, whose vectors have
-  // any length, zero where there is none.
+  // Reads the given ascending indices. `take` gets the position in `indices` and H×W×3 vectors of any length,
+  // zero if there is no normal.
   void take(const std::vector<int64_t>& indices,
             const std::function<void(int64_t place, Tensor<float>&& normals)>& take) const;
 
  private:
   std::optional<NpyFile> array_;
   std::optional<PictureSource> pictures_;
-  std::filesystem::path folder_;  // of pictures that this program reads itself, with all of their bits
+  std::filesystem::path folder_;  // of images that this program decodes itself, to keep all bits
   int64_t count_ = 0;
 };
 
-// 16 bits of v = (n + 1) / 2 of unit vectors; black where there is none.
+// 16 bits of v = (n + 1) / 2 of unit vectors; black if there is no normal.
 Tensor<uint16_t> normal_picture(const Tensor<float>& normals);
 
 }  // namespace traceflow::prepare

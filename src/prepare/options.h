@@ -9,19 +9,19 @@
 
 namespace traceflow::prepare {
 
-// Which pairs of pictures COLMAP compares.
+// The pairs of images that COLMAP compares.
 enum class Matcher { automatic, sequential, exhaustive };
 constexpr std::array<std::string_view, 3> enum_names(Matcher) {
   return {"automatic", "sequential", "exhaustive"};
 }
 
-// COLMAP's lenses that a capture can hold.
+// COLMAP's camera models that a capture supports.
 enum class CameraModel { simple_pinhole, pinhole, simple_radial, radial, opencv };
 constexpr std::array<std::string_view, 5> enum_names(CameraModel) {
   return {"simple-pinhole", "pinhole", "simple-radial", "radial", "opencv"};
 }
 
-// What is done, in this order; each step stands on those before it.
+// The steps, in order; each depends on those before it.
 enum class Step { frames, masks, features, matches, poses, capture };
 constexpr std::array<std::string_view, 6> enum_names(Step) {
   return {"frames", "masks", "features", "matches", "poses", "capture"};

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 bool is_picture(const fs::path& path) {
-  // A Mac puts a file of notes beside each picture on a foreign disk: ._IMG_0001.jpg.
+  // macOS stores a metadata file beside each image on foreign file systems: ._IMG_0001.jpg.
   if (path.filename().string().starts_with('.')) return false;
   constexpr std::array endings{".png",  ".jpg", ".jpeg", ".tif", ".tiff",
                                ".webp", ".bmp", ".ppm",  ".exr", ".dng"};

@@ -10,30 +10,31 @@
 
 namespace traceflow::prepare {
 
-// Files of a folder that look like pictures and are not hidden, ordered so that 9 comes before 10.
+// Files of a folder with an image's extension that are not hidden, in natural order (9 before 10).
 std::vector<std::filesystem::path> pictures_in(const std::filesystem::path& folder);
 
-// The name without folder and endings: "a" of "b/a.png", "a.jpg", "a.png.png".
+// The name without folder and extensions: "a" for "b/a.png", "a.jpg", "a.png.png".
 std::string stem_of(const std::string& name);
 
-// A film, or the pictures of a folder one after the other, decoded by ffmpeg (film.h).
+// A video, or the images of a folder, decoded by ffmpeg (film.h).
 class PictureSource {
  public:
-  // longest_side: larger pictures are scaled down to it; 0: none. log: where ffmpeg's words go. Throws
-  // InputError where there is nothing to read.
+  // longest_side: larger images are scaled down to it; 0: no limit. log: for ffmpeg's output. Throws
+  // InputError if there is nothing to read.
   PictureSource(const std::filesystem::path& path, int longest_side, std::filesystem::path log,
                 const std::atomic<bool>& stop);
 
   bool is_folder() const { return !files_.empty(); }
-  // Of a folder's pictures, in UTF-8 (base/utf8.h); of a film, none.
+  // Of a folder's images, in UTF-8 (base/utf8.h); empty for a video.
   std::vector<std::string> names() const;
-  // How many pictures there are; a film is decoded for it.
+  // The number of images; a video is decoded to count them.
   int64_t count() const;
 
   using Take = std::function<void(int64_t index, Tensor<uint8_t>&& picture)>;
-  // All, in order; their times in seconds, or their places in the folder. These throw InputError and Stopped.
+  // Reads all images in order. Returns their times in seconds, or their indices in the folder. Like
+  // take_some, throws InputError and Stopped.
   std::vector<double> take_all(bool grey, const Take& take) const;
-  // Those of the given indices, which rise; `take` gets the place in `indices`.
+  // Reads the given ascending indices; `take` gets the position in `indices`.
   void take_some(bool grey, const std::vector<int64_t>& indices, const Take& take) const;
 
  private:

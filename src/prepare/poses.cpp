@@ -45,8 +45,8 @@ bool compares_all(const PrepareOptions& options, const Frames& frames) {
   return options.matcher == Matcher::exhaustive;
 }
 
-// What COLMAP calls the options of any kind of features, by what it says itself: "Feature", or "Sift" before
-// 3.13, which knew no other kind.
+// COLMAP's prefix for options of features, from its help: "Feature", or "Sift" before 3.13, which had no
+// other kind.
 std::string kind_of_features(const PoseFolder& folder, const Work& work) {
   const fs::path log = folder.top / "help.log";
   run_program({"colmap", "feature_extractor", "--help"}, log, work,
@@ -59,8 +59,8 @@ std::string kind_of_features(const PoseFolder& folder, const Work& work) {
                    "see " + log.string());
 }
 
-// COLMAP looks for ID.png.png, and takes features where it is not black. From 3.12 on it leaves a picture out
-// that has none.
+// COLMAP reads ID.png.png and takes features where it is not black. Since 3.12 it skips an image without a
+// mask.
 void write_feature_masks(const Frames& frames, const fs::path& masks, const fs::path& feature_masks) {
   fs::remove_all(feature_masks);
   fs::create_directories(feature_masks);
@@ -91,7 +91,7 @@ ReadShare share_of_all(const Frames& frames) {
   };
 }
 
-// What may help, of what has not been tried.
+// Advice on options that have not been tried yet.
 std::string advice(const PrepareOptions& options, const Frames& frames) {
   std::string text = "try more frames (--frames, --rate)";
   if (options.masks == "none") text += ", masks of what moves (--masks estimate, or your own)";
@@ -102,7 +102,7 @@ std::string advice(const PrepareOptions& options, const Frames& frames) {
   return text + ", or film again with a camera that moves sideways around the scene";
 }
 
-// said: what the mapper ended with, where it failed.
+// said: the mapper's last line, if it failed.
 [[noreturn]] void refuse_poses(const PrepareOptions& options, const Frames& frames, const PoseFolder& folder,
                                int64_t registered, const std::string& said = "") {
   throw InputError(folder.models().string(), "poses",
@@ -145,7 +145,7 @@ std::string extract_features(const PrepareOptions& options, const Frames& frames
   for (size_t camera = 0; camera < frames.source_frames.size(); ++camera) {
     const fs::path list = folder.top / fmt::format("camera_{}.txt", camera);
     write_atomically(list, frame_list(frames, static_cast<int>(camera)));
-    // One call for each camera: what a call reads has one lens.
+    // One call for each camera, since all images of a call share one lens.
     Words words{"colmap",
                 "feature_extractor",
                 "--database_path",
@@ -203,7 +203,7 @@ std::string find_poses(const PrepareOptions& options, const Frames& frames, cons
                  std::to_string(thread_count()), "--Mapper.min_model_size", "3"},
                 log, work, share_of_all(frames));
   } catch (const InputError&) {
-    // It fails where it registers nothing, and each version says so in words of its own.
+    // The mapper fails if it registers nothing, with a different message in each version.
     failure = last_line(log);
     if (failure.empty() || !fs::is_empty(folder.models())) throw;
   }

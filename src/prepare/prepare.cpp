@@ -25,16 +25,17 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// Raised when a capture comes out otherwise than before: one that stands is then made again from its poses.
+// Increased when the resulting capture changes; existing captures are then made again from their poses.
 constexpr int made_capture = 2;
 
-// Beside a link's target, not the link, what is made can be moved into place.
+// Resolves links, so that results are beside a link's target and can be moved into place.
 fs::path without_links(const fs::path& path) {
   const fs::path whole = fs::weakly_canonical(fs::absolute(path));
   return whole.has_filename() ? whole : whole.parent_path();
 }
 
-// The steps of one capture, in order. Each tells Steps what its results depend on beyond the steps before.
+// The steps of one capture, in order. Each passes to Steps the inputs of its results beyond the earlier
+// steps.
 class Preparation {
  public:
   Preparation(fs::path input, fs::path capture, const PrepareOptions& options,
@@ -68,7 +69,7 @@ class Preparation {
   fs::path frame_list() const { return folder_ / "frames.list.json"; }
   PoseFolder poses() const { return {folder_ / "colmap"}; }
 
-  // A step empties its folder before it fills it, and an earlier capture goes with all that is in it.
+  // Refuses input inside folders that this preparation empties or replaces.
   void refuse_own_folders(const fs::path& given) const {
     if (given.empty() || !fs::exists(given)) return;
     const auto lies_in = [place = fs::weakly_canonical(given)](const fs::path& folder) {
@@ -82,13 +83,13 @@ class Preparation {
       if (lies_in(own)) refuse("a folder that this preparation writes itself", folder_);
     }
     if (!lies_in(capture_)) return;
-    // A folder that is no capture is refused as what it is.
+    // If the folder is not a capture, this reports it as such.
     check_place(capture_);
     refuse("a part of the capture that this preparation replaces", capture_);
   }
 
-  // Before hours go into steps whose capture would find its place taken, or one that cannot be freed, or into
-  // steps that another process does as well.
+  // Checks before hours of work that the capture's place is free or can be freed, and that no other process
+  // does the same work.
   void before_work() {
     if (options_.until == Step::capture) check_place(capture_);
     fs::create_directories(folder_);
@@ -122,7 +123,7 @@ class Preparation {
         steps_.run(
             step, json::object(), [&] { return fs::exists(poses().chosen()); },
             [&] { return find_poses(options_, frames_, pictures(), poses(), work_); });
-        // What was found stands, so that another --least-registered does not find it again.
+        // Not part of the step: a changed --least-registered must not run the mapper again.
         return require_registered(options_, frames_, poses());
       case Step::capture:
         return steps_.run(

@@ -10,7 +10,7 @@ namespace traceflow::prepare {
 
 namespace {
 
-// Its last lines.
+// The log's last bytes.
 std::string end_of(const std::filesystem::path& log) {
   constexpr std::streamoff enough = 2048;
   std::ifstream file(log, std::ios::binary | std::ios::ate);

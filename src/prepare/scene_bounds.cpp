@@ -7,7 +7,7 @@ namespace traceflow::prepare {
 
 namespace {
 
-// The value below which this share of the values lies, which are put into another order.
+// The quantile of the values at this share; reorders them.
 double quantile(std::vector<double>& values, double share) {
   const auto place = static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
   std::nth_element(values.begin(), values.begin() + place, values.end());

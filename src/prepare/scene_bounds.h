@@ -8,8 +8,8 @@
 
 namespace traceflow::prepare {
 
-// f(point, camera) for each point and camera; where these are more than some millions, for an even share of
-// the points of each camera.
+// Calls f(point, camera) for each pair. If there are more than some millions, uses an even sample of the
+// points for each camera.
 template <class F>
 void for_each_sampled_pair(const std::vector<Vec3<double>>& points,
                            const std::vector<Camera<double>>& cameras, F&& f) {
@@ -20,16 +20,16 @@ void for_each_sampled_pair(const std::vector<Vec3<double>>& points,
   }
 }
 
-// What scene.json says.
+// The values in scene.json.
 struct SceneBounds {
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;  // scene units
 };
 
-// As Nerfies has them: the scene's centre is that of the box around the cameras and the points, without the
-// outermost 2.5 % of these along each axis at either end; the scale makes the box's diagonal 1. Near and far
-// are the depths, in the images, between which all but a thousandth of the points lie, and a fifth more.
-// Everything in one frame and unit.
+// As in Nerfies: the centre is that of the box around the cameras and the points, without the outermost 2.5 %
+// at each end of each axis; the scale gives the box a diagonal of 1. Near and far enclose all but a
+// thousandth of the points' depths in the images, with a margin of a fifth. All input is in one frame and
+// unit.
 SceneBounds scene_bounds(const std::vector<Vec3<double>>& points, const std::vector<Camera<double>>& cameras);
 
 }  // namespace traceflow::prepare

@@ -41,7 +41,7 @@ json Steps::stamp(Step step) const {
     (void)file["seconds"].number();
     return file.json();
   } catch (const InputError&) {
-    return nullptr;  // what cannot be read is done again
+    return nullptr;  // an unreadable stamp means that the step runs again
   }
 }
 

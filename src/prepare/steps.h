@@ -10,24 +10,24 @@
 
 namespace traceflow::prepare {
 
-// Steps that are done once. What a step was done with, what it found and how long it took are kept in
-// STEP.json, its stamp, in the work folder; a step whose stamp tells the same again is skipped.
+// Runs each step once. A step's inputs, result text and duration are stored in STEP.json, its stamp, in the
+// work folder. A step with a matching stamp is skipped.
 class Steps {
  public:
-  // found: gets one line per step.
-  // before: called when a step's work is about to begin; what it throws leaves all stamps.
+  // found: gets one line per step. before: called before a step's work starts; if it throws, all stamps are
+  // kept.
   Steps(
       std::filesystem::path folder, std::function<void(const std::string& line)> found,
       std::function<void()> before = [] {})
       : folder_(std::move(folder)), say_(std::move(found)), before_(std::move(before)) {}
 
-  // Does `work`, which tells what it found, unless this step and all before it stand and `stands` finds the
-  // results in their place. inputs: what the results depend on, beyond the steps before. From the moment when
-  // work begins until it is done, neither this step nor any after it has a stamp.
+  // Runs `work`, which returns its result text, unless this step and all before it are up to date and
+  // `stands` finds the results in place. inputs: what the results depend on beyond the earlier steps. While
+  // work runs, this step and all later ones have no stamp.
   void run(Step step, const nlohmann::json& inputs, const std::function<bool()>& stands,
            const std::function<std::string()>& work);
 
-  // What the step found when it was last done, and its seconds; null where it does not stand.
+  // The step's last result text and its duration in seconds; null if the step is not up to date.
   nlohmann::json stamp(Step step) const;
 
  private:
@@ -40,8 +40,8 @@ class Steps {
 
 std::string step_name(Step step);
 
-// A file as an input of a step: its path, size and time of change; of a folder, those of its pictures, as
-// nothing else in it is looked at.
+// A file as an input of a step: its path, size and modification time. For a folder, those of its images, the
+// only files that are used.
 nlohmann::json identity_of(const std::filesystem::path& path);
 
 }  // namespace traceflow::prepare

@@ -11,8 +11,8 @@
 
 namespace traceflow::prepare {
 
-// Points as a program tracked them through a film: an .npz with `tracks` (T×N×2, pixels, the centre of the
-// first at 0, as CoTracker has them) and `visibility` (T×N), either with a batch of one before.
+// Points tracked through a video by another program: an .npz with `tracks` (T×N×2, pixels, the first pixel's
+// centre at 0, as from CoTracker) and `visibility` (T×N). Both may have a leading batch dimension of one.
 class TrackSource {
  public:
   // Throws InputError.
@@ -20,9 +20,9 @@ class TrackSource {
 
   int64_t times() const { return times_; }
   int64_t points() const { return points_; }
-  // tracks.npy of views with these ids (docs/captures.md): shares of a picture's sides, and whether a point
-  // is seen. matched: which time belongs to an id; a view without one sees nothing. width, height: of the
-  // pictures that were tracked.
+  // tracks.npy of views with these ids (docs/captures.md): fractions of the image's width and height, and
+  // whether a point is visible. matched: the time index of each id; a view without one sees no point. width,
+  // height: of the tracked images.
   Tensor<float> rows(const std::vector<std::string>& ids, const std::map<std::string, int64_t>& matched,
                      double width, double height) const;
 

@@ -19,22 +19,22 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* about_memory = "memory";  // what a trouble is about
-// That a frame takes with all its layers, and more.
+constexpr const char* about_memory = "memory";  // key of a warning
+// Upper limit for a frame with all its layers.
 constexpr int64_t bytes_per_pixel = 300;
 constexpr int64_t max_previewed_frames = 20'000;  // frames of a camera path
 constexpr int photo_quality = 90;
-// How fast the ranges of depth and distortion follow the picture: settled after some ten frames.
+// How fast the ranges of depth and distortion adapt: within about ten frames.
 constexpr float follow = 0.25F;
 
-// The mean over every new pixel's area.
+// Averages over the area of each new pixel.
 Tensor<float> fitted(const Tensor<float>& image, int64_t width, int64_t height) {
   if (image.dim(0) == height && image.dim(1) == width) return image;
   return resample(image, {width, height, static_cast<double>(image.dim(1)) / static_cast<double>(width),
                           static_cast<double>(image.dim(0)) / static_cast<double>(height)});
 }
 
-// A new pixel is known where all of what it is made of is.
+// A new pixel is known if all stored pixels below it are known.
 Tensor<uint8_t> fitted_known(const Tensor<uint8_t>& known, int64_t width, int64_t height) {
   if (known.empty() || (known.dim(0) == height && known.dim(1) == width)) return known;
   constexpr float whole = 0.999F;
@@ -58,7 +58,7 @@ viz::Layer layer_named(const std::string& name) {
   return layers[0];
 }
 
-// The system may promise memory that is not there, and then end the program: a training, perhaps.
+// The system may promise memory that it does not have and then kill the program, perhaps with its training.
 void check_memory_for(const FrameRequest& request, const SceneView& view) {
   const int64_t samples =
       samples::samples_for(request.camera, view.render.samples, view.scene.focal, request.most_samples);
@@ -106,7 +106,7 @@ void FrameServer::forget() {
 
 Renderer& FrameServer::renderer(const SceneView& view) {
   if (!renderer_) renderer_ = std::make_unique<Renderer>(view.render);
-  renderer_->options() = view.render;  // a training changes them as it goes on
+  renderer_->options() = view.render;  // a training may change them
   return *renderer_;
 }
 
@@ -121,7 +121,7 @@ void FrameServer::answer(const Job& job, const SceneView& view) {
     if (!clients_.any_lacks_memory()) clients_.set_warning(about_memory, "");
   } catch (const std::bad_alloc& error) {
     forget();
-    // What the host says has no numbers.
+    // Only the device's error has numbers.
     const auto* const device = dynamic_cast<const memory::OutOfMemory*>(&error);
     const std::string why = "No memory for a picture of this size" +
                             (device == nullptr ? "." : ": " + std::string(device->what()));
@@ -201,7 +201,7 @@ void FrameServer::answer(const Job& job, const StillJob& still, const SceneView&
   look.height = still.still.height;
   const FrameRequest request = request_for(look, view, 1);
   check_memory_for(request, view);
-  // A copy: the page's ranges stay as they are.
+  // A copy, so that the page's ranges do not change.
   viz::Painter painter = painters_[job.client];
   const std::string bytes = png_bytes(picture(look, request, view, painter));
   clients_.reply(job.client, picture_message({{"type", "still"},
@@ -210,7 +210,7 @@ void FrameServer::answer(const Job& job, const StillJob& still, const SceneView&
                                               {"height", request.camera.height},
                                               {"format", "png"}},
                                              bytes));
-  // What so large a picture took is not kept.
+  // Frees the buffers of so large a picture.
   forget();
 }
 
@@ -245,7 +245,7 @@ void FrameServer::answer(const Job& job, const Path& path, const SceneView& view
 
 void FrameServer::answer(const Job& job, const ProbeJob& probe, const SceneView& view) {
   FrameRequest request = request_for(probe.look, view, 1);
-  request.specular = view.request.specular;  // whatever the layer shows
+  request.specular = view.request.specular;  // for all layers
   const double x = probe.probe.x * request.camera.width, y = probe.probe.y * request.camera.height;
   std::optional<viz::ProbeResult> found = viz::probe(renderer(view), view.scene, request, x, y);
   posed_ = true;

@@ -20,10 +20,10 @@ class FrameServer {
   void send_hello(const SceneView& view);
   // Serves one job. Errors are sent to the page as text; nothing is thrown.
   void answer(const Job& job, const SceneView& view);
-  // The scene is about to change: drops what was computed from it and, on a CUDA device, frees the memory
+  // Call before the scene changes. Drops what was computed from it and, on a CUDA device, frees the memory
   // that training may need.
   void scene_changed(Device device);
-  // Another scene is shown from now on.
+  // Call when another scene is shown.
   void forget();
 
  private:
@@ -34,9 +34,9 @@ class FrameServer {
   void answer(const Job& job, const Path& path, const SceneView& view);
 
   FrameRequest request_for(const Look& look, const SceneView& view, double divisor) const;
-  // As the capture has it, on the host. Throws InputError.
+  // The capture's photograph, on the host. Throws InputError.
   std::shared_ptr<const ViewImages> photograph(const PhotoRef& photo) const;
-  // What a Look shows, as 8-bit colours.
+  // The picture of a Look as 8-bit colours.
   Tensor<uint8_t> picture(const Look& look, const FrameRequest& request, const SceneView& view,
                           viz::Painter& painter);
   Renderer& renderer(const SceneView& view);
@@ -45,9 +45,9 @@ class FrameServer {
   Clients& clients_;
   SceneInfo info_;
   std::unique_ptr<Renderer> renderer_;
-  std::optional<viz::TrackFollower> follower_;  // of the scene as it is now, once a page wants paths
-  bool posed_ = false;                          // the renderer has seen the scene as it is now
-  std::map<uint64_t, viz::Painter> painters_;   // of every page, whose ranges follow what it sees
+  std::optional<viz::TrackFollower> follower_;  // for this scene; made when a page requests tracks
+  bool posed_ = false;                          // whether the renderer has posed the present scene
+  std::map<uint64_t, viz::Painter> painters_;   // one per page: its value ranges adapt to what the page sees
 };
 
 }  // namespace traceflow::serve

@@ -8,7 +8,7 @@
 
 namespace traceflow::serve {
 
-// The first message to a page: the scene, its cameras and layers (web/src/messages.ts, Hello).
+// The first message to a page: the scene, its cameras and its layers (web/src/messages.ts, Hello).
 std::string hello_text(const SceneView& view, const SceneInfo& info);
 
 // {"position": …, "rotation": rows of world_from_camera, "fov_y": …}.

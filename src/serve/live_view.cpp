@@ -50,7 +50,7 @@ void LiveView::operator()(const events::Event& event) {
     on_step(*step);
     return;
   }
-  // What a step told before stays before.
+  // Keeps the order of events: the unsent step comes first.
   if (!last_step_.empty()) unsent_.push_back(std::exchange(last_step_, {}));
   unsent_.push_back(to_json_line(event));
   if (const auto* started = std::get_if<events::Started>(&event)) {
@@ -103,7 +103,7 @@ void LiveView::serve_while_paused() {
   frame_server_.scene_changed(hooks_.view().scene.device());
 }
 
-// A page's wish must not end a training: where it cannot be saved, it goes on.
+// A failed save, requested by a page, must not end the training.
 void LiveView::save() {
   try {
     hooks_.save();

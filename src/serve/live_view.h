@@ -13,39 +13,39 @@
 namespace traceflow::serve {
 
 struct ViewOptions {
-  double share = 0.25;  // of the time that may go into pictures while a page is open, above 0 and under 1
+  double share = 0.25;  // fraction of the time for rendering while a page is open, above 0 and below 1
 
   void validate() const;
 };
 
-// What the viewer may do with a training. All but `stop` are called on the training's thread, between
-// iterations.
+// Functions by which the viewer controls a training. All except `stop` are called on the training's thread,
+// between iterations.
 struct TrainingHooks {
   std::function<SceneView()> view;
   std::function<void()> save;
   std::function<void(const events::Event&)> emit;
   std::function<void()> stop;                      // on any thread
-  const std::atomic<bool>* interrupted = nullptr;  // set when the program shall end
+  const std::atomic<bool>* interrupted = nullptr;  // set when the program should end
 };
 
-// Shows a training to the open pages. It listens to the training's events, so it renders between two
-// iterations, on the training's thread, and takes a bounded share of the time. The trained scene is the same
-// to the byte whether a page is open or not.
+// Shows a training to the open pages. It listens to the training's events and renders between two iterations,
+// on the training's thread, for a limited share of the time. The trained scene is the same to the byte with
+// and without open pages.
 class LiveView {
  public:
   LiveView(const ViewOptions& options, SceneInfo info, TrainingHooks hooks);
 
-  // For the server.
+  // The handler for the server.
   MessageHandler& handler() { return clients_; }
 
-  // The log of a run that is resumed.
+  // Takes the log of a resumed run.
   void restore_log(const std::vector<LoggedEvent>& events) {
     clients_.add_log_lines(lines_of(thinned(events)), true);
   }
   void operator()(const events::Event& event);
-  // After the training: whether a page is open.
+  // Whether a page is open after the training.
   bool is_wanted();
-  // Serves until the last page has closed or the program shall end.
+  // Serves until the last page has closed or the program should end.
   void stay();
 
  private:

@@ -39,7 +39,7 @@ Camera<float> camera_of(const Look& look, const SceneInfo& info, const SceneNorm
   const Camera<float>& camera = captured(std::get<PhotoRef>(look.camera), info).camera;
   double fit = std::min(look.width / static_cast<double>(camera.width),
                         look.height / static_cast<double>(camera.height));
-  // Beyond the photograph's own size a difference would be one from pixels that were made up.
+  // A difference is never larger than the photograph, since the added pixels would be interpolated.
   if (look.layer == "difference") fit = std::min(fit, 1.0);
   fit /= divisor;
   return resized(camera, side(camera.width * fit), side(camera.height * fit));

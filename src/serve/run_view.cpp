@@ -9,7 +9,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto between_checks = 200ms;
-// What troubles are about.
+// Keys of warnings.
 constexpr const char* about_run = "the run";
 constexpr const char* about_device = "the device";
 
@@ -26,7 +26,7 @@ SceneView RunView::view() const {
 }
 
 void RunView::take(Shown shown) {
-  // The old scene goes before the new one comes: a device may not hold both.
+  // Frees the old scene first: the device may not have memory for both.
   frame_server_.forget();
   shown_ = std::move(shown);
   move_to_device();
@@ -46,7 +46,7 @@ void RunView::move_to_device() {
     frame_server_.forget();
     clients_.set_warning(about_device, "");
   } catch (const std::bad_alloc&) {
-    scene.move_to(Device::cpu);  // those parts that found room
+    scene.move_to(Device::cpu);  // the parts that had been moved
     clients_.set_warning(about_device,
                          "No memory for the scene on the device: pictures are made on the host, slowly.");
   }

@@ -12,38 +12,38 @@
 
 namespace traceflow::serve {
 
-// Shows a scene that is not being trained by this program. A run that another process trains is followed: its
-// newest checkpoint is shown and its log goes on.
+// Shows a scene that this program does not train. If another process trains the run, shows each new
+// checkpoint and continues the log.
 class RunView {
  public:
-  // What is shown and how far it was trained.
+  // The shown scene and the state of its training.
   struct Shown {
     viz::Subject subject;
     int64_t iteration = 0;
-    int64_t iterations = 0;  // that the run is to have in all; 0 for what is no run
-    std::string note = {};   // one line when it is not what was saved last; else empty
+    int64_t iterations = 0;  // planned iterations of the run; 0 if it is not a run
+    std::string note = {};   // one line if this is not the newest checkpoint; else empty
   };
 
-  // Takes what is shown to the device. Throws what that throws, here alone.
+  // Moves the scene to the device. Throws the errors of that; later functions do not.
   RunView(SceneInfo info, Shown shown, Device device);
 
-  // For the server.
+  // The handler for the server.
   MessageHandler& handler() { return clients_; }
 
-  // Follows a run. When the run has saved a checkpoint, `reread` reads it to the host. Where that throws, the
-  // pages get the error's text, the scene stays as it was, and the next check tries again.
+  // Follows a run. When the run has saved a checkpoint, `reread` reads it to the host. If that throws, the
+  // pages get the error's text, the scene stays the same, and the next check tries again.
   void follow(RunWatch watch, std::function<Shown()> reread,
               Clients::Clock::duration between_checks = std::chrono::seconds(1));
 
-  // Until `stop` is set.
+  // Serves until `stop` is set.
   void run(const std::atomic<bool>& stop);
-  // One turn of that: serves one job, if one arrives within `most`, and checks the run when it is time.
+  // One step of run(): serves one job, if one arrives within `most`, and checks the run if it is time.
   void turn(Clients::Clock::duration most);
 
  private:
   SceneView view() const;
   void take(Shown shown);
-  // A scene for which the device has no memory is shown from the host.
+  // If the device has no memory for the scene, keeps it on the host.
   void move_to_device();
   void check_run();
   void send_log();

@@ -19,7 +19,8 @@ RunWatch::RunWatch(RunFolder run) : run_(std::move(run)) {
 RunWatch::Change RunWatch::poll() {
   const Version checkpoint = version_of(run_.checkpoint());
   if (checkpoint.size < 0) {
-    // Where no file has two names, a checkpoint is renamed to the one before: only that one is there then.
+    // On file systems without hard links, the checkpoint is renamed to the previous one first. For a moment
+    // only that one exists.
     return {version_of(run_.previous_checkpoint()).size < 0, false};
   }
   seen_ = checkpoint;

@@ -10,13 +10,13 @@ namespace traceflow::serve {
 // Polls the folder of a run, which another process may train, move or delete.
 class RunWatch {
  public:
-  // Counts the present checkpoint as read. Construct it before reading the checkpoint, so that one saved
-  // meanwhile is not missed.
+  // Counts the present checkpoint as read. Construct it before reading the checkpoint, so that one saved in
+  // between is not missed.
   explicit RunWatch(RunFolder run);
 
   struct Change {
-    bool vanished = false;  // the run's checkpoints are not there
-    bool saved = false;     // there is another checkpoint than the one read last
+    bool vanished = false;  // the run has no checkpoint
+    bool saved = false;     // the checkpoint differs from the one read last
   };
   Change poll();
   // Counts the checkpoint of the last poll as read. Until then each poll reports it.

@@ -6,21 +6,21 @@
 
 namespace traceflow::serve {
 
-// Limits the share of a training's time that rendering for pages takes, as a token bucket. Up to one second
-// of unused time is saved, enough for the first pictures of a new page. A moving camera may overdraw by as
-// much.
+// Limits the fraction of a training's time that is spent on rendering for pages, as a token bucket. Up to one
+// second of unused time is saved for the first pictures of a new page. A moving camera may overdraw by the
+// same amount.
 class TimeShare {
  public:
-  // Above 0 and under 1.
+  // share: above 0 and below 1.
   explicit TimeShare(double share) : per_second_(share / (1 - share)) {}
 
-  // Seconds that went into the training, and into pages.
+  // Record seconds spent on the training, and on pages.
   void trained(double seconds) { credit_ = std::min(most_credit, credit_ + seconds * per_second_); }
   void spent(double seconds) { credit_ -= seconds; }
 
-  // Whether anything may be made now.
+  // Whether rendering is allowed now.
   bool is_open() const { return credit_ > -most_debt; }
-  // Finer and newer frames wait until there is time for them.
+  // Finer and newer frames wait until time is available.
   Allowed allowed() const { return {credit_ > 0, credit_ >= most_credit / 2}; }
 
   static constexpr double most_credit = 1, most_debt = 1;  // seconds

@@ -19,7 +19,7 @@ constexpr std::array<Stop, 6> ramp_stops = {{{0.18F, 0.06F, 0.30F},
                                              {0.52F, 0.80F, 0.32F},
                                              {0.98F, 0.93F, 0.42F}}};
 
-// Of these three, every 17th of the 256 colours that were published.
+// These three tables have every 17th of the 256 published colours.
 constexpr std::array<Stop, 16> viridis_stops = {{{0.26700F, 0.00487F, 0.32942F},
                                                  {0.28266F, 0.10020F, 0.42216F},
                                                  {0.27713F, 0.18523F, 0.48990F},

@@ -8,18 +8,17 @@
 
 namespace traceflow::viz {
 
-// The colours that a number from 0 to 1 is shown in. ramp: dark violet over green to light yellow; viridis,
-// magma: matplotlib's, by van der Walt and Smith (CC0); turbo: Mikhailov's (Apache 2.0); grey: black to
-// white.
+// Colour maps for numbers from 0 to 1. ramp: dark violet over green to light yellow; viridis, magma:
+// matplotlib's, by van der Walt and Smith (CC0); turbo: Mikhailov's (Apache 2.0); grey: black to white.
 enum class ColourMap { ramp, viridis, magma, turbo, grey };
 constexpr std::array<std::string_view, 5> enum_names(ColourMap) {
   return {"ramp", "viridis", "magma", "turbo", "grey"};
 }
 
-// The map of that name. Throws InputError.
+// The map with this name. Throws InputError.
 ColourMap parse_colour_map(const std::string& name);
 
-// Values are clamped to 0 to 1; one that is not a number is black.
+// Values are clamped to 0 to 1; NaN is black.
 Vec3<float> map_colour(ColourMap map, float value);
 
 }  // namespace traceflow::viz

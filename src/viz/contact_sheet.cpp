@@ -47,7 +47,7 @@ void ContactSheet::add(const Tensor<float>& photograph, const Frame& frame, cons
 
 void ContactSheet::write(const std::filesystem::path& path) const {
   require(!rows_.empty(), "a contact sheet has a row");
-  // No column is narrower than the longest title.
+  // Columns are at least as wide as the longest title.
   int64_t width = letter_width * static_cast<int64_t>(std::string_view(titles[0]).size());
   int64_t height = title_height;
   for (const auto& row : rows_) {

@@ -6,16 +6,16 @@
 
 namespace traceflow::viz {
 
-// One picture of everything: a row for each view, with photograph, render, difference (three times as
-// strong), diffuse, specular, tint, normal, depth and alpha side by side under their names.
+// One picture with a row for each view: photograph, render, difference (times three), diffuse, specular,
+// tint, normal, depth and alpha side by side, with titles.
 class ContactSheet {
  public:
-  // cell_width: columns of one picture, pixels.
+  // cell_width: width of one cell in pixels.
   explicit ContactSheet(int64_t cell_width) : cell_width_(cell_width) {}
 
-  // photograph, and what of it is known (H×W, may be empty): on the host; the frame is on any device.
+  // photograph and its known pixels (H×W, may be empty): on the host; the frame is on any device.
   void add(const Tensor<float>& photograph, const Frame& frame, const Tensor<uint8_t>& known = {});
-  // Written atomically. There must be a row.
+  // Writes atomically. There must be a row.
   void write(const std::filesystem::path& path) const;
 
  private:
@@ -24,8 +24,8 @@ class ContactSheet {
   std::vector<std::vector<Tensor<uint8_t>>> rows_;
 };
 
-// |photograph − render|, three times as strong, to be seen; 0 where the photograph is not known (H×W, may be
-// empty).
+// 3 · |photograph − render|, so that small differences are visible; 0 where the photograph is unknown (known:
+// H×W, may be empty).
 Tensor<float> difference(const Tensor<float>& photograph, const Tensor<float>& render,
                          const Tensor<uint8_t>& known);
 

@@ -8,7 +8,7 @@ namespace traceflow::viz {
 
 namespace {
 
-// The top row's left dot in the highest of 15 bits.
+// The highest of 15 bits is the left dot of the top row.
 constexpr std::array<uint16_t, 26> letters = {
     0b010101111101101, 0b110101110101110, 0b011100100100011, 0b110101101101110, 0b111100110100111,
     0b111100110100100, 0b011100101101011, 0b101101111101101, 0b111010010010111, 0b001001001101010,

@@ -5,7 +5,7 @@
 #include "base/tensor.h"
 #include "math/types.h"
 
-// Marks on 8-bit pictures, H×W×3. What lies beyond a picture's border is left out.
+// Draws on 8-bit pictures, H×W×3. Parts outside the picture are clipped.
 namespace traceflow::viz {
 
 struct Ink {
@@ -14,18 +14,18 @@ struct Ink {
 
 using Pixel = Vec2<int64_t>;  // x to the right, y down
 
-// Letters of 3×5 dots, of 2×2 pixels each: a to z (capitals as small ones), 0 to 9 and . , : - _ + = / % ( );
-// what is none of these stays blank. A letter takes letter_width pixels. at: the upper left corner.
+// Letters of 3×5 dots of 2×2 pixels each: a to z (also for capitals), 0 to 9 and . , : - _ + = / % ( ); other
+// characters are blank. A letter takes letter_width pixels. at: the upper left corner.
 inline constexpr int64_t letter_width = 8, letter_height = 10;
 void write_text(std::string_view text, const Pixel& at, const Ink& ink, Tensor<uint8_t>& picture);
 
 void paste(const Tensor<uint8_t>& image, const Pixel& at, Tensor<uint8_t>& picture);
 void fill_box(const Pixel& at, const Pixel& size, const Ink& ink, Tensor<uint8_t>& picture);
-// The border of a box, inside it.
+// The border of a box, drawn inside it.
 void draw_box(const Pixel& at, const Pixel& size, int64_t thickness, const Ink& ink,
               Tensor<uint8_t>& picture);
 void draw_line(const Vec2<double>& from, const Vec2<double>& to, const Ink& ink, Tensor<uint8_t>& picture);
-// The pixels whose centres are between the radii from the centre.
+// Fills the pixels whose distance from the centre is between the radii.
 void draw_ring(const Vec2<double>& centre, double inner, double outer, const Ink& ink,
                Tensor<uint8_t>& picture);
 

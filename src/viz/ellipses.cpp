@@ -10,15 +10,15 @@
 #include "math/surfel_projection.h"
 #include "scene/surfel_views.h"
 
-// Disks are prepared in parallel, listed by tiles in their own order, and each tile is one thread's. A tile
-// first finds the nearest disk of every pixel and then colours it.
+// Disks are prepared in parallel and sorted into tiles in their own order; one thread processes each tile. A
+// tile first finds the nearest disk of every pixel and then colours the pixels.
 namespace traceflow::viz {
 
 namespace {
 
 constexpr int tile_side = 32;
 
-// The first and the last column and row of pixels that a disk may cover; nothing where the last is less.
+// The first and last column and row of the pixels that a disk may cover; empty if last < first.
 struct PixelBox {
   int left = 0, top = 0, right = -1, bottom = -1;
 
@@ -33,7 +33,7 @@ struct PixelBox {
   }
 };
 
-// A linear form of a pixel's ray as one of its place.
+// A linear form in a pixel's ray, written as a linear form in the pixel's coordinates.
 struct PixelForm {
   double x = 0, y = 0, constant = 0;
 
@@ -45,7 +45,7 @@ struct PixelForm {
   double at(double pixel_x, double pixel_y) const { return x * pixel_x + y * pixel_y + constant; }
 };
 
-// A surfel as pixels see it (math/surfel_projection.h).
+// A surfel in pixel coordinates (math/surfel_projection.h).
 struct Disk {
   PixelForm u, v, w;
   double inverse_z_plane = 0;
@@ -60,10 +60,10 @@ bool is_shown(const PosedSurfelsView& s, int64_t i) {
          s.scale[2 * i] > 0 && s.scale[2 * i + 1] > 0;
 }
 
-// The pixels whose centres lie in the picture of an octagon around the disk, as far as it is beyond the near
-// plane. In every axis the picture of a convex shape lies between those of its corners.
+// The pixels whose centres are in the bounding box of a projected octagon around the disk, clipped at the
+// near plane. The box of a convex shape is the box of its corners.
 PixelBox box_around(const SurfelFrame<double>& s, const Camera<double>& camera, double near_plane) {
-  // Where the plane cuts a disk of this size would be lost in rounding.
+  // For so large a disk, rounding would make the clipping at the plane meaningless.
   if (std::max(s.scale.x, s.scale.y) > 1e8 * near_plane) return {0, 0, camera.width - 1, camera.height - 1};
   constexpr int corners = 8;
   constexpr double half_turn = 3.14159265358979323846;
@@ -89,7 +89,7 @@ PixelBox box_around(const SurfelFrame<double>& s, const Camera<double>& camera, 
     if (a.z >= nearest) include(a);
     if ((a.z >= nearest) != (b.z >= nearest)) include(mix(a, b, (nearest - a.z) / (b.z - a.z)));
   }
-  // Pixel i has its centre at i + 0.5. A disk that is nowhere in front has no bounds and an empty box.
+  // The centre of pixel i is at i + 0.5. A disk that is nowhere in front has no bounds and an empty box.
   const auto first = [](double v, int end) {
     return static_cast<int>(std::ceil(std::clamp(v - 0.5, 0.0, end + 0.0)));
   };
@@ -111,7 +111,7 @@ std::optional<Disk> prepare(const PosedSurfelsView& surfels, int64_t i, const Ca
   disk.box = box_around(frame, camera, options.near_plane);
   if (disk.box.empty()) return std::nullopt;
   const SurfelForms<double> forms = surfel_forms(frame, camera);
-  if (!(forms.z_plane > 0)) return std::nullopt;  // seen exactly from the side
+  if (!(forms.z_plane > 0)) return std::nullopt;  // seen edge-on
   disk.u = PixelForm(forms.u, camera);
   disk.v = PixelForm(forms.v, camera);
   disk.w = PixelForm(forms.w, camera);
@@ -121,7 +121,7 @@ std::optional<Disk> prepare(const PosedSurfelsView& surfels, int64_t i, const Ca
   return disk;
 }
 
-// The disks that can be seen, in the order of the surfels.
+// The visible disks, in surfel order.
 std::vector<Disk> prepare_all(const PosedSurfelsView& surfels, const Camera<double>& camera,
                               const raster::Options& options) {
   constexpr int64_t grain = 1024;
@@ -137,10 +137,10 @@ std::vector<Disk> prepare_all(const PosedSurfelsView& surfels, const Camera<doub
   return disks;
 }
 
-// Which disks may touch which tile, ascending.
+// For each tile the disks that may touch it, ascending.
 struct TileLists {
   int across, down;
-  std::vector<size_t> begin;  // of each tile's list in `disk`, and the end
+  std::vector<size_t> begin;  // start of each tile's list in `disk`, and the end
   std::vector<uint32_t> disk;
 
   TileLists(const std::vector<Disk>& disks, int width, int height)

@@ -12,7 +12,7 @@ void LayerFiles::write(const std::string& name, const Frame& frame, const Tracks
   std::vector<std::filesystem::path> paths(layers_.size());
   for (size_t i = 0; i < layers_.size(); ++i) {
     values[i] = layer_values(frame, layers_[i], scale_, tracks);
-    // In order, because the painter remembers the first frame's ranges.
+    // In order, since the painter keeps the first frame's ranges.
     if (format_ == ImageFormat::png) pictures[i] = painter_.paint(layers_[i], values[i]);
     paths[i] = folder_ / to_string(layers_[i]) / (name + (format_ == ImageFormat::png ? ".png" : ".npy"));
     std::filesystem::create_directories(paths[i].parent_path());

@@ -10,7 +10,7 @@ namespace traceflow::viz {
 
 enum class ImageFormat { png, npy };
 
-// Writes a frame's layers as FOLDER/LAYER/NAME.png for the eye, or .npy (float32, H×W or H×W×3) for other
+// Writes a frame's layers as FOLDER/LAYER/NAME.png for viewing, or as .npy (float32, H×W or H×W×3) for other
 // programs.
 class LayerFiles {
  public:
@@ -18,7 +18,7 @@ class LayerFiles {
   LayerFiles(std::filesystem::path folder, std::vector<Layer> layers, ImageFormat format, double scale)
       : folder_(std::move(folder)), layers_(std::move(layers)), format_(format), scale_(scale) {}
 
-  // name may hold folders, which are made. tracks: for the layer of that name.
+  // name may contain folders, which are created. tracks: for the layer `tracks`.
   void write(const std::string& name, const Frame& frame, const Tracks& tracks = {});
 
  private:

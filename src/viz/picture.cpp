@@ -36,7 +36,7 @@ std::optional<Painter::Range> Painter::range_of(const Tensor<float>& values) {
     if (shown(v)) seen.push_back(v);
   }
   if (seen.empty()) return std::nullopt;
-  // Two percent at either end are left to be clamped: a single stray hit would take the whole range.
+  // Two percent at each end are clamped, so that single outliers do not determine the range.
   const auto at = [&](size_t percent) {
     const auto place = seen.begin() + static_cast<std::ptrdiff_t>(((seen.size() - 1) * percent + 50) / 100);
     std::nth_element(seen.begin(), place, seen.end());
@@ -50,7 +50,7 @@ Painter::Range Painter::followed(std::optional<Range>& range, const Tensor<float
   if (range && options_.follow <= 0) return *range;
   const std::optional<Range> own = range_of(values);
   if (!range) {
-    // A picture without any values says nothing of the next ones, unless these must not differ.
+    // A picture without any value does not set the range, unless later ones must keep the first range.
     if (!own && options_.follow > 0) return {0, 1};
     range = own.value_or(Range{0, 1});
   } else if (own) {
@@ -64,7 +64,7 @@ Painter::Range Painter::followed(std::optional<Range>& range, const Tensor<float
 Tensor<uint8_t> Painter::mapped(const Tensor<float>& values, Range range, bool zero_is_none) const {
   const ColourMap map = options_.map.value_or(ColourMap::ramp);
   Tensor<float> colours(Shape{values.dim(0), values.dim(1), 3});
-  parallel_for("show: map numbers to colours", values.size(), [&](int64_t i) {
+  parallel_for("viz: map numbers to colours", values.size(), [&](int64_t i) {
     const bool none = !std::isfinite(values[i]) || (zero_is_none && values[i] == 0);
     if (!none)
       store3(colours.data() + 3 * i, map_colour(map, (values[i] - range.low) / (range.high - range.low)));

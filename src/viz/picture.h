@@ -8,20 +8,20 @@
 
 namespace traceflow::viz {
 
-// How numbers become colours.
+// How numbers are mapped to colours.
 struct PaintOptions {
-  // For every layer of numbers. Absent: the ramp for depths, distortion and differences, grey for tint and
-  // alpha.
+  // For all layers with one number per pixel. Absent: the ramp for depths, distortion and differences, grey
+  // for tint and alpha.
   std::optional<ColourMap> map = std::nullopt;
-  float exposure = 0;  // stops: layers that are light, and differences, are brightened by 2^exposure
-  // How far the ranges of depths and distortion go with each picture from where they are to the picture's
-  // own: 0 not at all, so that the first picture's stay and a film does not flicker; 1 all the way.
+  float exposure = 0;  // stops: light layers and differences are multiplied by 2^exposure
+  // How far the ranges of depths and distortion move towards each picture's own range: 0 keeps the first
+  // picture's range, so that a video does not flicker; 1 uses each picture's own.
   float follow = 0;
 };
 
-// Turns layers into 8-bit pictures for the eye. Colours, tint and alpha are shown as they are; normals as (n
-// + 1)/2 of world x, y, z; depths from near (bright) to far (dark) by inverse depth, distortion from none
-// (dark) to much (bright), black where there is none.
+// Converts layers to 8-bit pictures. Colours, tint and alpha are unchanged. Normals are (n + 1)/2 of world x,
+// y, z. Depths go from near (bright) to far (dark) by inverse depth, distortion from none (dark) to much
+// (bright); both are black where there is no value.
 class Painter {
  public:
   explicit Painter(const PaintOptions& options = {}) : options_(options) {}
@@ -30,7 +30,7 @@ class Painter {
   PaintOptions& options() { return options_; }
 
   Tensor<uint8_t> paint(Layer layer, const Tensor<float>& values);
-  // difference_values, H×W. At exposure 0 the map ends at a difference of a quarter.
+  // Paints difference_values, H×W. At exposure 0 the map ends at a difference of 0.25.
   Tensor<uint8_t> paint_difference(const Tensor<float>& values) const;
 
  private:
@@ -38,7 +38,7 @@ class Painter {
     float low, high;
   };
   static std::optional<Range> range_of(const Tensor<float>& values);
-  // The range to paint with, after it has followed the values.
+  // Updates the range by the values and returns it.
   Range followed(std::optional<Range>& range, const Tensor<float>& values) const;
   Tensor<uint8_t> mapped(const Tensor<float>& values, Range range, bool zero_is_none) const;
 
@@ -46,11 +46,12 @@ class Painter {
   std::optional<Range> inverse_depth_, distortion_;
 };
 
-// Averages to fit `width` columns and `height` rows; an image that fits stays as it is. H×W×3.
+// Averages the image down to at most `width` columns and `height` rows. An image that fits is unchanged.
+// H×W×3.
 Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width,
                        int64_t height = std::numeric_limits<int64_t>::max());
 
-// Grey (H×W) to three channels; three stay.
+// Converts grey (H×W) to three channels; three channels are unchanged.
 Tensor<uint8_t> in_colour(const Tensor<uint8_t>& image);
 
 }  // namespace traceflow::viz

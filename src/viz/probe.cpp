@@ -6,7 +6,7 @@ namespace traceflow::viz {
 
 namespace {
 
-// A camera that sees one pixel of another's picture.
+// A camera with only one pixel of another camera's image.
 Camera<float> camera_of_pixel(Camera<float> camera, double x, double y) {
   camera.centre_x -= static_cast<float>(std::floor(x));
   camera.centre_y -= static_cast<float>(std::floor(y));
@@ -17,7 +17,7 @@ Camera<float> camera_of_pixel(Camera<float> camera, double x, double y) {
 float number(const Tensor<float>& values) { return values.on(Device::cpu)[0]; }
 Vec3<float> vector(const Tensor<float>& values) { return load3<float>(values.on(Device::cpu).data()); }
 
-// A pixel list of the one pixel, where the frame is.
+// A list that contains only the first pixel, on the frame's device.
 Tensor<int32_t> first_pixel(Device device) { return Tensor<int32_t>(Shape{1}, device); }
 
 ProbeResult::Mirrored mirrored_of(const MirroredRays& from) {
@@ -45,7 +45,7 @@ std::optional<ProbeResult> probe(Renderer& renderer, const Scene& scene, const F
   if (!(result.alpha >= renderer.options().select.min_alpha && length2 > 0 && std::isfinite(length2))) {
     return std::nullopt;
   }
-  // The surface's point is where a mirrored ray begins, traced or not.
+  // The surface point is the origin of a reflected ray, traced or not.
   trace::Rays ray;
   surface::reflection_rays(one.camera, first_pixel(scene.device()), frame.raster.depth,
                            frame.raster.median_depth, frame.raster.normal, renderer.options().depth_ratio,

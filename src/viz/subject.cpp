@@ -18,7 +18,7 @@ namespace traceflow::viz {
 
 namespace {
 
-// Names of the notes in a .ply's comments.
+// Keys of the comments in a .ply's header.
 constexpr const char* extent_note = "extent";
 constexpr const char* focal_note = "focal";
 constexpr const char* render_note = "render";
@@ -31,7 +31,7 @@ std::string note(const PlyScene& file, const char* key) {
   return found == file.notes.end() ? "" : found->second;
 }
 
-// The number in a note; 0 where the note is not there.
+// The number in a comment; 0 if the comment is missing.
 float number_in(const PlyScene& file, const char* key, const std::filesystem::path& path) {
   const std::string text = note(file, key);
   if (text.empty()) return 0;
@@ -43,7 +43,7 @@ float number_in(const PlyScene& file, const char* key, const std::filesystem::pa
   return number;
 }
 
-// The environment's file as the note names it: a name in the same folder, and nothing else.
+// The environment's file in the same folder. The comment must be a plain file name.
 std::filesystem::path beside(const std::filesystem::path& path, const std::string& name) {
   const std::filesystem::path file(name);
   if (file.filename() != file || name == "." || name == "..") {
@@ -57,8 +57,8 @@ bool finite_row(const Tensor<float>& tensor, int64_t row) {
   return std::all_of(values, values + tensor.row_size(), [](float v) { return std::isfinite(v); });
 }
 
-// Stored values with the field's residuals added, still before activation. Surfels that are not finite are
-// left out, as pictures leave them out.
+// Stored values plus the field's residuals, before activation. Surfels that are not finite are left out, as
+// in renders.
 Surfels posed(const Surfels& stored, const Field* field, const Nodes* nodes, const Motion* motion,
               const Lighting* lighting, std::optional<float> time, field::Precision precision) {
   Surfels result =

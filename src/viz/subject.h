@@ -10,25 +10,26 @@
 
 namespace traceflow::viz {
 
-// What pictures are made of: a scene with all that its pictures depend on beside camera and time.
+// All that pictures depend on besides camera and time.
 struct Subject {
   Scene scene;
   RenderOptions render;
-  FrameRequest request;  // which parts of the scene take part; camera and time are each shot's own
-  std::string warning;   // one line on what a picture will lack; empty when all is there
+  FrameRequest request;  // the parts of the scene to render; camera and time are set by each shot
+  std::string warning;   // one line on what pictures lack; empty if nothing
 };
 
-// Reads a .ply and, where its notes name one, the environment's .ply beside it (`traceflow export` writes
-// such pairs); `environment`, when not empty, is read in its place. Throws InputError.
+// Reads a .ply and, if its header names one, the environment's .ply beside it (`traceflow export` writes such
+// pairs). `environment`, if not empty, is read instead. Throws InputError.
 Subject read_ply_subject(const std::filesystem::path& path, const std::filesystem::path& environment);
 
-// A scene's size for one that does not tell: the median distance of its surfels from the middle of the
+// The extent of a scene that does not store one: the median distance of its surfels from the mean of the
 // cameras. The near plane is relative to it (method §3.4).
 float extent_seen_from(const Surfels& surfels, const std::vector<Shot>& shots);
 
-// Main and environment surfels posed at `time` (method §1.3) and taken to the capture's own coordinates, as
-// main.ply and environment.ply in `folder`, with notes that let read_ply_subject make the same pictures.
-// Without a time they stay as they are stored, undeformed. Returns the files written.
+// Writes main and environment surfels, posed at `time` (method §1.3) and converted to the capture's
+// coordinates, as main.ply and environment.ply into `folder`. Header comments let read_ply_subject reproduce
+// the pictures. Without a time, surfels are written as stored, without deformation. Returns the written
+// files.
 std::vector<std::filesystem::path> export_subject(const Subject& subject, std::optional<float> time,
                                                   const std::filesystem::path& folder);
 

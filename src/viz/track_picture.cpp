@@ -7,20 +7,20 @@ namespace traceflow::viz {
 
 namespace {
 
-// How much farther than the median depth a point may be, as a share of it: surfels lie about the surface.
+// Tolerance on the median depth, as a fraction of it, since surfels scatter about the surface.
 constexpr double behind = 0.02;
 
-// Pixels, for a picture whose shorter side has 360 of them; and the least.
+// Pixels, for an image whose shorter side has 360 pixels; and the minimum.
 constexpr double usual_side = 360, line_width = 1.3, dot_radius = 2;
 constexpr double least_line_width = 1, least_dot_radius = 1.2;
 
-// How much of the pixel at a distance a shape of this half width covers.
+// The fraction of a pixel at this distance that a line of this half width covers.
 double coverage(double distance, double half_width) {
   return std::clamp(half_width + 0.5 - distance, 0.0, 1.0);
 }
 
-// Lays one path after another over a picture. Where a path crosses itself it is as strong as the stronger
-// part, so that neither joints nor loops show.
+// Blends one track after another over a picture. Where a track crosses itself, the stronger part counts, so
+// that joints and loops are not visible.
 class Pen {
  public:
   explicit Pen(Tensor<float>& picture)
@@ -45,7 +45,7 @@ class Pen {
   }
 
  private:
-  // The pixels whose centres are between two places.
+  // The pixels whose centres are between two coordinates.
   struct Range {
     int64_t first, last;
   };
@@ -55,13 +55,13 @@ class Pen {
             static_cast<int64_t>(std::floor(std::clamp(high - 0.5, -1.0, limit - 1)))};
   }
 
-  // Strengths are those at its ends.
+  // Strengths are given for the segment's ends.
   void segment(const Vec2<double>& a, const Vec2<double>& b, double half, double from, double to) {
     const Vec2<double> way = b - a;
     const double squared = dot_of(way, way), radius = half + 0.5;
     const Range rows = range(std::min(a.y, b.y) - radius, std::max(a.y, b.y) + radius, height_);
     for (int64_t y = rows.first; y <= rows.last; ++y) {
-      // Between which x the part of the segment runs that can reach this row.
+      // The x range of the part of the segment that can touch this row.
       const double middle = static_cast<double>(y) + 0.5;
       const auto x_at = [&](double row) {
         return a.x + std::clamp(way.y == 0 ? 0.0 : (row - a.y) / way.y, 0.0, 1.0) * way.x;
@@ -100,7 +100,7 @@ class Pen {
   Tensor<float>& picture_;
   int64_t width_, height_;
   double half_line_, dot_;
-  std::vector<float> ink_;  // of the path at hand, H×W
+  std::vector<float> ink_;  // of the present track, H×W
   std::vector<int64_t> wet_;
 };
 
@@ -113,7 +113,7 @@ bool is_hidden(const Tensor<float>& depth, const Vec2<double>& place, double z) 
 }  // namespace
 
 Vec3<float> rainbow_colour(float hue) {
-  // Five of the six parts of the circle of hues, so that the ends differ.
+  // Five sixths of the hue circle, so that the two ends differ.
   const float angle = 5 * std::clamp(hue, 0.0F, 1.0F);
   const auto channel = [&](float from) {
     const float away = std::fmod(angle + from, 6.0F);

@@ -14,11 +14,12 @@ namespace traceflow::viz {
 namespace {
 
 constexpr int usual_steps = 60;
-// A point is at least so opaque wherever it is looked at.
+// Minimum opacity of a point at every examined time.
 constexpr float least_opacity = 0.3F;
-// Of more surfels an even share is looked at, at so many times: about as much work as posing a frame or two.
+// If there are more surfels, an even sample is examined, at this many times: about as much work as posing one
+// or two frames.
 constexpr size_t most_candidates = 16384, most_looks = 9;
-// Points are never nearer to each other, as a share of the space that all of them take.
+// Minimum distance between points, as a fraction of the extent of all.
 constexpr float least_gap = 1.0F / 40;
 
 std::vector<float> times_of_scene(const Scene& scene) {
@@ -31,7 +32,7 @@ std::vector<float> times_of_scene(const Scene& scene) {
   return times;
 }
 
-// At most `most` of them, at even distances; the first and the last are among them.
+// At most `most` evenly spaced times, including the first and the last.
 std::vector<float> spread(const std::vector<float>& times, size_t most) {
   if (times.size() <= most) return times;
   std::vector<float> some;
@@ -39,7 +40,7 @@ std::vector<float> spread(const std::vector<float>& times, size_t most) {
   return some;
 }
 
-// How many times of the capture lie before a time; between two of them a part counts.
+// The index of a time among those of the capture, with a fraction between two of them.
 double place_among(const std::vector<float>& times, float time) {
   const auto next = std::upper_bound(times.begin(), times.end(), time);
   if (next == times.begin()) return 0;
@@ -48,8 +49,8 @@ double place_among(const std::vector<float>& times, float time) {
   return before + (double{time} - *(next - 1)) / (double{*next} - *(next - 1));
 }
 
-// Goes through the points and takes each that is no nearer than `gap` to those taken before, until there are
-// more than `most`.
+// Takes each point that is at least `gap` away from all points taken before, until there are more than
+// `most`.
 std::vector<size_t> apart(const std::vector<Vec3<float>>& points, float gap, size_t most) {
   std::vector<size_t> taken;
   for (size_t i = 0; i < points.size() && taken.size() <= most; ++i) {
@@ -62,8 +63,8 @@ std::vector<size_t> apart(const std::vector<Vec3<float>>& points, float gap, siz
   return taken;
 }
 
-// The diagonal of the box around the points that leaves a twentieth out at either end of each axis: strays
-// would take all of it.
+// The diagonal of the box around the points without the outermost twentieth at each end of each axis, so that
+// outliers do not count.
 float size_of(const std::vector<Vec3<float>>& points) {
   Vec3<float> sides(0);
   std::vector<float> values(points.size());
@@ -76,8 +77,8 @@ float size_of(const std::vector<Vec3<float>>& points) {
   return length(sides);
 }
 
-// At most `most` of the points, spread evenly over the space that they take: with the least gap for which
-// there are no more. What stands first is taken first.
+// At most `most` points, evenly spread over space: with the smallest gap that gives no more. Earlier points
+// are preferred.
 std::vector<size_t> spread_out(const std::vector<Vec3<float>>& points, size_t most) {
   if (points.empty()) return {};
   float too_near = least_gap * size_of(points);
@@ -97,8 +98,8 @@ std::vector<size_t> spread_out(const std::vector<Vec3<float>>& points, size_t mo
   return apart(points, far, most);
 }
 
-// The rank of each point along the axis on which they differ most, as a share: things that are near each
-// other have colours that are, and where paths go apart that is seen.
+// The rank of each point along the axis of largest variance, as a fraction. Points close together get similar
+// colours, so that diverging tracks are visible.
 std::vector<float> hues_of(const std::vector<Vec3<float>>& points) {
   Vec3<double> sum(0), squares(0);
   for (const Vec3<float>& p : points) {
@@ -164,7 +165,7 @@ void TrackFollower::choose(const Scene& scene) {
   if (rows.empty()) return;
   const Tensor<int32_t> looked_at = tensor_of(rows).on(scene.device());
 
-  // See how far each goes from where it is first, and how opaque it stays.
+  // Measure how far each surfel moves from its first position, and its lowest opacity.
   const std::vector<float> looks = spread(times_, most_looks);
   const Places first = places(scene, looks[0], looked_at);
   std::vector<float> moved(rows.size(), 0), opacity(rows.size(), 1);
@@ -179,7 +180,7 @@ void TrackFollower::choose(const Scene& scene) {
     }
   }
 
-  // Of those that move, keep the most opaque, apart from each other.
+  // Keep the most opaque of those that move, with gaps between them.
   std::vector<int64_t> movers;
   for (size_t k = 0; k < rows.size(); ++k) {
     if (opacity[k] >= least_opacity && moved[k] >= options_.least_move * scene.extent && moved[k] > 0)
@@ -195,7 +196,7 @@ void TrackFollower::choose(const Scene& scene) {
   for (const size_t k : spread_out(points, static_cast<size_t>(options_.most))) kept.push_back(movers[k]);
   if (kept.empty()) return;
 
-  // In the order of the surfels, each with its hue.
+  // In surfel order, each with its hue.
   std::sort(kept.begin(), kept.end());
   std::vector<int32_t> chosen;
   points.clear();

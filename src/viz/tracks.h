@@ -7,29 +7,30 @@
 
 namespace traceflow::viz {
 
-// Where P points of a scene have lately been, at V times each. On the host.
+// Recent positions of P points of a scene at V times. On the host.
 struct Tracks {
-  std::vector<float> age;  // V, ascending from 0, the present: how many times of the capture ago
-  float oldest = 1;        // the age at which a path has faded away
-  std::vector<float> hue;  // P, 0 to 1: a point has the same at every time
+  std::vector<float> age;  // V, ascending from 0, the present: age in times of the capture
+  float oldest = 1;        // the age at which a track has faded
+  std::vector<float> hue;  // P, 0 to 1: constant over time
   Tensor<float> position;  // V×P×3, world
 
   int64_t count() const { return static_cast<int64_t>(hue.size()); }
 };
 
-// Follows main surfels that move, over the times of a capture. Which ones is found once, by how far they move
-// over the whole film, so that every picture of a film has the same. The same at any number of threads.
+// Follows moving main surfels over the times of a capture. The surfels are chosen once, by how far they move
+// over all times, so that every frame of a video has the same. The result does not depend on the number of
+// threads.
 class TrackFollower {
  public:
-  // request: which parts of the scene take part. times: the capture's, ascending; empty where they are not
-  // known: then the keys of the bodies' motion or, without bodies, 60 even steps.
+  // request: the parts of the scene to render. times: the capture's, ascending. If empty, the keys of the
+  // bodies' motion or, without bodies, 60 even steps are used.
   TrackFollower(const Scene& scene, const FrameRequest& request, const RenderOptions& options,
                 std::vector<float> times);
 
-  // The paths that lead to where the points are at `time`. The scene is the same as before.
+  // The tracks up to `time`. The scene must be the same as in the constructor.
   Tracks at(const Scene& scene, float time) const;
 
-  // P, the rows of the points among the stored main surfels, ascending. Where the scene is.
+  // P, the points' rows among the stored main surfels, ascending. On the scene's device.
   const Tensor<int32_t>& chosen() const { return chosen_; }
 
  private:
@@ -37,7 +38,7 @@ class TrackFollower {
     Tensor<float> position, opacity;  // M×3, M, on the host
   };
   Places places(const Scene& scene, float time, const Tensor<int32_t>& rows) const;
-  // Opaque surfels that something may move.
+  // Opaque surfels that may move.
   std::vector<int32_t> candidates(const Scene& scene) const;
   void choose(const Scene& scene);
 

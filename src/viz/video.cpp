@@ -20,16 +20,16 @@ void Video::prepare(const std::filesystem::path& path) {
 }
 
 void Video::start() {
-  // The last ending tells ffmpeg the format.
+  // ffmpeg selects the format by the last extension.
   partial_.emplace(path_, PartialFile::OtherWriter::refused, ".partial" + path_.extension().string());
   Pipe pipe = make_pipe();
-  // A relative name could begin with a dash.
+  // A relative path could start with a dash.
   const std::string output = std::filesystem::absolute(partial_->name()).string();
   process_.emplace(
       std::vector<std::string>{
           "ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s",
           fmt::format("{}x{}", size_[1], size_[0]), "-r", fmt::format("{}", frames_per_second_), "-i", "-",
-          // Most players want 4:2:0, which wants even sides.
+          // Most players need 4:2:0, which needs even sides.
           "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-crf", "18", output},
       ProcessStreams{.input = pipe.reading.number(), .error = STDERR_FILENO});
   pipe_ = std::move(pipe.writing);
@@ -43,7 +43,7 @@ void Video::fail() const {
 void Video::add(const Tensor<uint8_t>& frame) {
   if (!process_) {
     size_ = frame.shape();
-    // ffmpeg may end early; the write must then fail instead of ending this program.
+    // If ffmpeg ends early, the write must fail without ending this program.
     std::signal(SIGPIPE, SIG_IGN);
     start();
   }

@@ -10,12 +10,11 @@
 
 namespace traceflow::viz {
 
-// A film written by ffmpeg, which is fed frames through a pipe. It takes its name when it is whole: until
-// then, and where it is never finished, what bore the name before stays.
+// A video that ffmpeg encodes from frames sent through a pipe. The file gets its name when it is complete.
+// Until then, and if it is never finished, an older file of the same name is kept.
 class Video {
  public:
-  // Throws InputError when there is no ffmpeg, and makes the film's folder: to be called before any work
-  // begins.
+  // Creates the video's folder. Throws InputError if ffmpeg is missing. Call before any work starts.
   static void prepare(const std::filesystem::path& path);
 
   Video(std::filesystem::path path, double frames_per_second)
@@ -23,10 +22,10 @@ class Video {
   Video(const Video&) = delete;
   Video& operator=(const Video&) = delete;
 
-  // H×W×3. Throws InputError for a frame of another size than the first one's, and where another program is
-  // writing this film.
+  // frame: H×W×3. Throws InputError if its size differs from the first frame's, or if another program is
+  // writing this video.
   void add(const Tensor<uint8_t>& frame);
-  // Ends the film. Throws InputError when ffmpeg could not write it.
+  // Completes the video. Throws InputError if ffmpeg could not write it.
   void finish();
 
  private:
@@ -37,7 +36,7 @@ class Video {
   double frames_per_second_;
   Shape size_;
   std::optional<PartialFile> partial_;
-  std::optional<Process> process_;  // ended before the file goes that it writes
+  std::optional<Process> process_;  // must end before its output file is removed
   Descriptor pipe_;
 };
 

@@ -11,8 +11,8 @@ namespace traceflow {
 
 namespace {
 
-// Where so many cameras have the place that they look at in their pictures, a camera looks away when the
-// angle between its axis and that place exceeds so many of its picture's half diagonals.
+// If at least this fraction of the cameras have the common target in their images, a camera looks away when
+// the angle between its axis and the target exceeds this many half diagonals of its image.
 constexpr double agreeing_share = 0.9;
 constexpr double away_half_diagonals = 1.5;
 
@@ -20,7 +20,7 @@ Vec3<double> axis_of(const View& view) {
   return Vec3<double>(Vec3<float>(0, 0, 1) * view.camera.camera_from_world);
 }
 
-// The largest angle between the axis and a corner of the picture.
+// The largest angle between the axis and a corner of the image.
 double half_diagonal(const Camera<float>& camera) {
   double largest = 0;
   for (const float x : {0.0F, static_cast<float>(camera.width)}) {
@@ -38,8 +38,8 @@ double angle_to(const View& view, const Vec3<double>& place) {
   return far > 0 ? std::acos(std::clamp(dot(axis_of(view), to) / far, -1.0, 1.0)) : 0;
 }
 
-// The place that the axes pass nearest to: the sum of the distances is least, so that a few that look away
-// count little. Parallel axes are held to the middle of the cameras by a trifle.
+// The point with the least sum of distances to the optical axes. Unlike squared distances, the sum gives few
+// outliers little weight. A tiny pull to the mean of the cameras keeps parallel axes solvable.
 Vec3<double> place_looked_at(const std::vector<View>& views) {
   constexpr int rounds = 30;
   constexpr double trifle = 1e-6;

@@ -88,7 +88,7 @@ void list_missing(const Capture& capture, Inspection& result) {
   if (!(capture.far_plane > 0)) result.missing.emplace_back("near and far planes");
 }
 
-// What stands in the list of what is missing needs no second line.
+// Adds the warnings of loading, except those that the list of missing parts already covers.
 void take_warnings(const Capture& capture, Findings& findings) {
   std::copy_if(capture.warnings.begin(), capture.warnings.end(), std::back_inserter(findings),
                [](const Finding& f) { return f.kind != "no-points" && f.kind != "no-test"; });
@@ -121,7 +121,7 @@ std::vector<ViewFacts> measure_views(const Capture& capture, bool quick) {
   return facts;
 }
 
-// The values that exist, of views that could be read.
+// The existing values, over the views that could be read.
 template <class F>
 std::vector<double> values_of(const std::vector<ViewFacts>& facts, F&& value) {
   std::vector<double> values;

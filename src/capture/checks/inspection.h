@@ -10,28 +10,28 @@
 
 namespace traceflow {
 
-// What `traceflow inspect` tells about a capture (docs/inspect.md).
+// The results of `traceflow inspect` (docs/inspect.md).
 struct Inspection {
   struct Split {
     int64_t views = 0, masks = 0, normal_priors = 0, truth_normals = 0, truth_depths = 0;
-    int64_t times = 0;  // different ones
+    int64_t times = 0;  // number of different times
     double first_time = 0, last_time = 0;
   };
-  // Over the views that were decoded. Shares are of pixels.
+  // Statistics of the decoded views. Shares are of pixels.
   struct Pixels {
     int64_t views = 0;
     double mean_colour = 0;  // in [0, 1]
     double masked = 0;
     double with_prior = 0;
-    // Standard deviations in 8-bit levels, root mean square over the views; 0: not known.
+    // Standard deviations in 8-bit levels, root mean square over the views; 0: unknown.
     double noise = 0, masked_noise = 0;
     double prior_angle =
-        0;  // degrees, median over the views, against planes through the points; 0: not known
+        0;  // degrees, median over the views, of the angle to planes through the points; 0: unknown
   };
-  // Over the training views, by a sample of the points. Shares are of points.
+  // Visibility of a sample of the points in the training views. Shares are of points.
   struct Sight {
-    double in_view = 0;  // in one view's image: median over the views
-    double unseen = 0;   // in no view's image
+    double in_view = 0;  // in the image of one view: median over the views
+    double unseen = 0;   // in the image of no view
     double behind = 0;   // behind every camera
   };
 
@@ -41,19 +41,19 @@ struct Inspection {
   int box_factor = 1;
   int64_t resampled_views = 0;  // with distortion or skew
   double largest_zoom = 1;
-  int64_t decoded_bytes = 0;                   // of all views, as they are kept
-  Vec3<double> camera_low{0}, camera_high{0};  // box of the training cameras, scene units
+  int64_t decoded_bytes = 0;                   // of all views, in their cached form
+  Vec3<double> camera_low{0}, camera_high{0};  // box around the training cameras, scene units
   double camera_turn_degrees = 0;              // largest angle between the axes of two training cameras
   double field_of_view_degrees = 0;            // horizontal, of the first training camera
   Vec3<double> points_low{0}, points_high{0};
   Sight sight;
   Pixels pixels;
-  std::vector<std::string> missing;  // what the capture could have and does not
-  std::vector<Finding> findings;     // loading's, and those of all checks; problems first
+  std::vector<std::string> missing;  // optional parts that the capture does not have
+  std::vector<Finding> findings;     // from loading and from all checks; problems first
 };
 
-// quick: up to 32 views of each split, spread evenly, are decoded instead of all, and not compared with their
-// neighbours in time. Files that cannot be read become findings.
+// quick: decodes up to 32 evenly spaced views of each split and skips the comparison of neighbours in time.
+// Files that cannot be read become findings.
 Inspection inspect(const Capture& capture, bool quick = false);
 
 }  // namespace traceflow

@@ -7,7 +7,7 @@ namespace traceflow {
 namespace {
 
 constexpr double inverted_share = 0.6;  // of the pixels of all views
-constexpr double full_share = 0.98;     // of one view's
+constexpr double full_share = 0.98;     // of the pixels of one view
 
 }  // namespace
 

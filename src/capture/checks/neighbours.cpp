@@ -14,16 +14,15 @@ namespace traceflow {
 
 namespace {
 
-constexpr size_t window = 3;        // neighbours on either side that a picture's sharpness is compared with
-constexpr double film_share = 0.6;  // of the difference between far pictures, from one to the next
-constexpr double blur_share = 0.4;  // of their median sharpness
-constexpr double blur_deviations = 6;  // and below it by so many, in logarithms
-constexpr double jump_stops = 0.75;    // from one picture to the next,
+constexpr size_t window = 3;           // neighbours on each side that an image's sharpness is compared with
+constexpr double film_share = 0.6;     // difference of successive images, relative to that of distant ones
+constexpr double blur_share = 0.4;     // of the neighbours' median sharpness
+constexpr double blur_deviations = 6;  // below that median, in deviations of the logarithm
+constexpr double jump_stops = 0.75;    // between successive images,
 constexpr double jump_steps = 6;       // and in median steps
-constexpr double frozen_share = 0.05;  // of the median difference between one picture and the next
+constexpr double frozen_share = 0.05;  // of the median difference between successive images
 
-// One camera's views of both splits in the order of time, and at one time in that of a film's numbers; those
-// that could not be read left out.
+// One camera's readable views of both splits, ordered by time and, at equal times, by number.
 using Sequence = std::vector<const ViewFacts*>;
 
 std::vector<Sequence> sequences(const Capture& capture, const std::vector<ViewFacts>& facts) {
@@ -44,7 +43,7 @@ std::vector<Sequence> sequences(const Capture& capture, const std::vector<ViewFa
   return result;
 }
 
-// What a check finds over all sequences.
+// The result of one check over all sequences.
 struct Found {
   std::vector<std::string> views;
   double worst = 0, threshold = 0;
@@ -76,9 +75,9 @@ double usual_difference(const Sequence& sequence, size_t lag) {
   return median(std::move(differences));
 }
 
-// Whether the pictures follow each other, as a film's do: a picture and the next differ less than two that
-// lie far apart in the sequence, at one distance at least, as a film may come back to where it was. In a
-// collection of photographs the next one says nothing of this one.
+// Whether successive images form a video: their difference is clearly less than that of images far apart in
+// the sequence. Several distances are tried, since a video may return to where it was. In a collection of
+// photographs, successive images are unrelated.
 bool is_film(const Sequence& sequence) {
   double far = 0;
   for (const size_t parts : {2, 3, 4})
@@ -117,7 +116,7 @@ void find_jumps(const Sequence& whole, Found& found) {
   for (size_t i = 0; i < steps.size(); ++i) {
     if (sizes[i] <= limit) continue;
     found.add(*sequence[i + 1], sizes[i], limit);
-    // One odd picture is told once.
+    // One odd image causes two jumps; it is reported once.
     if (i + 1 < steps.size() && sizes[i + 1] > limit && std::abs(steps[i] + steps[i + 1]) < limit) ++i;
   }
 }

@@ -11,16 +11,16 @@ namespace traceflow {
 namespace {
 
 constexpr int64_t sample_size = 4000;
-// Many are healthy: what is beside and behind the cameras is seen in mirrors, and helps there.
+// Large values can be normal: points beside and behind the cameras help, because mirrors show them.
 constexpr double unseen_share = 0.8;
 constexpr double behind_share = 0.4;
-// A view sees hardly anything below this share of what the median view sees.
+// A view sees hardly any points if it sees less than this fraction of the median view's.
 constexpr double few_share = 0.1;
-// From the middle of the points, in distances of the median point.
+// From the centre of the points, in distances of the median point.
 constexpr double far_distance = 30;
 
 struct Sighting {
-  std::vector<double> in_view;  // share of the points in each training view's image
+  std::vector<double> in_view;  // fraction of the points in each training view's image
   double unseen = 0, behind = 0;
 };
 
@@ -66,7 +66,7 @@ void emit_unseen(const Sighting& sighting, Findings& findings) {
     finding.value = sighting.behind;
     finding.threshold = behind_share;
   }
-  // Where those behind are so many by themselves, they have been told.
+  // If the points behind alone exceed the limit, they are already reported.
   const bool are_behind = sighting.behind > unseen_share;
   if (sighting.unseen > unseen_share && !are_behind && !is_told("points-unseen")) {
     Finding& finding = findings.emplace_back(

@@ -11,12 +11,12 @@ namespace traceflow {
 
 namespace {
 
-// From the middle: in distances of the median camera, and beyond it in deviations.
+// Distance from the centre, in median distances, and beyond the median in deviations.
 constexpr double apart_distance = 3;
 constexpr double apart_deviations = 6;
-// A way that leads out step by step is no outlier: in steps of the path.
+// A path that leads outwards step by step has no outliers. In usual steps of the path.
 constexpr double connected_steps = 3;
-// More than this share of the cameras is a second group.
+// Above this fraction, the distant cameras are a second group and not outliers.
 constexpr double group_share = 0.1;
 
 using Positions = std::vector<Vec3<double>>;
@@ -31,8 +31,8 @@ Vec3<double> middle_of(const Positions& positions) {
   return middle;
 }
 
-// How far it is to the nearer of a camera's neighbours in time, which for nine of ten cameras is no farther:
-// from an outlier both are far, from its neighbours one.
+// The 90th percentile of a camera's distance to the nearer of its two neighbours in time. For an outlier both
+// neighbours are far; for its neighbours only one is.
 double usual_step(std::vector<const View*> views) {
   std::stable_sort(views.begin(), views.end(),
                    [](const View* a, const View* b) { return a->time < b->time; });
@@ -47,7 +47,7 @@ double usual_step(std::vector<const View*> views) {
   return *place;
 }
 
-// Takes those out of `far` that are within reach of one that is not, step by step.
+// Removes from `far` the cameras that a chain of gaps of at most max_gap connects to a camera not in `far`.
 void connect(const Positions& positions, double max_gap, std::vector<bool>& far) {
   std::vector<size_t> reached;
   for (size_t i = 0; i < far.size(); ++i) {

@@ -10,8 +10,8 @@ namespace traceflow {
 namespace {
 
 constexpr double empty_share = 0.1;  // of a view's pixels
-constexpr double wide_angle = 60;    // degrees, over all views: directions at random have 90
-// A view against the median of all: degrees, and deviations.
+constexpr double wide_angle = 60;    // degrees, over all views; random directions have 90
+// Limits for one view against the median of all: degrees, and deviations.
 constexpr double odd_angle = 15;
 constexpr double odd_deviations = 6;
 

@@ -13,8 +13,9 @@ namespace {
 
 constexpr size_t fewest_times = 5;
 constexpr double gap_steps = 5;    // in median steps between training times
-constexpr double rounding = 1e-3;  // of steps between times in single precision, as a share
-// Where more views than this share a time with another, there are several cameras that nobody told apart.
+constexpr double rounding = 1e-3;  // relative error of steps between times in single precision
+// If more than this fraction of the views share a time, the capture has several cameras that are not told
+// apart.
 constexpr double repeated_share = 0.5;
 
 void check_gaps(const Capture& capture, Findings& findings) {

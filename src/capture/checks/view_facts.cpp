@@ -42,7 +42,7 @@ Tensor<uint8_t> thumbnail_of(const Tensor<uint8_t>& grey) {
 }
 
 void measure_colour(const Tensor<uint8_t>& colour, ViewFacts& facts) {
-  constexpr double least_contrast = 1;  // squares of 8-bit levels
+  constexpr double least_contrast = 1;  // squared 8-bit levels
   int64_t sum = 0;
   for (const uint8_t v : colour.values()) sum += v;
   facts.mean_colour = static_cast<double>(sum) / 255 / static_cast<double>(colour.size());
@@ -96,8 +96,8 @@ void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& fa
 }  // namespace
 
 std::optional<double> exposure_of(const Tensor<uint8_t>& grey) {
-  constexpr uint8_t darkest = 8;       // below it is the black of a background, or noise
-  constexpr int64_t least_share = 50;  // one pixel of so many must be brighter
+  constexpr uint8_t darkest = 8;       // darker pixels are black background or noise
+  constexpr int64_t least_share = 50;  // at least one in so many pixels must be brighter
   constexpr double display_gamma = 2.2;
   double sum = 0;
   int64_t count = 0;

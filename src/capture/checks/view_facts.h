@@ -8,24 +8,24 @@
 
 namespace traceflow {
 
-// What one view's pixels show.
+// Measurements of one view's pixels.
 struct ViewFacts {
   const View* view = nullptr;
-  std::string broken;  // why a file cannot be read; the rest is then as it stands here
+  std::string broken;  // why a file cannot be read; the other members then have their defaults
   bool is_uniform = false;
   double mean_colour = 0;          // in [0, 1]
-  std::optional<double> exposure;  // stops: mean log₂ of the luminance of what is not black
-  double sharpness = 0;       // variance of the Laplacian over that of the picture: light does not change it
-  Tensor<uint8_t> thumbnail;  // grey, H×W
-  std::optional<double> masked, with_prior;   // shares of the pixels
-  std::optional<double> noise, masked_noise;  // standard deviations in 8-bit levels, all over and in the mask
-  std::optional<double> prior_angle;  // degrees: mean, outside the mask, from planes through the points
+  std::optional<double> exposure;  // stops: mean log₂ of the luminance of pixels that are not black
+  double sharpness = 0;            // variance of the Laplacian over the image's: independent of brightness
+  Tensor<uint8_t> thumbnail;       // grey, H×W
+  std::optional<double> masked, with_prior;   // fractions of the pixels
+  std::optional<double> noise, masked_noise;  // standard deviations in 8-bit levels, of all and in the mask
+  std::optional<double> prior_angle;  // degrees: mean angle to planes through the points, outside the mask
 };
 
-// Decodes the view, past the cache.
+// Decodes the view, without the cache.
 ViewFacts measure_view(const Capture& capture, const View& view, const SurfacePoints& surface);
 
-// For tests and for what has pixels already.
+// For tests and for code that already has the pixels.
 std::optional<double> exposure_of(const Tensor<uint8_t>& grey);
 
 }  // namespace traceflow

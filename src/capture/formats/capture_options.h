@@ -8,28 +8,28 @@
 
 namespace traceflow {
 
-// Axes of the normal priors' camera space, as signs against OpenCV's (x right, y down, z forward): opengl + −
-// −, opencv + + +, stable_normal − − −. `automatic` is opengl, unless the geometry clearly speaks for another
-// (docs/captures.md).
+// Axes of the normal priors' camera space, as signs relative to OpenCV's (x right, y down, z forward): opengl
+// + − −, opencv + + +, stable_normal − − −. `automatic` is opengl, unless the geometry clearly indicates
+// another (docs/captures.md).
 enum class PriorAxes { automatic, opengl, opencv, stable_normal };
 constexpr std::array<std::string_view, 4> enum_names(PriorAxes) {
   return {"automatic", "opengl", "opencv", "stable-normal"};
 }
 
-// How a capture is laid out (docs/captures.md); `automatic` looks.
+// The format of a capture (docs/captures.md); `automatic` selects it by the files.
 enum class CaptureFormat { automatic, nerfies, dycheck, colmap, transforms };
 constexpr std::array<std::string_view, 5> enum_names(CaptureFormat) {
   return {"automatic", "nerfies", "dycheck", "colmap", "transforms"};
 }
 
-// What lies behind the transparent parts of an image; `automatic` is the format's custom.
+// What is behind the transparent parts of an image; `automatic` is the format's default.
 enum class Background { automatic, black, white, grey };
 constexpr std::array<std::string_view, 4> enum_names(Background) {
   return {"automatic", "black", "white", "grey"};
 }
 
-// Where a capture's times come from: `automatic` is what the format says; `names` the order of the file
-// names; `none` makes all of them 0, for a scene that stands still.
+// The source of a capture's times: `automatic` is what the format defines, `names` is the order of the file
+// names, `none` makes all times 0, for a static scene.
 enum class CaptureTimes { automatic, names, none };
 constexpr std::array<std::string_view, 3> enum_names(CaptureTimes) { return {"automatic", "names", "none"}; }
 

@@ -24,7 +24,7 @@ std::string model_folder(const FileTree& tree) {
                    "cameras and images (.bin or .txt) in sparse/0, sparse or the folder itself");
 }
 
-// The folder's name at a lower size. What lies at the top has none beside it.
+// The folder's name at a lower size. Images at the top have no such folder.
 std::string folder_at(const std::string& folder, int stored) {
   return stored == 1 || folder.empty() ? folder : folder + "_" + std::to_string(stored);
 }
@@ -69,7 +69,7 @@ class ColmapReader {
     }
   }
 
-  // In the first folder where some image of the model lies at a size that is wanted, or else at any.
+  // Uses the first folder with any image of the model at a fitting size, or else at any size.
   void find_images() {
     const auto is_stored_in = [&](const std::string& folder) {
       return [&, folder](int stored) { return has_some(folder, stored); };

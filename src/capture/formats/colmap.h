@@ -6,7 +6,7 @@
 
 namespace traceflow {
 
-// A COLMAP model in sparse/0, sparse or the folder itself, its photographs in images (images_2, images_4, …
+// A COLMAP model in sparse/0, sparse or the folder itself. Photographs are in images (images_2, images_4, …
 // at lower sizes), input, rgb or the folder itself.
 bool is_colmap(const FileTree& tree);
 // Throws InputError.

@@ -16,7 +16,7 @@ static_assert(std::endian::native == std::endian::little, "COLMAP's files are li
 constexpr size_t longest_name = 4096;
 constexpr uint64_t no_point = ~uint64_t{0};
 
-// Numbers one after another, a piece of the file in memory at a time.
+// Reads successive numbers and holds one piece of the file in memory at a time.
 class Cursor {
  public:
   explicit Cursor(const InputFile& file) : file_(file), buffer_(size_t{1} << 18) {}
@@ -30,7 +30,7 @@ class Cursor {
     at_ += sizeof(T);
     return value;
   }
-  // A number of things of at least `each` bytes.
+  // Reads the count of elements that take at least `each` bytes.
   int64_t count(int64_t each, const std::string& field) {
     const auto value = take<uint64_t>(field);
     if (value > static_cast<uint64_t>(left() / each)) {
@@ -73,7 +73,7 @@ class Cursor {
   const InputFile& file_;
   std::vector<char> buffer_;
   size_t at_ = 0, end_ = 0;
-  int64_t offset_ = 0;  // in the file, of what follows the buffer
+  int64_t offset_ = 0;  // of the bytes after the buffer, in the file
 };
 
 std::string take_name(Cursor& cursor, const std::string& field) {

@@ -36,12 +36,12 @@ bool is_supported(std::string_view name) {
   return std::find(std::begin(unsupported), std::end(unsupported), name) == std::end(unsupported);
 }
 
-// Models with one focal length name it once.
+// Models with one focal length store it once.
 bool has_one_focal(std::string_view name) {
   return name.starts_with("SIMPLE_") || name.starts_with("RADIAL");
 }
 
-// p: what follows the principal point.
+// p: the parameters after the principal point.
 void set_distortion(Lens& lens, std::string_view name, std::span<const double> p) {
   if (name == "SIMPLE_RADIAL" || name == "SIMPLE_RADIAL_FISHEYE") {
     lens.radial = {p[0], 0, 0};

@@ -16,12 +16,12 @@ struct ColmapLensModel {
   size_t parameters;
 };
 
-// Null for what COLMAP does not know.
+// Null for models that COLMAP does not have.
 const ColmapLensModel* find_colmap_lens_model(int id);
 const ColmapLensModel* find_colmap_lens_model(std::string_view name);
 
-// where, field: of the camera, for errors. Throws InputError for a model that no Lens can be, and for
-// parameters that make no camera.
+// where, field: location of the camera in the files, for errors. Throws InputError for models that Lens
+// cannot represent and for invalid parameters.
 Lens colmap_lens(const ColmapLensModel& model, std::span<const double> parameters, double width,
                  double height, const std::string& where, const std::string& field);
 

@@ -13,7 +13,7 @@ namespace traceflow {
 
 namespace {
 
-// What double precision still holds after some arithmetic.
+// Double precision is still accurate here, with some margin for arithmetic.
 constexpr double far = 1e15;
 
 std::string text_of(const std::vector<double>& numbers) {
@@ -23,11 +23,11 @@ std::string text_of(const std::vector<double>& numbers) {
 }
 
 bool is_near(const Vec3<double>& v) {
-  // Also false for a NaN.
+  // Also false for NaN.
   return std::abs(v.x) < far && std::abs(v.y) < far && std::abs(v.z) < far;
 }
 
-// The first row whose key another before it has; rows.size() where there is none.
+// The first row whose key an earlier row has; rows.size() if there is none.
 template <class Row, class Key>
 size_t first_repeated(const std::vector<Row>& rows, Key&& key) {
   std::set<std::decay_t<decltype(key(rows[0]))>> seen;
@@ -37,7 +37,7 @@ size_t first_repeated(const std::vector<Row>& rows, Key&& key) {
   return rows.size();
 }
 
-// Makes a model of rows, each list checked on its way.
+// Builds a model from rows and checks each list.
 class Builder {
  public:
   Builder(const FileTree& tree, const std::string& folder) : tree_(tree), folder_(folder) {}
@@ -53,7 +53,7 @@ class Builder {
   }
 
  private:
-  // .bin, else .txt, else nothing.
+  // The .bin file, else the .txt file, else empty.
   std::string path_of(const std::string& name) const {
     for (const char* extension : {".bin", ".txt"}) {
       std::string path = (std::filesystem::path(folder_) / (name + extension)).string();

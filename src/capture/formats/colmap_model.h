@@ -8,7 +8,7 @@
 #include "files/file_tree.h"
 #include "math/types.h"
 
-// A reconstruction as COLMAP writes it, in its own coordinates: camera axes x right, y down, z forward.
+// A COLMAP reconstruction in its own coordinates: camera axes x right, y down, z forward.
 namespace traceflow {
 
 struct ColmapCamera {
@@ -20,16 +20,16 @@ struct ColmapCamera {
 struct ColmapImage {
   int64_t id = 0;
   int64_t camera_id = 0;
-  std::string name;  // below the folder of images
+  std::string name;  // relative to the folder of images
   Mat3<double> camera_from_world{1};
-  Vec3<double> position{0};  // of the camera, in the world
+  Vec3<double> position{0};  // of the camera, in world
   int64_t points_seen = 0;
 };
 
 struct ColmapPoint {
   Vec3<double> position{0};
   Vec3<uint8_t> colour{0};
-  double error = 0;  // pixels, as it stands in the file
+  double error = 0;  // pixels, as stored in the file
   int64_t track_length = 0;
 };
 
@@ -37,19 +37,19 @@ struct ColmapModel {
   std::vector<ColmapCamera> cameras;
   std::vector<ColmapImage> images;
   std::vector<ColmapPoint> points;
-  std::string cameras_file, images_file, points_file;  // in the tree; the last may be empty
+  std::string cameras_file, images_file, points_file;  // paths in the tree; the last may be empty
 
-  // Null where there is none.
+  // Null if there is no such camera.
   const ColmapCamera* camera(int64_t id) const;
 };
 
 // Whether the folder has a model's files, binary or text.
 bool has_colmap_model(const FileTree& tree, const std::string& folder);
 
-// Reads cameras, images and points3D, .bin where there are such, else .txt; all sorted by id. Rigs and frames
-// are not needed: images carry their poses. Without points3D there are no points. Throws InputError naming
-// file, field and value for files that are cut short or promise more than they hold, models that no Lens can
-// be, ids or image names that come twice, cameras that are missing, numbers that are not finite, and zero
+// Reads cameras, images and points3D, from .bin if it exists, else from .txt. All are sorted by id. Rigs and
+// frames are not needed, since images have poses. Without points3D there are no points. Throws InputError
+// with file, field and value for files that are truncated or promise more than they hold, models that Lens
+// cannot represent, repeated ids or image names, missing cameras, numbers that are not finite, and zero
 // quaternions.
 ColmapModel read_colmap_model(const FileTree& tree, const std::string& folder);
 

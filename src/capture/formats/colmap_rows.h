@@ -9,14 +9,14 @@
 #include "files/limits.h"
 #include "math/types.h"
 
-// The rows of a COLMAP model's files as they stand there, in the files' order: nothing but their form is
-// checked. Every reader throws InputError for files that are cut short or hold something else, before taking
-// memory for more rows than the file can hold, and for more than `most` points.
+// The rows of a COLMAP model's files, in file order; only their syntax is checked. The readers throw
+// InputError for files that are truncated or malformed, and for more than `most` points. They check that the
+// file can hold the promised rows before they allocate memory for them.
 namespace traceflow {
 
 struct ColmapCameraRow {
   int64_t id = 0;
-  std::string model;  // its name, or its number where that is not known
+  std::string model;  // its name, or its number if the name is unknown
   double width = 0, height = 0;
   std::vector<double> parameters;
 };

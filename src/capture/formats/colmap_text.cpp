@@ -12,12 +12,12 @@ namespace {
 
 constexpr size_t longest_line = size_t{1} << 26;
 
-// Lines one after another, a piece of the file in memory at a time.
+// Reads successive lines and holds one piece of the file in memory at a time.
 class Lines {
  public:
   explicit Lines(const InputFile& file) : file_(file) {}
 
-  // The next line, without spaces around it; false at the end.
+  // Reads the next line and strips spaces around it; false at the end.
   bool next() {
     line_.clear();
     bool any = false;
@@ -36,7 +36,7 @@ class Lines {
                                        : std::string_view(line_).substr(first, last + 1 - first);
     return any;
   }
-  // The next line that says something.
+  // Reads the next line that is neither empty nor a comment.
   bool next_row() {
     while (next()) {
       if (!rest_.empty() && rest_.front() != '#') return true;
@@ -44,7 +44,7 @@ class Lines {
     return false;
   }
 
-  // The next word of the line; empty where it ends.
+  // The next word of the line; empty at its end.
   std::string_view word() {
     const size_t begin = std::min(rest_.find_first_not_of(" \t"), rest_.size());
     rest_.remove_prefix(begin);
@@ -53,7 +53,7 @@ class Lines {
     rest_.remove_prefix(end);
     return word;
   }
-  // All that is left of the line.
+  // The rest of the line.
   std::string rest() const {
     const size_t begin = std::min(rest_.find_first_not_of(" \t"), rest_.size());
     return std::string(rest_.substr(begin));
@@ -101,7 +101,8 @@ Vec3<double> take_vector(Lines& lines, const std::string& field) {
   return {x, y, z};
 }
 
-// Of the triples "x y id" of the line, those with a point's id. A line of something else is the next image's.
+// Counts the triples "x y id" of the line that have a point's id. A line with other content belongs to the
+// next image.
 int64_t count_points(Lines& lines, const std::string& field) {
   int64_t count = 0, words = 0;
   for (std::string_view word = lines.word(); !word.empty(); word = lines.word()) {
@@ -142,7 +143,7 @@ std::vector<ColmapImageRow> read_colmap_images_text(const InputFile& file) {
     row.translation = take_vector(lines, field + ".tvec");
     row.camera_id = lines.number<uint32_t>(field + ".camera_id");
     row.name = lines.rest();
-    // The line after it may be empty, or, in models written by hand, missing at the end.
+    // The line after it may be empty or, in hand-written models, missing at the end.
     if (lines.next()) row.points_seen = count_points(lines, field + ".points2D");
   }
   return rows;

@@ -43,7 +43,7 @@ NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<Finding>& wa
   }
   NerfiesLayout layout;
   layout.format = "dycheck";
-  // Its training pictures are points of a depth camera: where it saw nothing they are black and transparent.
+  // Training images are points of a depth camera. Where it has no data they are black and transparent.
   layout.transparent_is_unknown = true;
   std::set<std::string> seen;
   layout.train_ids = read_split(tree, train_split, layout, seen);

@@ -4,9 +4,9 @@
 
 namespace traceflow {
 
-// DyCheck's captures: the layout of Nerfies, with the splits in splits/train.json and splits/val.json.
+// DyCheck's captures: the Nerfies layout, with the splits in splits/train.json and splits/val.json.
 bool is_dycheck(const FileTree& tree);
-// Reads the splits, their times and scene.json. Throws InputError.
+// Reads the splits with their times, and scene.json. Throws InputError.
 NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<Finding>& warnings);
 
 }  // namespace traceflow

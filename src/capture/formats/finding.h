@@ -8,25 +8,25 @@
 
 namespace traceflow {
 
-// problem: it will cost quality, or is a mistake; notice: worth knowing.
+// problem: a mistake, or a loss of quality; notice: good to know.
 enum class Severity { problem, notice };
 constexpr std::array<std::string_view, 2> enum_names(Severity) { return {"problem", "notice"}; }
 
-// Something about a capture that its owner should know, said by who loads it or by who inspects it.
+// A fact about a capture that its owner should know, from loading or inspection.
 struct Finding {
-  std::string text;  // one line, which names three views at most
+  std::string text;  // one line; names at most three views
   std::string kind;  // docs/inspect.md lists them
   Severity severity = Severity::problem;
-  std::vector<std::string> views;  // ids of all that are concerned
-  std::vector<std::string> files;  // likewise, paths inside the capture
+  std::vector<std::string> views;  // ids of all views concerned
+  std::vector<std::string> files;  // paths of all files concerned, inside the capture
   std::optional<double> value,
-      threshold;  // what was measured, of the worst view, and from where on it is told
+      threshold;  // the measured value of the worst view, and the limit beyond which it is reported
 
   Finding(std::string words, std::string its_kind, Severity how_bad = Severity::problem)
       : text(std::move(words)), kind(std::move(its_kind)), severity(how_bad) {}
 };
 
-// "a, b, c and 4 more": at most three are named.
+// "a, b, c and 4 more": names at most three.
 std::string ids_text(const std::vector<std::string>& ids);
 
 }  // namespace traceflow

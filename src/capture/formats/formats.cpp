@@ -21,8 +21,8 @@ struct Format {
   FoundCapture (*read)(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);
 };
 
-// In the order that they are looked for in. COLMAP goes before transforms.json, which programs write beside a
-// model, because it has points.
+// In order of precedence. COLMAP precedes transforms.json, which programs write beside a model, because it
+// has points.
 constexpr std::array<Format, 4> formats = {{{CaptureFormat::dycheck, is_dycheck, read_dycheck},
                                             {CaptureFormat::nerfies, is_nerfies, read_nerfies},
                                             {CaptureFormat::colmap, is_colmap, read_colmap},
@@ -32,12 +32,12 @@ const Format& format_called(CaptureFormat name) {
   return *std::find_if(formats.begin(), formats.end(), [&](const Format& f) { return f.name == name; });
 }
 
-// By what lies at the top.
+// Selects the format by the files at the top.
 const Format& look(const FileTree& tree) {
   const auto* const found =
       std::find_if(formats.begin(), formats.end(), [&](const Format& f) { return f.lies_in(tree); });
   if (found != formats.end()) return *found;
-  // Other programs write files of this name too; alone it is what is left of a capture.
+  // Other programs write files of this name too. Without the others it is an incomplete capture.
   if (tree.has("metadata.json")) return format_called(CaptureFormat::nerfies);
   throw InputError(tree.path().string(), "", "no capture",
                    "dataset.json (Nerfies, HyperNeRF, NeRF-DS), splits/train.json (DyCheck), sparse/0 with "
@@ -45,7 +45,7 @@ const Format& look(const FileTree& tree) {
                    "see docs/captures.md");
 }
 
-// The times that are asked for, or else the format's custom.
+// Applies the requested times, or else the format's default.
 void settle_times(CaptureTimes asked, const std::vector<std::string>& unregistered, FoundCapture& found) {
   if (asked != CaptureTimes::automatic) found.times = asked;
   if (found.times == CaptureTimes::automatic) return;

@@ -6,7 +6,7 @@
 
 namespace traceflow {
 
-// Reads a capture by the reader that knows its format, chosen by what lies in the folder. Throws InputError.
+// Selects the reader by the files in the folder and reads the capture. Throws InputError.
 FoundCapture read_capture(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);
 
 }  // namespace traceflow

@@ -10,24 +10,24 @@
 #include "files/file_tree.h"
 #include "scene/normalisation.h"
 
-// What a reader finds in a capture, whatever its format: everything in the capture's own coordinates and
-// units. load_capture (capture/capture.h) makes views of it.
+// What a reader finds in a capture of any format, in the capture's own coordinates and units. load_capture
+// (capture/capture.h) makes views of it.
 namespace traceflow {
 
 struct FoundView {
-  std::string id;  // part of file names: without '/'
+  std::string id;  // becomes part of file names: no '/'
   TreeFile image;
-  Lens lens;                // over lens.width × lens.height pixels; an image of another size scales it
-  std::string camera_name;  // of the file and field that say the lens, for errors
+  Lens lens;                // for lens.width × lens.height pixels; scaled if the image has another size
+  std::string camera_name;  // the file and field that define the lens, for errors
   Mat3<double> camera_from_world{1};  // camera axes x right, y down, z forward
   Vec3<double> position{0};
-  double time = 0;         // in any unit, from any beginning
-  std::string rig_camera;  // which of a rig's cameras took it; empty: not known
+  double time = 0;         // in any unit, with any origin
+  std::string rig_camera;  // the camera of a rig that took the view; empty: unknown
 };
 
-// Stored images at 1/stored of the full size, to be filtered by `factor`: stored · factor is the downscale.
+// Stored images at 1/stored of the full size, to be filtered by `factor`. The downscale is stored · factor.
 struct StoredImages {
-  std::string folder;  // which may hold one for each camera of a rig
+  std::string folder;  // may contain one folder for each camera of a rig
   int stored = 1;
   int factor = 1;
 };
@@ -35,41 +35,41 @@ struct StoredImages {
 struct FoundCapture {
   std::string format;
   StoredImages images;
-  std::vector<FoundView> train, test;  // whole ones alone
-  // Where times come from by the format's custom; `automatic`: as the views have them. Of what read_capture
-  // returns: where they came from.
+  std::vector<FoundView> train, test;  // complete views only
+  // The source of times that the format defines; `automatic`: the views' own times. As returned by
+  // read_capture: the source that was used.
   CaptureTimes times = CaptureTimes::automatic;
-  // As the capture lists them, those left out included: what arrays with one element per view count.
+  // In the order of the capture's lists, including views that were left out. Arrays have one element per id
+  // here.
   std::vector<std::string> train_ids, all_ids;
-  // Paths, without extension, of all images that the capture names, those left out included.
+  // Paths, without extension, of all images that the capture names, including those left out.
   std::vector<std::string> listed_images;
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;  // scene units; 0: not given
   std::vector<Vec3<double>> points;
-  std::string points_file;                    // where they come from; empty: there are none
-  Background background = Background::black;  // the format's custom, never `automatic`
-  bool transparent_is_unknown = false;        // likewise: transparent pixels are no part of a photograph
+  std::string points_file;                    // the file with the points; empty: no points
+  Background background = Background::black;  // the format's default, never `automatic`
+  bool transparent_is_unknown = false;        // likewise: transparent pixels are not part of a photograph
   std::vector<Finding> warnings;
 };
 
-// The ids for which `exists` holds; the others become a warning: "3 of 80 training views have no image (a, b,
-// c): left out". kind: of the warning. path_of: the file in which it should be; may be null.
+// Returns the ids for which `exists` holds. The others cause a warning: "3 of 80 training views have no image
+// (a, b, c): left out". kind: of the warning. path_of: the expected file; may be null.
 std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const std::string& split,
                                     const std::string& what,
                                     const std::function<bool(const std::string& id)>& exists,
                                     std::vector<Finding>& warnings, const std::string& kind,
                                     const std::function<std::string(const std::string& id)>& path_of);
 
-// By the scale that images are stored at.
+// Functions of the scale of stored images.
 using IsStored = std::function<bool(int stored)>;
 using StoredFolder = std::function<std::string(int stored)>;
 
-// The largest scale of stored images that `downscale` is a multiple of; 0 where there is none.
+// The largest scale of stored images that divides `downscale`; 0 if there is none.
 int fitting_scale(int downscale, const IsStored& is_stored);
-// The scales at which images are stored, whether one wants them or not.
+// All scales at which images are stored.
 std::vector<int> stored_scales(const IsStored& is_stored);
-// The images at the fitting scale. Throws InputError naming `where`, and the folders that there are, where
-// there is none.
+// The images at the fitting scale. If there is none, throws InputError with `where` and the existing folders.
 StoredImages choose_images(const std::string& where, int downscale, const IsStored& is_stored,
                            const StoredFolder& folder_of);
 

@@ -11,7 +11,7 @@ namespace traceflow {
 
 namespace {
 
-// They take half a gigabyte.
+// They take 0.5 GB.
 constexpr int64_t most_names_kept = 4'000'000;
 
 std::strong_ordering compare_letters(std::string_view a, std::string_view b) {
@@ -79,7 +79,7 @@ ImageFinder::Place ImageFinder::place_of(const std::string& path) {
 }
 
 std::string ImageFinder::find(const std::string& path) {
-  // From the root: in no tree.
+  // Absolute paths are in no tree.
   if (path.starts_with('/')) return "";
   const size_t slash = path.rfind('/');
   const std::string folder = slash == std::string::npos ? "" : path.substr(0, slash);

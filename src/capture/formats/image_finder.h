@@ -13,26 +13,25 @@
 
 namespace traceflow {
 
-// Finds images as find_image does (capture/formats/image_names.h), where a file may name a million paths:
-// each folder of the tree is listed once, and what is not there costs no call of the system. The system is
-// asked where lists do not tell: of names that differ from a listed one in the case of their letters alone,
-// which some file systems ignore, and in folders that seem empty, since some may be entered but not listed.
-// For one thread.
+// Finds images like find_image (capture/formats/image_names.h), for files that name up to a million paths.
+// Each folder of the tree is listed once, so missing names cost no system call. The system is called only if
+// the lists cannot decide: for names that differ from a listed one only in case (some file systems ignore
+// case), and in folders that appear empty (some can be entered but not listed). Not thread-safe.
 class ImageFinder {
  public:
-  // The names in a folder ("" is the top); none where there is no such folder.
+  // The names in a folder ("" is the top); empty if there is no such folder.
   using List = std::function<std::vector<std::string>(const std::string& folder)>;
-  // Whether there is such a file.
+  // Whether the file exists.
   using Has = std::function<bool(const std::string& file)>;
 
-  // The tree outlives the finder.
+  // The tree must outlive the finder.
   explicit ImageFinder(const FileTree& tree);
-  // The same with somebody else's lists. most_names: in all folders that are listed; name: of the tree, for
-  // errors.
+  // The same with other sources of the lists. most_names: limit over all listed folders; name: of the tree,
+  // for errors.
   ImageFinder(std::string name, List files_in, List folders_in, Has has, int64_t most_names);
 
-  // path: as tidy_path makes it. What is found is called as it is listed. Throws InputError where the folders
-  // that were looked into hold more names than are kept: links that lead back make folders without end.
+  // path: as from tidy_path. Returns the path as listed. Throws InputError if the listed folders hold more
+  // names than the limit: circular links create endless folders.
   std::string find(const std::string& path);
 
  private:
@@ -40,7 +39,7 @@ class ImageFinder {
   struct AnyCase {
     std::string_view name;
   };
-  // By letters, and by their case where all of them are the same.
+  // Ordered by letters without case, then by case.
   struct ByLetters {
     using is_transparent = void;  // NOLINT(readability-identifier-naming): the library looks for it
     bool operator()(std::string_view a, std::string_view b) const;
@@ -53,18 +52,18 @@ class ImageFinder {
     bool seems_empty() const { return files.empty() && folders.empty(); }
   };
   struct Place {
-    const Folder* folder = nullptr;  // null where there is none
-    std::string path;                // as it is listed
+    const Folder* folder = nullptr;  // null if there is none
+    std::string path;                // as listed
   };
 
   Folder list(const std::string& path);
-  // Of a folder, or of the first on the way to it that seems empty.
+  // The folder, or the first folder on the way to it that appears empty.
   Place place_of(const std::string& path);
 
   const std::string name_;
   const List files_in_, folders_in_;
   const Has has_;
-  int64_t left_;  // names that may still be kept
+  int64_t left_;  // remaining names before the limit
   Folder top_;
 };
 

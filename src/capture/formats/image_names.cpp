@@ -17,7 +17,7 @@ namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-// The digits at `at` without zeros before them; moves `at` behind them.
+// Returns the digits at `at` without leading zeros and moves `at` past them.
 std::string_view take_number(const std::string& text, size_t& at) {
   size_t begin = at;
   while (at < text.size() && is_digit(text[at])) ++at;
@@ -25,7 +25,7 @@ std::string_view take_number(const std::string& text, size_t& at) {
   return std::string_view(text).substr(begin, at - begin);
 }
 
-// What programs call pictures of kinds that are not read. Whoever names such may have converted them.
+// Whether the extension is that of an unsupported image format. Such a file may have been converted since.
 bool has_foreign_name(const std::filesystem::path& name) {
   constexpr std::array<std::string_view, 9> kinds = {".tif", ".tiff", ".bmp", ".webp", ".heic",
                                                      ".exr", ".dng",  ".ppm", ".jp2"};
@@ -39,7 +39,7 @@ std::string bare_name(const std::string& path) {
   return std::filesystem::path(without_extension(path)).filename().string();
 }
 
-// Of all paths, up to and with its last "/".
+// The length of the common folder of all paths, including its last "/".
 size_t shared_folder(const std::vector<std::string>& paths) {
   if (paths.empty()) return 0;
   size_t shared = paths[0].size();

@@ -17,7 +17,7 @@ using ReadLayout = NerfiesLayout (*)(const FileTree& tree, std::vector<Finding>&
 
 std::string camera_path(const std::string& id) { return "camera/" + id + ".json"; }
 
-// Reads step by step into `found`.
+// Reads step by step into `found_`.
 class NerfiesReader {
  public:
   NerfiesReader(std::shared_ptr<const FileTree> tree, const CaptureOptions& options, ReadLayout read_layout)
@@ -46,7 +46,7 @@ class NerfiesReader {
   }
 
  private:
-  // PNG as the families have it, or the same in JPEG.
+  // PNG is usual; JPEG is accepted too.
   std::string image_path(const std::string& id) const {
     const std::string stem = found_.images.folder + "/" + id;
     for (const char* extension : image_extensions) {

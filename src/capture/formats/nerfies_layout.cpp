@@ -53,7 +53,7 @@ void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
   if (layout.all_ids.empty() && layout.train_ids.empty()) {
     dataset.fail("no ids", "train_ids and val_ids, or ids");
   }
-  // Else the views that test would be trained on.
+  // Otherwise the split of `ids` would train on the test views.
   if (layout.train_ids.empty() && dataset.has("train_ids")) {
     dataset["train_ids"].fail("an empty list", "the ids of the views to train on",
                               layout.all_ids.empty()
@@ -85,7 +85,7 @@ bool has_sides(const std::vector<std::string>& ids, const std::string& side) {
   return std::any_of(ids.begin(), ids.end(), [&](const std::string& id) { return id.ends_with(side); });
 }
 
-// The families differ in what they leave out; nothing but the name depends on this.
+// The formats differ in what they leave out. Only the name depends on this.
 std::string format_of(const FileTree& tree, const NerfiesLayout& layout, bool has_time_ids) {
   if (!layout.format.empty()) return layout.format;
   const std::filesystem::path whole = std::filesystem::weakly_canonical(tree.path());
@@ -108,7 +108,7 @@ void read_times(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
   for (const std::string& id : ids) {
     if (!metadata.has(id)) continue;
     const JsonField entry = metadata[id];
-    // A view without a time is left out; one whose time is null, or whose entry is no object, is a mistake.
+    // A view without a time is left out. A null time, or an entry that is not an object, is an error.
     const nlohmann::json& said = entry.json();
     if (said.is_object() && !said.contains("time_id") && !said.contains("warp_id")) continue;
     const bool has_time = entry.has("time_id");
@@ -142,7 +142,7 @@ void check_capture_id(const JsonField& field, const std::string& id) {
 void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout) {
   const JsonFile scene(tree.open_file("scene.json"));
   layout.normalisation.centre = scene["center"].vector();
-  // So that lengths on either side of it are held by single precision.
+  // Limits lengths to what single precision can hold on both sides of the scaling.
   constexpr double largest = 1e12;
   scene["scale"].positive();
   layout.normalisation.scale = scene["scale"].number(1 / largest, largest);

@@ -11,24 +11,24 @@
 
 namespace traceflow {
 
-// What the JSON files of a capture in the layout of Nerfies, HyperNeRF and NeRF-DS say about all of its views
+// What the JSON files in the layout of Nerfies, HyperNeRF and NeRF-DS define for all views
 // (docs/captures.md).
 struct NerfiesLayout {
   std::string format;
-  bool transparent_is_unknown = false;                    // as of FoundCapture
-  std::vector<std::string> all_ids, train_ids, test_ids;  // in the file's order, each id once
-  std::map<std::string, double> time_id;                  // of the ids that metadata.json says it of
-  std::map<std::string, std::string> rig_camera;          // camera_id, where it says one
+  bool transparent_is_unknown = false;                    // as in FoundCapture
+  std::vector<std::string> all_ids, train_ids, test_ids;  // in file order, each id once
+  std::map<std::string, double> time_id;                  // of the ids that have one in metadata.json
+  std::map<std::string, std::string> rig_camera;          // camera_id, of the ids that have one
   SceneNormalisation normalisation;
   double near_plane = 0, far_plane = 0;
 };
 
-// An id becomes part of file names, and must not lead out of the folder: throws InputError.
+// Ids become part of file names and must not lead out of the folder. Throws InputError for others.
 void check_capture_id(const JsonField& field, const std::string& id);
-// Takes normalisation and planes from scene.json. Throws InputError.
+// Reads normalisation and planes from scene.json. Throws InputError.
 void read_nerfies_scene(const FileTree& tree, NerfiesLayout& layout);
 
-// Reads dataset.json, metadata.json and scene.json; adds what looks wrong to `warnings`. Throws InputError.
+// Reads dataset.json, metadata.json and scene.json. Adds warnings. Throws InputError.
 NerfiesLayout read_nerfies_layout(const FileTree& tree, std::vector<Finding>& warnings);
 
 }  // namespace traceflow

@@ -21,10 +21,10 @@ struct NerfiesView {
 
 struct NerfiesScene {
   SceneNormalisation normalisation;
-  double near_plane = 0, far_plane = 0;  // scene units; 0: not known
+  double near_plane = 0, far_plane = 0;  // scene units; 0: unknown
 };
 
-// Writes camera/ID.json, metadata.json, scene.json and last dataset.json into a folder, which has a folder
+// Writes camera/ID.json, metadata.json, scene.json and, last, dataset.json. The folder must have a folder
 // `camera`.
 void write_nerfies_layout(const std::filesystem::path& folder, const std::vector<NerfiesView>& views,
                           const NerfiesScene& scene);

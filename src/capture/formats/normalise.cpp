@@ -21,7 +21,7 @@ struct Box {
   double diagonal() const { return length(high - low); }
 };
 
-// Around all but the outermost 2.5 % on either side of each axis.
+// Extends the box around all but the outermost 2.5 % on each side of each axis.
 void take_inner(Box& box, const std::vector<Vec3<double>>& places) {
   std::vector<double> values;
   Vec3<double> low(0), high(0);
@@ -44,7 +44,8 @@ Vec3<double> axis_of(const FoundView& view) {
   return transpose(view.camera_from_world) * Vec3<double>(0, 0, 1);
 }
 
-// That gives the box a diagonal of 1. One that is a place but for rounding keeps the capture's units.
+// The scale that gives the box a diagonal of 1. A box that is a single point, up to rounding, keeps the
+// capture's units.
 double scale_of(const Box& box) {
   constexpr double rounding = 1e-9, largest = 1e12;
   const Vec3<double> corner = glm::max(glm::abs(box.low), glm::abs(box.high));
@@ -53,8 +54,8 @@ double scale_of(const Box& box) {
   return std::clamp(1 / diagonal, 1 / largest, largest);
 }
 
-// The point with the least squared distance to all optical axes; none where they run side by side, or where
-// most cameras look away from it.
+// The point with the least sum of squared distances to all optical axes. Returns nothing if the axes are
+// nearly parallel or if most cameras look away from the point.
 std::optional<Vec3<double>> common_sight(const std::vector<FoundView>& views) {
   constexpr double flattest = 1e-3;
   Mat3<double> sum(0);

@@ -61,7 +61,7 @@ std::vector<Vec3<double>> read_binary(const InputFile& file) {
   return points;
 }
 
-// Words of a text one after another, and where lines end.
+// Reads successive words of a text, with line ends.
 class Words {
  public:
   explicit Words(std::string_view text) : text_(text) {}
@@ -86,7 +86,7 @@ class TextReader {
 
   std::vector<Vec3<double>> read(int64_t bytes) {
     read_header();
-    // A row of three numbers takes six bytes.
+    // A row of three numbers takes at least six bytes.
     if (rows_ < 0 || rows_ > bytes / 6) {
       fail("element vertex",
            std::to_string(rows_) + " vertices in a file of " + std::to_string(bytes) + " bytes",

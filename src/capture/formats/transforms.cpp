@@ -25,20 +25,20 @@ constexpr const char* train_file = "transforms_train.json";
 constexpr const char* test_file = "transforms_test.json";
 constexpr const char* val_file = "transforms_val.json";
 
-// "images/left/a.png" at scale 2: "images_2/left/a.png".
+// "images/left/a.png" at scale 2 is "images_2/left/a.png".
 std::string at_scale(const std::string& path, int stored) {
   const size_t slash = path.find('/');
   if (stored == 1 || slash == std::string::npos) return path;
   return path.substr(0, slash) + "_" + std::to_string(stored) + path.substr(slash);
 }
 
-// Of "images/left/a.png": "images"; "" where it lies at the top.
+// "images" for "images/left/a.png"; "" for a file at the top.
 std::string top_folder(const std::string& path) {
   const size_t slash = path.find('/');
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
-// What stands behind the last slashes of a path, the longest first.
+// The ends of a path after each of its last slashes, the longest first.
 std::vector<std::string> ends_of(const std::string& path) {
   constexpr size_t most = 8;
   std::vector<std::string> ends;
@@ -49,7 +49,7 @@ std::vector<std::string> ends_of(const std::string& path) {
   return ends;
 }
 
-// 1, and N where some folder at the top is called anything_N.
+// 1, and each N for which a folder at the top is named anything_N.
 std::set<int> scales_of(const FileTree& tree) {
   std::set<int> scales{1};
   const std::vector<std::string> folders = tree.folders_in("");
@@ -72,7 +72,7 @@ class TransformsReader {
     list_other_files();
     drop_repeats();
     settle_paths();
-    // What was written in two ways may be one.
+    // Different paths may have become equal.
     drop_repeats();
     choose_sizes();
     list_images();
@@ -180,7 +180,7 @@ class TransformsReader {
     std::move(file.frames.begin(), file.frames.end(), std::back_inserter(frames_));
   }
 
-  // The frames of files that are not used: their images are not left over.
+  // Lists the frames of unused files, so that their images are not reported as unused.
   void list_other_files() {
     for (const char* file : {whole_file, train_file, test_file, val_file}) {
       if (files_.contains(file) || !tree_->has(file)) continue;
@@ -189,29 +189,29 @@ class TransformsReader {
     }
   }
 
-  // The image of this path at 1/stored of the full size; empty where there is none. What lies at the top has
-  // no folder beside which another could hold it smaller.
+  // The image with this path at 1/stored of the full size; empty if there is none. Files at the top have no
+  // folder with a scale in its name.
   std::string image_at(const std::string& path, int stored) {
     if (stored > 1 && top_folder(path).empty()) return "";
     return finder_.find(at_scale(path, stored));
   }
 
-  // Whether there is an image of this path at full size or another that is stored.
+  // Whether the image exists at full size or at another stored scale.
   bool is_there(const std::string& path) {
     return std::any_of(scales_.begin(), scales_.end(),
                        [&](int stored) { return !image_at(path, stored).empty(); });
   }
 
-  // The longest end of the path that is an image here; empty where there is none.
+  // The longest end of the path that is an image in the tree; empty if there is none.
   std::string end_here(const std::string& path) {
     const std::vector<std::string> ends = ends_of(path);
-    // In this order, since most ends are not there, which takes less to tell than where a path leads.
+    // is_there comes first: it is cheaper than path_in_tree, and most ends do not exist.
     const auto found = std::find_if(
         ends.begin(), ends.end(), [&](const std::string& end) { return is_there(end) && path_in_tree(end); });
     return found == ends.end() ? "" : *found;
   }
 
-  // The path without what stands before the ends of others that are here; empty where it begins otherwise.
+  // Removes a beginning that the paths of existing images also had; empty if the path has no such beginning.
   std::string without_beginning(const std::string& path) const {
     const std::vector<std::string> ends = ends_of(path);
     const auto known = std::find_if(ends.begin(), ends.end(), [&](const std::string& end) {
@@ -220,15 +220,15 @@ class TransformsReader {
     return known == ends.end() ? "" : *known;
   }
 
-  // Where an image that is not here would be: beside the others, or where its path says, of which the last
-  // part remains if it leads out of the capture.
+  // Where a missing image would be: beside the others, or at its path. If the path leads out of the capture,
+  // only the last part remains.
   std::string place_of_missing(const std::string& path) const {
     std::string beside_others = without_beginning(path);
     if (!beside_others.empty()) return beside_others;
     return path_in_tree(path) ? path : path.substr(path.rfind('/') + 1);
   }
 
-  // As written, beside the images, or the longest end of the path that is here.
+  // The path as written, or beside the images, or the longest end of the path that exists.
   std::string place_of_points() const {
     std::vector<std::string> places = ends_of(points_path_);
     places.insert(places.begin(), {points_path_, without_beginning(points_path_)});
@@ -237,7 +237,7 @@ class TransformsReader {
     return found == places.end() ? points_path_ : *found;
   }
 
-  // Paths of another machine, or from another folder: their ends may be here.
+  // Paths may be of another machine or folder. Their ends are searched in the tree.
   void settle_paths() {
     const bool as_written = std::any_of(frames_.begin(), frames_.end(),
                                         [&](const TransformsFrame& frame) { return is_there(frame.path); });
@@ -269,7 +269,7 @@ class TransformsReader {
         .files = moved;
   }
 
-  // A frame that comes again, in the same file or in the other, is taken once.
+  // Keeps one of repeated frames, in the same file or across files.
   void drop_repeats() {
     std::set<std::string> seen;
     std::vector<std::string> repeated;
@@ -391,15 +391,15 @@ class TransformsReader {
 
   const std::shared_ptr<const FileTree> tree_;
   const CaptureOptions options_;
-  const std::set<int> scales_;  // that folders are called by
+  const std::set<int> scales_;  // that folder names end with
   ImageFinder finder_;
   std::string origin_;  // the file to name in errors
   std::vector<std::shared_ptr<const JsonFile>> documents_;
   std::vector<TransformsFrame> frames_;
-  std::vector<std::string> images_;   // of frames_, at the size that is used; empty where there is none
-  std::vector<std::string> unused_;   // paths of frames that make no view
-  std::set<std::string> files_;       // that were read
-  std::set<std::string> beginnings_;  // of paths that are here without them
+  std::vector<std::string> images_;   // of frames_, at the selected size; empty if missing
+  std::vector<std::string> unused_;   // paths of frames that give no view
+  std::set<std::string> files_;       // the files that were read
+  std::set<std::string> beginnings_;  // removed from paths of existing images
   std::string points_path_;
   FoundCapture found_;
 };

@@ -6,8 +6,8 @@
 
 namespace traceflow {
 
-// transforms.json, or transforms_train.json and transforms_test.json: NeRF-synthetic, D-NeRF, instant-ngp and
-// nerfstudio (docs/captures.md).
+// transforms.json, or transforms_train.json with transforms_test.json: NeRF-synthetic, D-NeRF, instant-ngp
+// and nerfstudio (docs/captures.md).
 bool is_transforms(const FileTree& tree);
 // Throws InputError.
 FoundCapture read_transforms(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);

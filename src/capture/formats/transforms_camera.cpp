@@ -23,7 +23,7 @@ void take_positive(const JsonField& field, const char* key, std::optional<double
   value = field[key].number(smallest_pixels, largest_pixels);
 }
 
-// An angle of which half a turn is `half_turn`, in radians.
+// Reads an angle in the unit in which half a turn is `half_turn`, and converts it to radians.
 void take_angle(const JsonField& field, const char* key, double half_turn, std::optional<double>& radians) {
   if (!field.has(key)) return;
   std::optional<double> angle;
@@ -35,7 +35,7 @@ void take_angle(const JsonField& field, const char* key, double half_turn, std::
 constexpr const char* known_models = "OPENCV, OPENCV_FISHEYE, PINHOLE or their simpler kin";
 constexpr const char* undistort_remedy = "undistort the images with the program that made them";
 
-// The names of nerfstudio, and those of COLMAP that mean the same with its k1 to k4, p1 and p2.
+// The names of nerfstudio, and COLMAP's names of models with the same k1 to k4, p1 and p2.
 bool is_fisheye_model(const JsonField& field) {
   constexpr std::array<std::string_view, 5> perspective = {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE",
                                                            "SIMPLE_RADIAL", "RADIAL"};
@@ -47,14 +47,15 @@ bool is_fisheye_model(const JsonField& field) {
   field.fail(model, known_models, undistort_remedy);
 }
 
-// Whether a value takes back what its key says: false, zero, or a list of such.
+// Whether the value disables its key: false, zero, or a list of such values.
 bool is_off(const nlohmann::json& value) {
   if (value.is_array()) return std::all_of(value.begin(), value.end(), is_off);
   if (value.is_boolean()) return !value.get<bool>();
   return value.is_null() || (value.is_number() && value.get<double>() == 0);
 }
 
-// Lenses that instant-ngp and nerfstudio name by keys of their own: without them a pinhole would be left.
+// Refuses lenses that instant-ngp and nerfstudio mark by separate keys. Ignoring these keys would leave a
+// wrong pinhole.
 void refuse_other_lenses(const JsonField& field) {
   const auto is_on = [&](const char* key) { return field.has(key) && !is_off(field[key].json()); };
   for (const auto& [key, lens] : {std::pair{"ftheta_p0", "an f-theta lens"},
@@ -76,7 +77,7 @@ void refuse_other_lenses(const JsonField& field) {
 void TransformsLens::take(const JsonField& field) {
   take_positive(field, "w", width);
   take_positive(field, "h", height);
-  // An angle counts more than what the file says for all frames.
+  // A frame's angle overrides all values that the file gives for all frames.
   constexpr std::array angles = {"camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
   if (std::any_of(angles.begin(), angles.end(), [&](const char* key) { return field.has(key); })) {
     for (auto* inherited : {&focal_x, &focal_y, &angle_x, &angle_y}) inherited->reset();
@@ -86,7 +87,7 @@ void TransformsLens::take(const JsonField& field) {
     take_positive(field, key, *focal);
   take_angle(field, "camera_angle_x", pi, angle_x);
   take_angle(field, "camera_angle_y", pi, angle_y);
-  // In degrees. Beside the same in radians these count, as instant-ngp and nerfstudio have it.
+  // Degrees override radians, as in instant-ngp and nerfstudio.
   take_angle(field, "x_fov", 180, angle_x);
   take_angle(field, "y_fov", 180, angle_y);
   for (const auto& [key, centre] : {std::pair{"cx", &centre_x}, {"cy", &centre_y}}) {

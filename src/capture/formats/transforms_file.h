@@ -11,29 +11,29 @@
 namespace traceflow {
 
 struct TransformsFrame {
-  std::string file;  // that it stands in, as errors call it
-  std::string path;  // of its image as written, "/" between folders
+  std::string file;  // the file that defines it, for errors
+  std::string path;  // of its image as written, with "/" as separator
   TransformsLens lens;
   TransformsPose pose;
   std::optional<double> time;
-  std::optional<bool> is_test;  // where the files split their frames
+  std::optional<bool> is_test;  // set if the files define a split
   std::shared_ptr<const JsonField> json;
 };
 
 // One of a capture's JSON files.
 struct TransformsFile {
   std::vector<TransformsFrame> frames;
-  std::vector<std::string> train, test;  // paths, where the file splits its frames
-  std::string points;                    // a .ply's path; empty where it names none
+  std::vector<std::string> train, test;  // paths, if the file defines a split
+  std::string points;                    // a .ply's path; empty if none is named
   bool is_nerfstudio = false;
-  int masks = 0, depths = 0;  // frames that name such files
+  int masks = 0, depths = 0;  // number of frames that name such files
   std::shared_ptr<const JsonFile> json;
 };
 
-// Throws InputError naming file, field and value.
+// Throws InputError with file, field and value.
 TransformsFile read_transforms_file(const FileTree& tree, const std::string& path);
 
-// The paths of a file's frames, where it is one of this kind; of one that is not, none.
+// The paths of the file's frames; empty if it is not a file of this kind.
 std::vector<std::string> list_frames(const FileTree& tree, const std::string& path);
 
 }  // namespace traceflow

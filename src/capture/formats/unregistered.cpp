@@ -14,7 +14,7 @@ std::string folder_of(const std::string& path) {
   return std::filesystem::path(path).parent_path().generic_string();
 }
 
-// Those of the views' images; where these are folders of a rig, their neighbours too.
+// The folders of the views' images and, if these belong to a rig, the folders beside them.
 std::set<std::string> folders_to_look_into(const FileTree& tree, const FoundCapture& found) {
   std::set<std::string> folders;
   for (const auto* split : {&found.train, &found.test}) {
@@ -31,7 +31,7 @@ std::set<std::string> folders_to_look_into(const FileTree& tree, const FoundCapt
   return folders;
 }
 
-// Whether the path, without extension, is listed, or one of its beginnings before a "_" of its name.
+// Whether the path (without extension), or a beginning of its name that ends before a "_", is listed.
 bool belongs(const std::string& path, const std::set<std::string>& listed) {
   if (listed.contains(path)) return true;
   const size_t name = path.rfind('/') == std::string::npos ? 0 : path.rfind('/') + 1;

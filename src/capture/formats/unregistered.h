@@ -7,9 +7,9 @@
 
 namespace traceflow {
 
-// Paths of images that lie beside those of the views, or in the folders of other cameras of their rig, and
-// that the capture does not name. One called like a named one with something behind ("r_0_depth_0001.png" to
-// r_0) counts as belonging to it. Hidden files, which a Mac adds ("._a.jpg"), are none.
+// Paths of images that the capture does not name, in the folders of the views' images or of other cameras of
+// their rig. A name that extends a named one ("r_0_depth_0001.png" and r_0) counts as part of it. Hidden
+// files, such as those of macOS ("._a.jpg"), are ignored.
 std::vector<std::string> unregistered_images(const FileTree& tree, const FoundCapture& found);
 
 }  // namespace traceflow

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double half_pi = 1.57079632679489661923;
 
-// How far from the centre an ideal projection places a direction that is at r = tan θ, over r, and the
-// derivative of that distance by r.
+// For a direction at r = tan θ: its ideal projected distance from the centre over r, and the derivative of
+// that distance by r.
 struct ProjectionFactor {
   double factor = 1, slope = 1;
 };
@@ -59,7 +59,7 @@ Vec2<double> unproject(const Lens& lens, const Vec2<double>& at) {
   return distance > 0 ? direction_at(lens, distance) / distance * at : at;
 }
 
-// Radial to both sides: the factor grows along the ray and stays across it.
+// Along the radius the derivative is `slope`; across it, `factor`.
 glm::dmat2 project_jacobian(const Lens& lens, const Vec2<double>& ideal) {
   const double r2 = dot(ideal, ideal);
   const ProjectionFactor at = projection_factor(lens, std::sqrt(r2));
@@ -84,7 +84,7 @@ Radial radial_factor(const Lens& lens, double r2) {
   return {k, (above_slope - k * below_slope) / below};
 }
 
-// (u, v) to (x', y').
+// From (u, v) to (x', y').
 Vec2<double> bend(const Lens& lens, const Vec2<double>& at) {
   const double u = at.x, v = at.y, r2 = u * u + v * v;
   const double k = radial_factor(lens, r2).k;
@@ -99,7 +99,7 @@ glm::dmat2 bend_jacobian(const Lens& lens, const Vec2<double>& at) {
   const auto [k, slope] = radial_factor(lens, r2);
   const Vec2<double>& p = lens.tangential;
   const Vec4<double>& s = lens.prism;
-  // By r², which grows with 2u and 2v.
+  // Derivatives by r², whose own derivatives are 2u and 2v.
   const double x_prism = 2 * (s[0] + 2 * r2 * s[1]), y_prism = 2 * (s[2] + 2 * r2 * s[3]);
   const double both = 2 * u * v * slope + 2 * p[0] * u + 2 * p[1] * v;
   const double xx = k + 2 * u * u * slope + 2 * p[0] * v + 6 * p[1] * u + x_prism * u;
@@ -107,8 +107,8 @@ glm::dmat2 bend_jacobian(const Lens& lens, const Vec2<double>& at) {
   return {xx, both + y_prism * u, both + x_prism * v, yy};
 }
 
-// f(ideal direction, stored pixel) at places spread over a pinhole's image, its border included, until it is
-// false.
+// Whether f(ideal direction, stored pixel) holds on a regular grid over a pinhole's image, including its
+// border.
 template <class F>
 bool everywhere(const Lens& lens, double zoom, bool border_only, F&& f) {
   constexpr int steps = 64;
@@ -124,7 +124,7 @@ bool everywhere(const Lens& lens, double zoom, bool border_only, F&& f) {
 }
 
 bool fits(const Lens& lens, double zoom) {
-  // Half a pixel of the photograph's border may be replicated.
+  // Replicating half a pixel at the photograph's border is acceptable.
   return everywhere(lens, zoom, true, [&](const Vec2<double>&, const Vec2<double>& pixel) {
     return pixel.x >= 0 && pixel.y >= 0 && pixel.x <= lens.width && pixel.y <= lens.height;
   });

@@ -4,14 +4,14 @@
 
 #include "math/types.h"
 
-// A capture's lens: how directions in camera space fall on the pixels of a stored photograph (method §2).
+// A capture's lens: maps directions in camera space to pixels of a stored photograph (method §2).
 namespace traceflow {
 
-// What an ideal lens does with a direction's angle θ to the optical axis, tan θ = r = |(X/Z, Y/Z)|; the
-// direction around the axis stays.
+// How an ideal lens maps a direction's angle θ to the optical axis, with tan θ = r = |(X/Z, Y/Z)|. The
+// direction around the axis is unchanged.
 enum class Projection {
   perspective,  // r
-  equidistant,  // θ: the common fisheye
+  equidistant,  // θ: the usual fisheye
   fov           // atan(2r·tan(ω/2)) / ω
 };
 
@@ -31,31 +31,30 @@ struct Lens {
   Vec3<double> radial_below{0};  // b₁, b₂, b₃
   Vec4<double> prism{0};         // s₁ to s₄
   Projection projection = Projection::perspective;
-  double omega = 0;  // of fov; radians, in (0, π)
+  double omega = 0;  // for fov; radians, in (0, π)
 
-  // Without distortion and skew: nothing has to be resampled.
+  // Without distortion or skew, so that no resampling is needed.
   bool is_pinhole() const;
-  // The same lens over an image of another size.
+  // The same lens for an image of another size.
   Lens resized(double new_width, double new_height) const;
 
-  // (X/Z, Y/Z) to (x', y').
+  // From (X/Z, Y/Z) to (x', y').
   Vec2<double> distort(const Vec2<double>& ideal) const;
-  // The derivative of distort: glm's columns are ∂/∂x and ∂/∂y.
+  // The Jacobian of distort: glm's columns are ∂/∂x and ∂/∂y.
   glm::dmat2 distort_jacobian(const Vec2<double>& ideal) const;
-  // The inverse of distort by Newton's method. Not a number where a fisheye looks sideways or behind.
+  // The inverse of distort by Newton's method. NaN if a fisheye's direction is 90° or more off the axis.
   Vec2<double> undistort(const Vec2<double>& distorted) const;
   Vec2<double> pixel_from_ideal(const Vec2<double>& ideal) const;
   Vec2<double> ideal_from_pixel(const Vec2<double>& pixel) const;
 };
 
-// Whether a picture of one size shows the same when it is stretched to the other: their proportions differ by
-// 2 % at most.
+// Whether an image of one size can be stretched to the other: their proportions differ by at most 2 %.
 bool same_proportions(double width, double height, double other_width, double other_height);
 
-// The factor ≥ 1 by which the focal length of an ideal pinhole must exceed the lens's, principal point and
-// size the same, so that each of its pixels lies within the photograph; what a fisheye sees beyond that
-// pinhole is lost. Throws InputError naming `origin` when the distortion folds the image over, when more than
-// a zoom of 2 were needed, and when the pinhole would see more than 80° off its axis.
+// The factor ≥ 1 on the focal length of an ideal pinhole, with the lens's principal point and size, that
+// keeps each of its pixels within the photograph. What a fisheye sees beyond that pinhole is lost. Throws
+// InputError with `origin` if the distortion folds the image over, if the zoom would exceed 2, or if the
+// pinhole would see more than 80° off axis.
 double pinhole_zoom(const Lens& lens, const std::string& origin);
 
 }  // namespace traceflow

@@ -8,7 +8,7 @@ namespace traceflow {
 
 namespace {
 
-// The source pixels that one target pixel is made of, along one side, and their weights (sum 1).
+// The source pixels of one target pixel, along one side, and their weights (sum 1).
 struct Taps {
   int64_t first = 0;
   std::vector<float> weight;

@@ -60,7 +60,7 @@ SynthImages empty_images(const SynthOptions& options) {
   return images;
 }
 
-// What the pixel's centre shows: mask, normal and depth.
+// Stores mask, normal and depth at the pixel's centre.
 void record_geometry(const synth::Stage& stage, const Camera<double>& camera, int64_t row, int64_t column,
                      SynthImages& images) {
   const synth::Ray ray =

@@ -12,14 +12,14 @@ namespace traceflow::synth {
 namespace {
 
 constexpr int32_t leaf_size = 4;
-// Halving 2^31 triangles takes no more levels than this.
+// Halving 2^31 triangles needs no more levels.
 constexpr int deepest = 32;
-// By how much of its size a triangle reaches over its borders, so that no ray slips between two.
+// Triangles extend past their borders by this fraction of their size, so that no ray passes between two.
 constexpr double overlap = 1e-12;
-// Sine of the angles below which a triangle, or a ray against it, is too thin for its hit to be known.
+// Sine of the smallest angle of a triangle, or between it and a ray, for which the hit is reliable.
 constexpr double thinnest = 1e-12;
 
-// Möller and Trumbore (1997). Comparisons are written so that what is not a number misses.
+// Möller and Trumbore (1997). Comparisons are written so that NaN is a miss.
 double distance_to_triangle(const std::array<Vector, 3>& corners, const Ray& ray) {
   const Vector edge_1 = corners[1] - corners[0];
   const Vector edge_2 = corners[2] - corners[0];
@@ -37,8 +37,7 @@ double distance_to_triangle(const std::array<Vector, 3>& corners, const Ray& ray
   return std::isfinite(t) ? t : infinity;
 }
 
-// Whether the ray passes through the box between `nearest` and `farthest`. A ray along a face counts as
-// inside.
+// Whether the ray passes through the box between `nearest` and `farthest`. A ray along a face is inside.
 bool enters(const Vector& low, const Vector& high, const Ray& ray, const Vector& inverse, double nearest,
             double farthest) {
   for (int axis = 0; axis < 3; ++axis) {
@@ -54,7 +53,7 @@ bool enters(const Vector& low, const Vector& high, const Ray& ray, const Vector&
   return nearest <= farthest;
 }
 
-// The point of the triangle `to` with the barycentric coordinates that `point` has in the triangle `from`.
+// The point of triangle `to` with the barycentric coordinates of `point` in triangle `from`.
 Vector carried(const std::array<Vector, 3>& from, const std::array<Vector, 3>& to, const Vector& point) {
   const Vector edge_1 = from[1] - from[0];
   const Vector edge_2 = from[2] - from[0];
@@ -96,8 +95,8 @@ Mesh::Corners Mesh::corners(const std::vector<Vector>& vertices, int triangle) c
           vertices[static_cast<size_t>(t[2])]};
 }
 
-// Halves the triangles order_[first … last) by the median of their centres along the longest side of the box
-// around those centres, until few are left. Nodes lie in depth-first order.
+// Splits the triangles order_[first … last) at the median of their centres along the longest side of the box
+// around those centres, until few are left. Nodes are stored in depth-first order.
 void Mesh::build(int32_t first, int32_t last, const std::vector<Vector>& centres) {
   Node node{Vector(infinity), Vector(-infinity), first, last - first};
   Vector low(infinity);
@@ -111,7 +110,7 @@ void Mesh::build(int32_t first, int32_t last, const std::vector<Vector>& centres
     low = glm::min(low, centres[static_cast<size_t>(triangle)]);
     high = glm::max(high, centres[static_cast<size_t>(triangle)]);
   }
-  // Rounding must not keep a ray out of a box whose triangle it meets at the border.
+  // Rounding must not make a ray miss the box of a triangle that it hits at the border.
   node.low -= overlap * bounding_radius_;
   node.high += overlap * bounding_radius_;
   const size_t index = nodes_.size();

@@ -6,7 +6,7 @@
 
 #include "capture/synth/ray.h"
 
-// A surface of triangles that was deformed: where a ray meets it, and which point of its matter that is.
+// A deformed triangle mesh: where a ray hits it, and which material point that is.
 namespace traceflow::synth {
 
 struct MeshHit {
@@ -16,27 +16,26 @@ struct MeshHit {
 
 class Mesh {
  public:
-  // Three indices of vertices, counter-clockwise from outside.
+  // Three vertex indices, counter-clockwise seen from outside.
   using Triangle = std::array<int32_t, 3>;
 
-  // rest, deformed: the same vertices at rest and as they are now, metres, finite. A triangle whose vertices
-  // lie in one line is never hit.
+  // rest, deformed: the same vertices at rest and now, metres, finite. A degenerate triangle is never hit.
   Mesh(std::vector<Triangle> triangles, std::vector<Vector> rest, std::vector<Vector> deformed);
 
-  // First triangle that the ray meets beyond `nearest`, from either side; triangles include their borders.
+  // First triangle that the ray hits beyond `nearest`, from either side; borders are included.
   MeshHit hit(const Ray& ray, double nearest = 0) const;
-  // The triangle's own unit normal, outward: flat, so that it is exactly the normal of the depth.
+  // The triangle's outward unit normal. It is flat, so that normals agree exactly with depths.
   Vector normal(int triangle) const;
-  // A point of a triangle, from the deformed surface to the one at rest and back: it keeps its barycentric
-  // coordinates.
+  // Maps a point of a triangle from the deformed surface to the surface at rest and back. It keeps its
+  // barycentric coordinates.
   Vector at_rest(int triangle, const Vector& deformed_point) const;
   Vector deformed(int triangle, const Vector& rest_point) const;
-  // Radius of the sphere around the origin that holds the deformed surface.
+  // Radius of the sphere around the origin that contains the deformed surface.
   double bounding_radius() const { return bounding_radius_; }
 
  private:
-  // A box around the triangles order_[first … first + count); a box with count 0 holds the next node and
-  // node `first` instead.
+  // A box around the triangles order_[first … first + count). If count is 0, it contains the next node and
+  // node `first`.
   struct Node {
     Vector low;
     Vector high;

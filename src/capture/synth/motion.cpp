@@ -11,7 +11,7 @@ namespace {
 
 using synth::Vector;
 
-// Rays over the first picture, whatever its size, and how many of an object's hits are kept.
+// Rays over the first image, whatever its size, and the limit of kept points per object.
 constexpr int64_t ray_columns = 480;
 constexpr int64_t ray_rows = 270;
 constexpr size_t most_of_an_object = 600;
@@ -22,7 +22,7 @@ struct Followed {
   int triangle;
 };
 
-// For each object its points that the camera sees, in the order of rays.
+// For each object, the points that the camera sees, in the order of rays.
 std::vector<std::vector<Followed>> seen_points(const synth::Stage& stage, const Camera<double>& camera) {
   std::vector<std::vector<Followed>> objects;
   for (int64_t i = 0; i < ray_rows * ray_columns; ++i) {
@@ -41,7 +41,7 @@ std::vector<std::vector<Followed>> seen_points(const synth::Stage& stage, const 
   return objects;
 }
 
-// Evenly spread ones of too many.
+// An evenly spaced selection if there are too many.
 std::vector<Followed> thinned(const std::vector<Followed>& points) {
   if (points.size() <= most_of_an_object) return points;
   std::vector<Followed> kept;

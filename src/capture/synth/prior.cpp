@@ -19,7 +19,7 @@ using synth::Vector;
 constexpr double blur_per_width = 1.3 / 240;                 // standard deviation
 constexpr double fixed_turn = 2.5 * std::numbers::pi / 180;  // of the whole capture
 constexpr double view_turn = 1.5 * std::numbers::pi / 180;   // of one view, standard deviation
-constexpr double warp = 4.0 * std::numbers::pi / 180;        // slowly over the picture, largest
+constexpr double warp = 4.0 * std::numbers::pi / 180;        // varies slowly over the image, maximum
 
 std::vector<double> gaussian_weights(double deviation) {
   const int radius = static_cast<int>(std::ceil(3 * deviation));
@@ -28,7 +28,7 @@ std::vector<double> gaussian_weights(double deviation) {
   return weights;
 }
 
-// One direction of a separable blur; the border repeats. step: (0, 1) along rows, (1, 0) along columns.
+// One direction of a separable blur; the border is replicated. step: (0, 1) along rows, (1, 0) along columns.
 Tensor<float> blurred(const Tensor<float>& image, const std::vector<double>& weights, int64_t step_y,
                       int64_t step_x) {
   const auto radius = static_cast<int64_t>(weights.size() / 2);
@@ -55,7 +55,7 @@ Vector random_axis(Random& random) {
   return v / std::max(length(v), 1e-12);
 }
 
-// A few plane waves: a smooth field of small rotations, as vectors axis · angle.
+// A sum of a few plane waves: a smooth field of small rotations, as axis · angle.
 class SlowWarp {
  public:
   SlowWarp(Random& random, double largest) {
@@ -65,7 +65,7 @@ class SlowWarp {
       wave.phase = random.uniform(0, 2 * std::numbers::pi);
     }
   }
-  // Position in units of the picture's width.
+  // Position in units of the image width.
   Vector at(const Vec2<double>& position) const {
     Vector sum(0);
     for (const Wave& wave : waves_) sum += wave.axis * std::sin(dot(wave.frequency, position) + wave.phase);
@@ -82,7 +82,7 @@ class SlowWarp {
   Wave waves_[waves];
 };
 
-// World axes to the priors' camera space: OpenCV's with y and z turned round.
+// From world axes to the priors' camera space: OpenCV's with y and z negated.
 Tensor<float> in_prior_space(const Camera<double>& camera, const Tensor<float>& normal) {
   Tensor<float> result(normal.shape());
   for (int64_t i = 0; i < normal.size(); i += 3) {

@@ -8,7 +8,7 @@ namespace traceflow::synth {
 
 using Vector = Vec3<double>;
 
-// How far a ray that misses goes.
+// The distance of a ray that hits nothing.
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // direction has unit length.

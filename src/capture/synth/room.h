@@ -4,8 +4,8 @@
 
 #include "capture/synth/scene.h"
 
-// What the named scenes share: a closed room of 3.4 × 3.4 × 2.3 m around the origin with its light, what
-// stands by its walls, and short names for materials and still things.
+// What the named scenes share: a closed room of 3.4 × 3.4 × 2.3 m around the origin with its light, furniture
+// by the walls, and short names for materials and static objects.
 namespace traceflow::synth {
 
 inline constexpr double pi = std::numbers::pi;
@@ -21,18 +21,18 @@ Material mirror(const Vector& tint);
 
 Actor still(const Shape& shape, const Material& material, const Vector& position,
             const Mat3<double>& rotation = Mat3<double>(1));
-// A box that stands on the floor, turned about the vertical.
+// A box on the floor, rotated about the vertical.
 Actor standing_box(const Texture& texture, const Vector& half_size, const Vec2<double>& place, double angle);
 Actor resting_ball(const Texture& texture, double radius, const Vec2<double>& place, double angle);
 
-// Six walls that face inwards, each with a pattern of its own, so that a reflection tells where it looks.
+// Six walls that face inwards. Each has its own pattern, so that a reflection shows where it comes from.
 void add_room(AnimatedScene& scene);
 void add_light(AnimatedScene& scene);
-// Furniture by the walls, out of the camera's way: most of it is seen by reflection only.
+// Furniture by the walls, out of the camera's path: most of it is seen only in reflections.
 void add_far_clutter(AnimatedScene& scene);
 
 CameraArc arc_around(const Vector& target, double distance, double elevation);
-// The arc of `balls`, which `tumble` and `soft` share.
+// The camera path of `balls`, also used by `tumble` and `soft`.
 CameraArc arc_of_balls();
 
 }  // namespace traceflow::synth

@@ -5,11 +5,11 @@
 
 #include "math/types.h"
 
-// Counter-based sampling: a number is a function of what it is for, never of what was drawn before, so that
-// pictures do not depend on the order in which pixels are computed.
+// Counter-based sampling: a number depends only on what it is for and not on earlier numbers, so images do
+// not depend on the order in which pixels are computed.
 namespace traceflow::synth {
 
-// A bijection of 64-bit words whose output bits all depend on all input bits (splitmix64's finaliser).
+// A bijection of 64-bit words in which every output bit depends on all input bits (splitmix64's finaliser).
 constexpr uint64_t mix_bits(uint64_t z) {
   z += 0x9E3779B97F4A7C15ULL;
   z = (z ^ (z >> 30U)) * 0xBF58476D1CE4E5B9ULL;
@@ -20,9 +20,9 @@ constexpr uint64_t combine_bits(uint64_t key, uint64_t value) { return mix_bits(
 // Uniform in [0, 1).
 constexpr double unit_from_bits(uint64_t bits) { return static_cast<double>(bits >> 11U) * 0x1.0p-53; }
 
-// Points in the unit square for one sample of one pixel. Over the samples of the pixel each successive use
-// (the place in the pixel, the first light point, …) gets an evenly spread set of its own: a randomly shifted
-// R2 sequence in an order of its own, so that no two uses are correlated.
+// Points in the unit square for one sample of one pixel. Each successive use (the position in the pixel, the
+// first light point, …) gets its own evenly distributed set over the pixel's samples: a randomly shifted R2
+// sequence in random order, so that no two uses are correlated.
 class Sampler {
  public:
   // key: of the pixel; sample in [0, count).
@@ -31,14 +31,14 @@ class Sampler {
   Vec2<double> next() {
     const uint64_t bits = combine_bits(key_, use_++);
     const auto index = static_cast<double>(shuffled(static_cast<uint32_t>(bits)));
-    // 1/g and 1/g² with g the plastic number, the two-dimensional golden ratio.
+    // 1/g and 1/g², where g is the plastic number, the two-dimensional golden ratio.
     const double x = unit_from_bits(bits) + 0.7548776662466927 * index;
     const double y = unit_from_bits(mix_bits(bits)) + 0.5698402909980532 * index;
     return {x - std::floor(x), y - std::floor(y)};
   }
 
  private:
-  // The place of sample_ in a random order of [0, count_) (Kensler, Correlated Multi-Jittered Sampling,
+  // The position of sample_ in a random order of [0, count_) (Kensler, Correlated Multi-Jittered Sampling,
   // §"permute").
   uint32_t shuffled(uint32_t order) const {
     uint32_t mask = count_ - 1;
@@ -73,7 +73,7 @@ class Sampler {
   uint32_t count_;
 };
 
-// A uniform point of the unit disk from one of the unit square.
+// Maps a uniform point of the unit square to a uniform point of the unit disk.
 inline Vec2<double> disk_point(const Vec2<double>& square) {
   const double radius = std::sqrt(square.x);
   const double angle = 6.283185307179586 * square.y;

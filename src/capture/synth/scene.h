@@ -9,11 +9,11 @@
 #include "capture/synth/ray.h"
 #include "capture/synth/texture.h"
 
-// What a synthetic capture shows: shapes with materials, each moving as a function of time. Metres, world z
-// up.
+// What a synthetic capture shows: shapes with materials, each with a pose that is a function of time. Metres,
+// world z up.
 namespace traceflow::synth {
 
-// Shapes in their own frame, centred at its origin.
+// Shapes are in their own frame, centred at its origin.
 struct Sphere {
   double radius;
 };
@@ -28,27 +28,26 @@ struct Box {
 struct Plane {};
 using Shape = std::variant<Sphere, Disk, Box, Plane, std::shared_ptr<const Mesh>>;
 
-// Where a ray meets a shape: distance in units of the ray's direction, infinite where it misses; the
-// triangle of a mesh, -1 on other shapes.
+// A ray's hit with a shape: distance in units of the ray's direction, infinite for a miss; the triangle of a
+// mesh, -1 for other shapes.
 using ShapeHit = MeshHit;
 // First hit beyond `nearest`.
 ShapeHit hit_shape(const Shape& shape, const Ray& ray_in_body, double nearest = 0);
 double hit_distance(const Shape& shape, const Ray& ray_in_body, double nearest = 0);
 
-// Outward normal and texture position of a point on the shape, and where the same point of its matter is at
-// rest: on a mesh before it was deformed, on other shapes the point itself. uv is in metres on flat shapes,
-// on spheres in turns (longitude / 2π, latitude from the pole / π), on meshes x and y at rest.
+// Outward normal and texture position of a point on the shape, and the material point at rest: on a mesh
+// before its deformation, on other shapes the point itself. uv is in metres on flat shapes, in turns on
+// spheres (longitude / 2π, latitude from the pole / π), and x and y at rest on meshes.
 struct SurfacePoint {
   Vector normal;
   Vec2<double> uv;
   Vector rest;
 };
-// triangle: as the hit says.
+// triangle: from the hit.
 SurfacePoint surface_at(const Shape& shape, const Vector& point_in_body, int triangle = -1);
 
-// A diffuse base under a mirror coat. The coat reflects the share `specular` at normal incidence, more at
-// grazing angles (Schlick), and the base gets the rest; roughness is the radius of the lobe around the mirror
-// direction.
+// A diffuse base under a specular coat. The coat reflects `specular` at normal incidence and more at grazing
+// angles (Schlick); the base gets the rest. roughness is the radius of the lobe around the mirror direction.
 struct Material {
   Texture albedo;
   Vector specular{0};
@@ -72,22 +71,22 @@ struct Body {
   Shape shape;
   Material material;
   Pose pose;
-  double bounding_radius;  // radius of the sphere around the pose's position that holds the body; infinite
+  double bounding_radius;  // radius of the sphere around the pose's position that contains the body; infinite
                            // for planes
-  int object = -1;         // which moving thing it is part of; -1: it never moves
+  int object = -1;         // the moving object that it belongs to; -1: it never moves
   bool is_masked = false;  // whether the masks show it
 };
-// Where a point of a body's matter is: `rest` and `triangle` say which point, the body when.
+// World position of a material point of a body: `rest` and `triangle` select the point.
 Vector point_in_world(const Body& body, const Vector& rest, int triangle);
 
-// The scene at one moment.
+// The scene at one time.
 struct Stage {
   std::vector<Body> bodies;
   int light = -1;      // the emitting disk among the bodies that lights the others; -1: none
-  double ambient = 0;  // radiance that reaches every point from everywhere
+  double ambient = 0;  // radiance that reaches every point from all directions
 };
 
-// Bodies that move as one are one object. Objects are numbered 0, 1, ….
+// Bodies that move together are one object. Objects are numbered 0, 1, ….
 struct Actor {
   Shape shape;
   Material material;
@@ -95,17 +94,17 @@ struct Actor {
   int object = -1;
   bool is_masked = false;
   std::function<Shape(double)> shape_at =
-      nullptr;  // of what deforms, in place of `shape`; its triangles stay
+      nullptr;  // for deforming shapes, instead of `shape`; the triangles stay the same
 };
 
 // The camera's arc around a target. Azimuth is measured from -y towards +x.
 struct CameraArc {
   Vector target{0};
   double distance = 1;
-  double half_angle = 0.6;        // the azimuth sweeps there and back over ± this, radians
+  double half_angle = 0.6;        // the azimuth moves forth and back over ± this, radians
   double elevation = 0.25;        // mean, radians
   double elevation_swing = 0.06;  // radians
-  double test_azimuth = 0.06;     // of the right camera against the left, radians
+  double test_azimuth = 0.06;     // azimuth of the right camera relative to the left, radians
 };
 
 struct AnimatedScene {

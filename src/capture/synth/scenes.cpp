@@ -57,7 +57,7 @@ AnimatedScene balls() {
 
 constexpr double mirror_height = 0.42;
 
-// The disk's normal is its body's +z: it faces -y and nods and turns about its centre.
+// The disk's normal is its body's +z. It faces -y, and nods and turns about its centre.
 Mat3<double> mirror_rotation(double time) {
   const double phase = 2 * pi * time;
   return rotation_about(axis_z, 0.16 * std::sin(phase)) *
@@ -66,7 +66,7 @@ Mat3<double> mirror_rotation(double time) {
 
 Pose mirror_pose(double time) { return {{0, 0, mirror_height}, mirror_rotation(time)}; }
 
-// The frame's disk lies just behind the mirror and shows as a rim around it.
+// The frame's disk lies just behind the mirror and appears as a rim around it.
 Pose frame_pose(double time) {
   const Mat3<double> rotation = mirror_rotation(time);
   return {Vector(0, 0, mirror_height) - 0.006 * rotation[2], rotation};

@@ -10,21 +10,21 @@ namespace {
 
 const Vector pillar_half_size(0.13, 0.115, 0.22);
 
-// How far the pillar is deformed at one time: it stretches along its axis and gets thinner by as much as
-// keeps its volume, and its axis becomes an arc of a circle.
+// The pillar's deformation at one time. It stretches along its axis at constant volume, and its axis becomes
+// a circular arc.
 struct Deformation {
-  double stretch;     // length of the axis in units of that at rest
-  Vec2<double> bend;  // angle between the axis' two ends, radians, towards where the top leans in x and y
+  double stretch;     // length of the axis relative to that at rest
+  Vec2<double> bend;  // angle between the axis' two ends, radians, towards which the top leans in x and y
 
   static Deformation at(double time) {
     const double phase = 2 * pi * time;
     const double swell = std::sin(pi * time) * std::sin(pi * time);
-    // Most of the stretch comes while the pillar passes through upright, so that together they stay near a
-    // fifth.
+    // Most of the stretch happens while the pillar is nearly upright, so that the two deformations together
+    // stay near a fifth.
     return {1 + 0.2 * swell * swell * swell, {0.5 * std::sin(phase), 0.16 * std::sin(2 * phase)}};
   }
 
-  // rest: z from 0 at the foot of the axis, which stays where it is.
+  // rest: z is 0 at the foot of the axis, which does not move.
   Vector applied(const Vector& rest) const {
     const double top = 2 * pillar_half_size.z;
     const double angle = std::hypot(bend.x, bend.y);
@@ -35,7 +35,7 @@ struct Deformation {
     const double curvature = angle / (stretch * top);
     const double turned = curvature * along;
     const double offset = dot(across, towards);
-    // The arc's centre lies 1 / curvature from the axis, on the side to which it bends.
+    // The arc's centre is 1 / curvature from the axis, on the side to which it bends.
     const double half_sine = std::sin(0.5 * turned);
     const double shift = 2 * half_sine * half_sine / curvature + offset * std::cos(turned);
     const double height = std::sin(turned) / curvature - offset * std::sin(turned);
@@ -48,8 +48,7 @@ struct Surface {
   std::vector<Vector> vertices;
 };
 
-// One side of a cube, pressed to a box with round edges: x⁴ + y⁴ + z⁴ = 1, scaled. `u` × `v` points to the
-// outside.
+// One side of a cube, mapped to a box with round edges: x⁴ + y⁴ + z⁴ = 1, scaled. `u` × `v` points outward.
 void add_side(Surface& surface, const Vector& u, const Vector& v, int columns, int rows) {
   const auto first = static_cast<int32_t>(surface.vertices.size());
   const Vector out = cross(u, v);

@@ -12,13 +12,12 @@
 #include "math/camera.h"
 #include "scene/scene.h"
 
-// A capture of a scene that never existed, with its truth (docs/synth.md): in memory for tests, or as a
-// folder.
+// A synthetic capture with ground truth (docs/synth.md): in memory for tests, or as a folder.
 namespace traceflow {
 
-// balls: a mirror ball and a glazed ball that slide and hop, a box that turns beside them. mirror: a round
-// mirror that turns and nods on its stand between moving boxes. tumble: a textured box and a mirroring
-// kettle, carried and turned. soft: a textured pillar that bends and stretches.
+// balls: a mirror ball and a glazed ball that slide and hop, and a rotating box. mirror: a round mirror that
+// turns and nods on its stand between moving boxes. tumble: a textured box and a mirroring kettle, carried
+// and rotated. soft: a textured pillar that bends and stretches.
 enum class SynthScene { balls, mirror, tumble, soft };
 constexpr std::array<std::string_view, 4> enum_names(SynthScene) {
   return {"balls", "mirror", "tumble", "soft"};
@@ -52,7 +51,7 @@ struct SynthOptions {
   void validate() const;
 };
 
-// When and where a picture is taken. The camera is in the capture's own world (metres, z up).
+// One image's time and camera. The camera is in the capture's own world (metres, z up).
 struct SynthView {
   std::string id;   // 000012_left, 000012_right
   int frame = 0;    // time_id
@@ -61,45 +60,45 @@ struct SynthView {
   Camera<double> camera;
 };
 
-// All views, in the order of frames, left before right.
+// All views in frame order, left before right.
 std::vector<SynthView> synth_views(const SynthOptions& options);
 
-// A view's pixels. colour = diffuse + specular, clipped to [0, 1]: diffuse is what the first surface sends
-// back itself, specular what it mirrors, each with its weight. Masks show the mirroring bodies of balls and
-// mirror, and the moving objects of tumble and soft.
+// A view's pixels. colour = diffuse + specular, clipped to [0, 1]: diffuse is the first surface's own light,
+// specular is what it mirrors, both weighted. Masks show the mirroring bodies of balls and mirror, and the
+// moving objects of tumble and soft.
 struct SynthImages {
   Tensor<float> colour, diffuse, specular;  // H×W×3
-  Tensor<uint8_t> mask;                     // H×W, 1 where the pixel's centre shows what masks show
+  Tensor<uint8_t> mask;                     // H×W, 1 if a masked body is at the pixel's centre
   Tensor<float> normal;                     // H×W×3, world axes, unit, at pixel centres
   Tensor<float> depth;                      // H×W, camera z at pixel centres
 };
 SynthImages synth_images(const SynthOptions& options, const SynthView& view);
 
-// A view's normals with the errors of a monocular estimator: smoothed, turned, and warped slowly over the
-// picture. H×W×3 in the camera space of normal priors (x right, y up, z to the viewer), unit.
+// A view's normals with errors like those of a monocular estimator: blurred, rotated, and warped slowly over
+// the image. H×W×3 in the camera space of normal priors (x right, y up, z to the viewer), unit.
 Tensor<float> synth_normal_prior(const SynthOptions& options, const SynthView& view,
                                  const Tensor<float>& normal);
 
-// Noisy points, P×3 in world, on the surfaces at time 0 that the left camera sees from somewhere on its way.
+// Noisy points, P×3 in world, on the surfaces at time 0 that the left camera sees from anywhere on its path.
 Tensor<float> synth_points(const SynthOptions& options);
 
-// Where points of the moving objects are in world, at every time: points that the first training camera sees
-// at time 0, at most 600 of an object, on a grid that does not depend on the size of the pictures. Bodies
-// that move as one are one object; what never moves is left out.
+// World positions of points on the moving objects at every time. The points are those that the first training
+// camera sees at time 0, at most 600 per object, on a grid that does not depend on the image size. Bodies
+// that move together are one object. Static bodies are excluded.
 struct SynthMotion {
   Tensor<float> points;    // T×N×3, entry i at the time of frame i
   Tensor<int32_t> object;  // N, 0, 1, …
 };
 SynthMotion synth_motion(const SynthOptions& options);
 
-// How the capture's scene.json normalises the world, and its depth range in the normalised scene.
+// The normalisation in the capture's scene.json, and the depth range in the normalised scene.
 SceneNormalisation synth_normalisation();
 inline constexpr double synth_near = 0.05;
 inline constexpr double synth_far = 4.0;
 
-// Writes the capture in the NeRF-DS layout with priors, points and truth. An empty or absent folder is
-// filled, an earlier synthetic capture replaced; any other folder throws InputError. dataset.json is written
-// last: a folder that has it is whole.
+// Writes the capture in the NeRF-DS layout with priors, points and truth. Accepts an absent or empty folder
+// or an earlier synthetic capture, which is replaced. Any other folder throws InputError. dataset.json is
+// written last and marks a complete folder.
 void write_synthetic_capture(const SynthOptions& options, const std::filesystem::path& folder);
 
 }  // namespace traceflow

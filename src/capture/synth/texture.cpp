@@ -14,7 +14,7 @@ double lattice_value(int64_t x, int64_t y) {
       mix_bits(static_cast<uint64_t>(x) * 0x9E3779B97F4A7C15ULL + static_cast<uint64_t>(y)));
 }
 
-// Value noise in [0, 1] on the unit lattice.
+// Value noise in [0, 1] on the integer lattice.
 double smooth_noise(double x, double y) {
   const double floor_x = std::floor(x);
   const double floor_y = std::floor(y);
@@ -34,7 +34,7 @@ double grain_at(const Vec2<double>& p) {
 
 bool is_odd(double cell) { return std::fmod(cell, 2.0) != 0; }
 
-// Mortar lines a tenth of a brick's height wide, every second row shifted by half a brick.
+// Mortar lines are a tenth of a brick's height wide. Every second row is shifted by half a brick.
 bool is_mortar(const Vec2<double>& p) {
   const double row = std::floor(p.y);
   const double x = p.x + (is_odd(row) ? 0.5 : 0.0);
@@ -62,13 +62,13 @@ uint64_t cell_bits(const Vec3<int64_t>& cell) {
   return bits;
 }
 
-// Three numbers in [0, 1) from one word.
+// Three numbers in [0, 1) from one 64-bit word.
 Vector three_units(uint64_t bits) {
   return {unit_from_bits(bits), unit_from_bits(mix_bits(bits)), unit_from_bits(mix_bits(mix_bits(bits)))};
 }
 
-// The word of the irregular cell that holds p: each cube of the unit lattice has one centre at a random
-// place, and the nearest centre wins.
+// The random word of the irregular cell that contains p. Each cube of the integer lattice has one cell centre
+// at a random position; p belongs to the nearest centre.
 uint64_t patch_bits(const Vector& p) {
   const Vec3<int64_t> home(glm::floor(p));
   double nearest = infinity;

@@ -7,7 +7,7 @@ namespace traceflow::synth {
 
 namespace {
 
-// Metres by which rays start above the surface that they leave.
+// Offset of a ray's origin from the surface that it leaves, metres.
 constexpr double lift = 1e-7;
 
 bool can_reach(const Body& body, const Ray& ray, double farthest) {
@@ -22,7 +22,7 @@ Ray in_body(const Pose& pose, const Ray& ray) {
   return {(ray.origin - pose.position) * pose.world_from_body, ray.direction * pose.world_from_body};
 }
 
-// The body's hit along the ray where it is nearer than `farthest`; a larger distance otherwise.
+// The body's hit along the ray if it is nearer than `farthest`; otherwise any larger distance.
 ShapeHit body_hit(const Body& body, const Ray& ray, double farthest) {
   if (std::holds_alternative<Plane>(body.shape)) {
     const Vector& normal = body.pose.world_from_body[2];
@@ -64,7 +64,7 @@ Vector mirror_direction(const Vector& direction, const Vector& normal, double ro
   return dot(jittered, normal) > 0 ? jittered : ideal;
 }
 
-// Light that one point of the light disk sends to a surface, over π: what a white surface would send back.
+// Light from one point of the light disk at a surface, over π: what a white surface would reflect.
 Vector direct_light(const Stage& stage, const Hit& hit, const Vec2<double>& square) {
   const Body& light = stage.bodies[static_cast<size_t>(stage.light)];
   const double radius = std::get<Disk>(light.shape).radius;

@@ -7,20 +7,20 @@ namespace traceflow::synth {
 
 namespace {
 
-// How a hand carries a thing: from `start` by `travel`, a little off the straight line, while it turns about
-// a tilted axis and rocks about another one. At time 0 it is unturned.
+// Motion of an object carried by hand. It moves from `start` by `travel`, slightly off the straight line,
+// turns about a tilted axis and rocks about another. At time 0 it is not rotated.
 struct Carry {
   Vector start;
   Vector travel;
   Vector sway;
   Vector axis;
-  double turn;  // radians, as is rock
+  double turn;  // radians, like rock
   Vector rock_axis;
   double rock;
 
   Pose at(double time) const {
     const double phase = 2 * pi * time;
-    // Slow at both ends; the speed never falls to zero nor changes suddenly.
+    // Slow at both ends; the speed is never zero and never changes suddenly.
     const double way = time - (0.55 * std::sin(phase) + 0.14 * std::sin(2 * phase)) / (2 * pi);
     const double turned = 0.5 - 0.5 * std::cos(pi * time);
     const Vector shaken = sway * std::sin(pi * time) + Vector(0, 0, 0.008) * std::sin(2.5 * phase);
@@ -46,7 +46,7 @@ const Carry crate_carry{.start = {0.25, -0.15, 0.19},
                         .rock_axis = {0, 1, 0.3},
                         .rock = 0.10};
 
-// A part of a rigid whole: `place` is where it sits in the whole.
+// A part of a rigid object; `place` is its pose in the object.
 Actor part(const Shape& shape, const Material& material, const Carry& whole, const Pose& place, int object) {
   const auto pose_at = [whole, place](double time) -> Pose {
     const Pose carried = whole.at(time);
@@ -56,7 +56,7 @@ Actor part(const Shape& shape, const Material& material, const Carry& whole, con
   return {shape, material, pose_at, object, true};
 }
 
-// A mirror ball whose symmetry a spout, a handle, a knob and a foot break.
+// A mirror ball. Its spout, handle, knob and foot break the symmetry.
 void add_kettle(AnimatedScene& scene, int object) {
   const auto add = [&](const Shape& shape, const Material& material, const Vector& position,
                        const Mat3<double>& rotation = Mat3<double>(1)) {

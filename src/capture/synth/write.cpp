@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-// The file that marks a folder as a synthetic capture, which may be written again.
+// The file that marks a folder as a synthetic capture, which may be overwritten.
 constexpr const char* marker = "synth.json";
 constexpr std::array<const char*, 5> subfolders{"rgb", "camera", "mask", "normal", "truth"};
 
@@ -59,7 +59,7 @@ json as_json(const SynthOptions& options) {
 
 void write_json(const fs::path& path, const json& value) { write_atomically(path, value.dump(1) + "\n"); }
 
-// Unit vectors as 8-bit pictures: v = (n + 1) / 2.
+// Unit vectors as 8-bit images: v = (n + 1) / 2.
 Tensor<uint8_t> normal_picture(const Tensor<float>& normal) {
   Tensor<float> values = normal;
   for (float& value : values.values()) value = 0.5F * (value + 1);

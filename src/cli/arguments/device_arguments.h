@@ -11,13 +11,13 @@ class App;
 
 namespace traceflow::cli {
 
-// Where a verb runs: `--device auto|cpu|cuda` and `--deterministic`.
+// The device of a verb: `--device auto|cpu|cuda` and `--deterministic`.
 class DeviceArguments {
  public:
   explicit DeviceArguments(CLI::App& verb);
 
-  // After parsing: the device, told on stderr with the reason, unless quiet. Throws InputError where cuda is
-  // asked for and none answers.
+  // After parsing: the chosen device. Unless quiet, prints it with the reason to stderr. Throws InputError if
+  // cuda is requested and not available.
   Device choose(bool quiet = false) const;
 
  private:

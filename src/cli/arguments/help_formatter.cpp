@@ -19,7 +19,7 @@ std::string names_of(const std::set<CLI::Option*>& options) {
 
 }  // namespace
 
-// A negated flag is `--no-low-pass{false}` in CLI11's words.
+// CLI11 names a negated flag `--no-low-pass{false}`.
 std::string HelpFormatter::make_option_name(const CLI::Option* option, bool is_positional) const {
   return CLI::detail::find_and_replace(CLI::Formatter::make_option_name(option, is_positional), "{false}",
                                        "");

@@ -6,8 +6,8 @@
 
 namespace traceflow::cli {
 
-// An option's lines in a verb's help: `-o,--output RUN REQUIRED`, what it is for, its default in brackets.
-// CLI11's own formatter leaves out all of that where an option has a placeholder.
+// Formats an option in a verb's help: `-o,--output RUN REQUIRED`, its purpose, and its default in brackets.
+// CLI11's own formatter omits all that if an option has a placeholder.
 class HelpFormatter : public CLI::Formatter {
  public:
   std::string make_option_name(const CLI::Option* option, bool is_positional) const override;

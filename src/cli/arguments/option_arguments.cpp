@@ -25,7 +25,7 @@ bool has_flag(const OptionField& field, const std::vector<std::string>& promoted
          std::find(promoted.begin(), promoted.end(), field.path.substr(0, dot)) != promoted.end();
 }
 
-// What stands for the value in the help: "N", "X", the choices.
+// Placeholder of the value in the help: "N", "X" or the choices.
 std::string placeholder(const OptionField& field) {
   switch (field.kind) {
     case OptionKind::boolean:
@@ -44,14 +44,14 @@ std::string placeholder(const OptionField& field) {
   return "";
 }
 
-// With the value that is taken where none is given.
+// The help text with the default value.
 std::string help_text(const OptionField& field) {
   const std::string value = option_text(field.get());
   if (value.empty()) return field.full_help();
   return fmt::format("{} [{}{}{}]", field.full_help(), value, field.unit.empty() ? "" : " ", field.unit);
 }
 
-// Paths that --set alone reaches.
+// Paths that only --set can set.
 std::vector<std::string> paths_without_flag(const std::vector<OptionField>& fields,
                                             const std::vector<std::string>& promoted) {
   std::vector<std::string> paths;
@@ -61,10 +61,10 @@ std::vector<std::string> paths_without_flag(const std::vector<OptionField>& fiel
   return paths;
 }
 
-// More are left to the page of all options.
+// The page of all options lists the rest.
 constexpr size_t most_listed = 5;
 
-// An assignment that changes nothing, of an option that --set alone reaches where there is one.
+// An example for --set that changes nothing, if possible for an option that only --set can set.
 std::string example_of(const std::vector<OptionField>& fields, const std::vector<std::string>& without_flag) {
   for (const OptionField& field : fields) {
     const std::string value = option_text(field.get());
@@ -97,7 +97,7 @@ struct OptionArguments::State {
   std::deque<Flag> flags;  // CLI11 keeps references to its elements
   std::vector<std::string> assignments;
   std::string config;
-  std::string listed_by;  // the command whose output has the names of all options
+  std::string listed_by;  // the command that lists the names of all options
 };
 
 OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>& fields,

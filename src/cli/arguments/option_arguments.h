@@ -12,9 +12,9 @@ class App;
 
 namespace traceflow::cli {
 
-// An options struct on a verb's command line: a flag for every field that stands in no group or in one of the
-// `promoted` groups (`--save-every N`, `--no-low-pass`), `--set loss.normal=0` for every field, and `--config
-// FILE.toml`. The help shows what the fields hold at that time as their defaults.
+// An options struct on a verb's command line. Each field in no group or in a `promoted` group has a flag
+// (`--save-every N`, `--no-low-pass`). `--set loss.normal=0` sets any field, and `--config FILE.toml` reads a
+// file. The help shows the fields' present values as defaults.
 //
 //   auto options = std::make_shared<TrainOptions>();
 //   OptionArguments arguments(*verb, option_fields(*options), {"capture"});
@@ -24,7 +24,8 @@ class OptionArguments {
   OptionArguments(CLI::App& verb, const std::vector<OptionField>& fields,
                   const std::vector<std::string>& promoted = {});
 
-  // After parsing: writes what was given, the file first, then --set, then the flags. Throws InputError.
+  // After parsing: sets the given values, first from the file, then from --set, then from the flags. Throws
+  // InputError.
   void apply(const std::vector<OptionField>& fields) const;
 
  private:

@@ -9,8 +9,8 @@
 #include "base/utf8.h"
 #include "files/input_file.h"
 
-// The parser asserts of a table's name, "[:]", what it checks in the next line and refuses. In a debug build
-// that would end the program; clang, where NDEBUG is defined, is told to take it for granted.
+// For a table named "[:]" the parser asserts a condition that it checks and reports in the next line. The
+// assertion would end a debug build; with NDEBUG it becomes an assumption for clang.
 #undef NDEBUG
 #define TOML_ASSERT(expression) static_assert(true)
 #include <toml++/toml.h>
@@ -22,8 +22,8 @@ namespace {
 constexpr int64_t most_bytes = int64_t{1} << 20;
 constexpr int deepest = 64;
 
-// Goes ahead of the parser, which walks tables in tables by recursion, and whose search for the end of what
-// it cannot read does not bear letters beyond ASCII: they reach it as escapes.
+// Runs before the parser. Limits nesting, since the parser recurses into tables. Escapes characters beyond
+// ASCII, since the parser's error recovery fails on them.
 class Guard {
  public:
   explicit Guard(const std::filesystem::path& path) : path_(path.string()) {}
@@ -77,7 +77,7 @@ class Guard {
 
   std::string path_;
   int line_ = 1, brackets_ = 0, dots_ = 0;
-  char quote_ = '\0';  // what ends the string or, '\n', the comment that this is in
+  char quote_ = '\0';  // what ends the present string or, if '\n', the present comment
   bool follows_backslash_ = false;
 };
 
@@ -92,7 +92,7 @@ std::string read_settings(const std::filesystem::path& path) {
   return Guard(path).in_ascii(text);
 }
 
-// What stands there, in a word.
+// The kind of the node in one word.
 std::string kind_of(const toml::node& node) {
   std::ostringstream text;
   text << node.type();

@@ -55,7 +55,7 @@ std::unique_ptr<serve::Server> ServerArguments::start(serve::MessageHandler& han
   try {
     server = listen();
   } catch (const InputError&) {
-    // With other names or addresses a port is part of an agreement.
+    // With --bind or --allow-host, other parties rely on the port.
     const bool as_usual = state_->allowed_hosts.empty() && state_->bind == serve::ServerOptions().bind;
     if (state_->port || !as_usual) throw;
     options.port = 0;
@@ -65,7 +65,7 @@ std::unique_ptr<serve::Server> ServerArguments::start(serve::MessageHandler& han
   if (state_->bind == serve::ServerOptions().bind)
     fmt::print("      from elsewhere: ssh -L {0}:127.0.0.1:{0} THIS-MACHINE, then the same address\n",
                server->port());
-  std::fflush(stdout);  // whoever waits for the address at the other end of a pipe
+  std::fflush(stdout);  // for a process that reads the address from a pipe
   return server;
 }
 

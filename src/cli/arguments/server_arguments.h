@@ -15,11 +15,11 @@ namespace traceflow::cli {
 // Where the viewer's server listens: --port, --bind, --allow-host.
 class ServerArguments {
  public:
-  // needs: a flag without which these make no sense, or null.
+  // needs: a flag that these require, or null.
   explicit ServerArguments(CLI::App& verb, CLI::Option* needs = nullptr);
 
-  // Starts the server, and says on standard output where to look and how from another machine. Where no port
-  // was asked for and the usual one is taken, it takes any. Throws InputError.
+  // Starts the server and prints its address, and how to reach it from another machine, to standard output.
+  // If the default port is taken and no port was requested, uses any free one. Throws InputError.
   std::unique_ptr<serve::Server> start(serve::MessageHandler& handler) const;
 
  private:

@@ -18,7 +18,7 @@ namespace traceflow::cli {
 
 namespace {
 
-// Names and paths come from outside.
+// Names and paths are untrusted.
 void row(const std::string& name, const std::string& text) {
   constexpr size_t longest = 4096;
   fmt::print("{:<16}{}\n", name, printable(text, longest));
@@ -63,7 +63,7 @@ void print_images(const Inspection& found) {
                                                 : ""));
 }
 
-// What a render that is right but for the noise would have.
+// PSNR of a perfect render without noise against a noisy image.
 double noise_limit_db(double deviation) { return 20 * std::log10(255 / deviation); }
 
 void print_noise(const Inspection::Pixels& pixels) {
@@ -110,7 +110,7 @@ void print_extras(const Capture& capture, const Inspection& found) {
   }
 }
 
-// The texts name three views; paths, which are asked for to be followed, are listed, but not by the hundred.
+// The texts name at most three views. Paths are listed so that the user can open them, but only a few.
 void print_findings(const std::vector<Finding>& findings) {
   constexpr size_t most_files = 5;
   for (const Finding& finding : findings) {

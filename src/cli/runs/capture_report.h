@@ -7,15 +7,15 @@
 
 namespace traceflow::cli {
 
-// What a run on the capture would take, bytes.
+// Memory that training on the capture needs, bytes.
 struct MemoryNeeds {
-  int64_t kept_images = 0;  // decoded, of those that the cache holds
-  int64_t on_cpu = 0;       // of a training at most
+  int64_t kept_images = 0;  // decoded images that the cache holds
+  int64_t on_cpu = 0;       // upper limit for training
   int64_t on_cuda = 0;
-  int64_t available = 0;  // on this machine, now
+  int64_t available = 0;  // on this machine, at present
 };
 
-// Adds a finding where even the images are too many for this machine.
+// Adds a finding if the images alone exceed this machine's memory.
 MemoryNeeds memory_needs(const Capture& capture, const TrainOptions& options, Inspection& inspection);
 
 // What `traceflow inspect` prints (docs/inspect.md).

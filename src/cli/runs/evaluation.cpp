@@ -31,7 +31,7 @@ std::optional<lpips::Network> read_lpips(const std::string& path) {
   return std::nullopt;
 }
 
-// The options beside those of the preset that they differ least from: a run does not say which it began with.
+// The options beside those of the most similar preset. A run does not store the preset that it started from.
 std::vector<eval::Setting> settings_of(const TrainOptions& options) {
   TrainOptions copy = options;
   const std::vector<OptionField> fields = option_fields(copy);

@@ -8,7 +8,7 @@
 
 namespace traceflow::cli {
 
-// What `eval` and `report` are both told.
+// Arguments of both `eval` and `report`.
 struct EvaluationArguments {
   std::string run, capture, split = "test", lpips;
   int downscale = 0;
@@ -16,17 +16,17 @@ struct EvaluationArguments {
 };
 void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& arguments);
 
-// A run and the views that it is measured on.
+// A run and the views on which it is measured.
 class Evaluation {
  public:
-  // Reads the run, the capture and, where they are given, LPIPS's weights; says on standard error what is
-  // missing. Throws InputError.
+  // Reads the run, the capture and, if given, the weights of LPIPS. Prints to standard error what is missing.
+  // Throws InputError.
   Evaluation(const EvaluationArguments& arguments, const DeviceArguments& devices);
 
-  // Renders and measures every view; the listener may be empty. Where it is asked for, or held-out views are
-  // measured of a run that refined its cameras, measures them with aligned cameras too.
+  // Renders and measures every view; the listener may be empty. Also measures with aligned cameras if
+  // requested, or if these are held-out views of a run that refined its cameras.
   void measure(const eval::ViewListener& listener);
-  // What has been measured, as a page (eval/report_page.h).
+  // Writes the results as a page (eval/report_page.h).
   void write_page(const std::filesystem::path& path);
 
   const eval::Report& report() const { return report_; }
@@ -36,7 +36,7 @@ class Evaluation {
   const Capture& capture() const { return capture_; }
 
  private:
-  // The views with cameras from which they look most like their photographs.
+  // The views with cameras aligned to their photographs.
   std::vector<View> aligned_views();
 
   std::filesystem::path folder_;

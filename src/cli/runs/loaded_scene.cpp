@@ -6,7 +6,7 @@ namespace traceflow::cli {
 
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
   if (std::filesystem::is_regular_file(path)) return {viz::read_ply_subject(path, environment), std::nullopt};
-  // A run that was exported into its own folder is more than that one moment of it.
+  // If a run was exported into its own folder, the run contains more than the exported time.
   const bool is_taken_for_run = environment.empty() && RunFolder{path}.holds_a_run();
   if (!is_taken_for_run && std::filesystem::is_regular_file(path / "main.ply")) {
     return {viz::read_ply_subject(path / "main.ply", environment), std::nullopt};

@@ -7,18 +7,18 @@
 
 namespace traceflow::cli {
 
-// A scene and, when it comes from a run, what else is known of it.
+// A scene and, if it comes from a run, the run's other data.
 struct LoadedScene {
   viz::Subject subject;
   std::optional<TrainedRun> run;
 };
 
-// A run's folder, a .ply or a folder that export wrote; a folder that is both is the run's. environment: a
-// .ply's own, with which such a folder is the export's, or empty.
+// Loads a run's folder, a .ply or a folder written by export. A folder that is both counts as a run.
+// environment: the .ply with the reflected surfels, or empty; if given, such a folder counts as an export.
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment);
 
-// The capture in `folder`; of a run the one that it was trained on, where that is empty. downscale 0: the
-// run's, or the usual one. Throws InputError.
+// The capture in `folder` or, if that is empty, the one that the run was trained on. downscale 0: the run's,
+// or the default. Throws InputError.
 Capture capture_of(const LoadedScene& scene, const std::filesystem::path& folder, int downscale);
 
 }  // namespace traceflow::cli

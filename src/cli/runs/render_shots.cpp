@@ -24,7 +24,7 @@ constexpr std::pair<int, int> usual_size = {640, 360};
   throw InputError("option", option, found, expected);
 }
 
-// "640x360".
+// Parses "640x360".
 std::pair<int, int> parse_size(const std::string& text) {
   int width = 0, height = 0;
   char rest = 0;
@@ -35,7 +35,7 @@ std::pair<int, int> parse_size(const std::string& text) {
   return {width, height};
 }
 
-// Seen under the same vertical angle.
+// Keeps the vertical field of view.
 Camera<float> resized(Camera<float> camera, std::pair<int, int> size) {
   const float scale = static_cast<float>(size.second) / static_cast<float>(camera.height);
   camera.centre_x =
@@ -47,7 +47,7 @@ Camera<float> resized(Camera<float> camera, std::pair<int, int> size) {
   return camera;
 }
 
-// Chooses shots with all that is known of the scene; the capture is read when it is asked for.
+// Chooses shots from all data of the scene. The capture is only read if needed.
 class Chooser {
  public:
   Chooser(const ShotArguments& arguments, const LoadedScene& scene) : a_(arguments), scene_(scene) {}
@@ -84,7 +84,7 @@ class Chooser {
     return *capture_;
   }
 
-  // A capture's camera where the scene is: a .ply stands in the capture's own coordinates.
+  // A capture's camera in the scene's coordinates: a .ply has the capture's own coordinates.
   Camera<float> placed(const Camera<float>& camera) {
     return carried(camera, capture().normalisation, scene_.subject.scene.normalisation);
   }
@@ -105,7 +105,7 @@ class Chooser {
     chosen.frames_per_second = path.fps;
   }
 
-  // The scene moves while the camera does, once from beginning to end.
+  // Time runs once from beginning to end while the camera moves.
   void around(ChosenShots& chosen) {
     const int frames = a_.frames.value_or(usual_frames);
     if (a_.orbit && !scene_.run && a_.capture.empty()) {
@@ -125,7 +125,7 @@ class Chooser {
     return static_cast<float>(static_cast<double>(i) / std::max<double>(1, static_cast<double>(count) - 1));
   }
 
-  // By its id, of either split, or by its place in the split's list.
+  // Finds a view by its id, in either split, or by its index in the split.
   const View& view_to_freeze() {
     const std::string split = a_.split.empty() ? "test" : a_.split;
     const std::vector<View>& first = split == "train" ? capture().train : capture().test;
@@ -134,7 +134,7 @@ class Chooser {
           std::find_if(list->begin(), list->end(), [&](const View& v) { return v.id == a_.freeze_camera; });
       if (found != list->end()) return *found;
     }
-    // Only now: a capture without test views has training views to freeze.
+    // Only after the search by id: a capture without test views can still freeze a training view.
     const std::vector<View>& views = views_of(capture(), split);
     const std::string& text = a_.freeze_camera;
     size_t index = 0;
@@ -151,8 +151,8 @@ class Chooser {
     return a.width == b.width && a.height == b.height;
   }
 
-  // Of all times of the capture, the view that was taken from nearest to the camera: of its size, where there
-  // is one, as no other can stand beside its picture.
+  // For each time of the capture, the view nearest to the camera. Views of the camera's size come first,
+  // since only their photographs can be compared.
   std::map<float, const View*> moments(const Camera<float>& camera) {
     std::map<float, const View*> nearest;
     const auto away = [&](const View* view) {
@@ -168,7 +168,7 @@ class Chooser {
     return nearest;
   }
 
-  // Said before anything is rendered.
+  // Checked before anything is rendered.
   static void check_beside(const View& view, const Camera<float>& camera) {
     if (has_size_of(view.camera, camera)) return;
     const Camera<float>& other = view.camera;
@@ -220,7 +220,7 @@ void ShotArguments::check() const {
   }
   const std::string way = ways.empty() ? "--split" : ways[0];
   const bool made = orbit || spiral || !freeze_camera.empty();
-  // The parser's range lets "nan" through.
+  // CLI11's range check accepts "nan".
   if (time) check_option(*time >= 0 && *time <= 1, "time", *time, "0 to 1");
   if (time && !freeze_camera.empty())
     refuse("freeze-time", "it together with --freeze-camera, by which nothing would move", "one of them");

@@ -14,7 +14,7 @@ class App;
 
 namespace traceflow::cli {
 
-// Which pictures `render` takes: the flags that choose cameras and times.
+// The flags of `render` that choose cameras and times.
 struct ShotArguments {
   std::string split, cameras, camera_path, freeze_camera, capture;
   bool orbit = false, spiral = false;
@@ -25,17 +25,17 @@ struct ShotArguments {
   std::optional<double> frames_per_second;
   int downscale = 0;
 
-  // Throws InputError, in words, for flags that do not go together.
+  // Throws InputError with an explanation for flags that exclude each other.
   void check() const;
 };
 void add_shot_arguments(CLI::App& verb, ShotArguments& arguments);
 
 struct ChosenShots {
-  std::vector<viz::Shot> shots;  // each with its time
-  // To compare with: one view for each shot, and where their pictures are. Else empty.
+  std::vector<viz::Shot> shots;  // each has a time
+  // For comparison: one view for each shot, and the capture with their photographs. Otherwise empty.
   std::vector<View> photographs;
   std::optional<Capture> capture;
-  std::vector<float> times;  // of the capture, ascending; empty where the cameras did not need it
+  std::vector<float> times;  // of the capture, ascending; empty if the cameras did not need it
   double frames_per_second = 30;
 };
 

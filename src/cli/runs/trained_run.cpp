@@ -20,7 +20,7 @@ TrainedRun read_run(const std::filesystem::path& folder) {
   TrainedRun run;
   const Safetensors file = read_checkpoint(files, run.note);
   run.options = options_in(file, where);
-  // What training alone must keep to is no matter of what it has made.
+  // Only the render options are validated: limits of training do not concern its result.
   run.options.render.validate();
   run.subject.scene = get_scene(file);
   run.iterations = std::llround(file.number("iteration"));

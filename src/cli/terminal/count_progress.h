@@ -6,28 +6,28 @@
 
 namespace traceflow::cli {
 
-// What is counted, of how many: "12/120 frames", "features  12/87". all is 0 where it is not known.
+// A count out of a total: "12/120 frames", "features  12/87". all is 0 if unknown.
 struct Count {
   std::string label, unit;
   int64_t done = 0, all = 0;
 };
-// With the rate and the time that is left, after `seconds` of counting: "12/120 frames  4.0 a second  27 s
+// Adds the rate and the remaining time, after `seconds` of counting: "12/120 frames  4.0 a second  27 s
 // left".
 std::string count_line(const Count& count, double seconds);
 
-// Shows a person how far counted work has come. On a terminal one line is redrawn; elsewhere a line is
-// written every fifteen seconds. It keeps no clock of its own.
+// Shows the progress of counted work. On a terminal it redraws one line; elsewhere it writes a line every
+// fifteen seconds. It has no clock: the caller passes the time.
 class CountProgress {
  public:
-  // width: columns of the terminal, 0 where there is none.
+  // width: columns of the terminal, 0 if there is none.
   CountProgress(std::ostream& out, int width) : out_(&out), width_(width) {}
   ~CountProgress() { finish(); }
   CountProgress(const CountProgress&) = delete;
   CountProgress& operator=(const CountProgress&) = delete;
-  // To standard error, as wide as its terminal is.
+  // Writes to standard error, with the width of its terminal.
   static CountProgress for_stderr();
 
-  // seconds: since this was begun to count. Fewer than before are those of another count.
+  // seconds: since the start of this count. A smaller value than before starts a new count.
   void show(const Count& count, double seconds);
   // Clears the redrawn line.
   void finish();

@@ -16,7 +16,7 @@ namespace traceflow::cli {
 
 namespace {
 
-// Asks for no memory: there may be none.
+// Allocates no memory, since none may be left.
 int report(std::ostream& err, const char* kind, std::string_view text, const char* remedy, int code) {
   err << "traceflow: " << kind;
   for (const char c : text) err << (c == '\n' ? ' ' : c);
@@ -46,7 +46,7 @@ int guarded(const std::function<int()>& work, std::ostream& err) {
     return e.code;
   } catch (const InputError& e) {
     return report(err, "", e.what(), "", exit_input);
-  } catch (const std::system_error& e) {  // a file, a stream or a thread that the system refuses
+  } catch (const std::system_error& e) {  // a file, stream or thread that the system refuses
     return report(err, "", e.what(), "", exit_input);
   } catch (const memory::OutOfMemory& e) {
     return report(err, "", e.what(), "; try a higher --downscale, or --device cpu", exit_memory);

@@ -3,27 +3,26 @@
 #include <functional>
 #include <iosfwd>
 
-// The one place where errors end. Each becomes one line on `err` and an exit code.
+// The one place that handles errors: each becomes one line on `err` and an exit code.
 namespace traceflow::cli {
 
 inline constexpr int exit_done = 0;
-inline constexpr int exit_input = 2;          // input or arguments that cannot be used
-inline constexpr int exit_internal = 3;       // a broken promise inside the program: a bug
-inline constexpr int exit_memory = 4;         // memory ran out
-inline constexpr int exit_diverged = 5;       // a training run ended in numbers that are none, or collapsed
-inline constexpr int exit_interrupted = 130;  // ended on request, its state saved
+inline constexpr int exit_input = 2;          // unusable input or arguments
+inline constexpr int exit_internal = 3;       // a failed internal check: a bug
+inline constexpr int exit_memory = 4;         // out of memory
+inline constexpr int exit_diverged = 5;       // a training diverged to non-finite numbers, or collapsed
+inline constexpr int exit_interrupted = 130;  // stopped on request, with its state saved
 
-// Thrown by a verb that has said all there is to say and only has an exit code left.
+// Thrown by a verb that has printed its message and only needs an exit code.
 struct Exit {
   int code;
 };
 
-// From now on what cannot reach a boundary, since it is thrown where nothing may be (libraries ask for memory
-// in destructors), ends the program at once, with its line on standard error and its code. What is on disk is
-// as a killed program leaves it.
+// Handles errors that cannot reach a boundary, such as failed allocations in destructors of libraries: the
+// program ends at once, with its line on standard error and its exit code. Files are left as after a kill.
 void guard_termination();
 
-// Runs `work`, which returns an exit code, and turns what it throws into a line and a code.
+// Runs `work`, which returns an exit code. Turns exceptions into a line and an exit code.
 int guarded(const std::function<int()>& work, std::ostream& err);
 
 }  // namespace traceflow::cli

@@ -138,7 +138,7 @@ void Progress::show(const events::Step& e) {
   shown_percent_ = percent_of(e);
 }
 
-// Growth shows in the status line's counts; what limits it comes as a warning.
+// The status line shows the counts; a warning reports a limit on growth.
 void Progress::show(const events::DensityChanged&) {}
 void Progress::show(const events::FollowingDecided&) {}
 void Progress::show(const events::BodiesParted&) {}
@@ -164,7 +164,7 @@ void Progress::show(const events::Saved& e) {
   print_line(fmt::format("saved {} at iteration {}", e.path.string(), e.iteration));
 }
 
-// For the log alone.
+// Only for the log.
 void Progress::show(const events::Measured&) {}
 
 void Progress::show(const events::Finished& e) {

@@ -8,17 +8,17 @@
 
 namespace traceflow::cli {
 
-// How often a line is drawn again on a terminal, and a new one written elsewhere.
+// Interval of redrawing on a terminal, and of new lines elsewhere.
 constexpr double redraw_seconds = 0.1;
 constexpr double line_seconds = 15;
 
-// A listener that shows a run to a person. On a terminal one line is redrawn; elsewhere a line is written
-// every five percent or fifteen seconds. It keeps no clock of its own: time is what the events say.
+// A listener that shows the progress of a run. On a terminal it redraws one line; elsewhere it writes a line
+// every five percent or fifteen seconds. It has no clock: events carry the time.
 class Progress {
  public:
-  // width: columns of the terminal, 0 where there is none.
+  // width: columns of the terminal, 0 if there is none.
   Progress(std::ostream& out, int width);
-  // To standard error, as wide as its terminal is.
+  // Writes to standard error, with the width of its terminal.
   static Progress for_stderr();
 
   void operator()(const events::Event& event);
@@ -38,7 +38,7 @@ class Progress {
   void show(const events::Saved& e);
   void show(const events::Measured& e);
   void show(const events::Finished& e);
-  // A line of its own, above the redrawn one.
+  // Prints a separate line above the redrawn one.
   void print_line(const std::string& text);
 
   std::ostream* out_;
@@ -48,13 +48,13 @@ class Progress {
   int64_t shown_percent_ = -100;
 };
 
-// A listener that shows of a run its warnings alone.
+// A listener that only shows the run's warnings.
 events::Listener warnings_alone(std::ostream& out);
 
-// The status line of one step, made of as many of its parts as fit into `width` columns (0: all, and no bar).
+// The status line of one step, with as many parts as fit into `width` columns (0: all parts, no bar).
 std::string status_line(const events::Step& step, int width);
 
-// Columns of standard error's terminal; 0 where it is none.
+// Columns of standard error's terminal; 0 if it is not a terminal.
 int terminal_width();
 
 // 7 s, 2:05, 1:02:03.

@@ -4,12 +4,11 @@
 
 namespace traceflow::cli {
 
-// Gives each of the standard streams that the program was started without a place that swallows it. Else the
-// next file that is opened would take its number, and what is said its bytes.
+// Opens /dev/null for each standard stream that is closed. Otherwise the next opened file would get its
+// number, and printed text would go into that file.
 void hold_standard_streams();
 
-// Writes out what was printed to standard output. Where that fails, says so in a line on `err` and returns
-// false.
+// Flushes standard output. If that fails, prints a line to `err` and returns false.
 bool flush_output(std::ostream& err);
 
 }  // namespace traceflow::cli

@@ -9,13 +9,13 @@ namespace traceflow::cli {
 
 namespace {
 
-constexpr int64_t second = 1'000'000'000;  // in nanoseconds
+constexpr int64_t second = 1'000'000'000;  // nanoseconds
 
 std::atomic<bool> stop_requested{false};
-// When each signal came first, in nanoseconds; 0: not yet.
+// When each signal first came, in nanoseconds; 0: not yet.
 std::array<std::atomic<int64_t>, NSIG> first_came{};
 
-// Only what a handler of signals may call is called in these two.
+// These two only call functions that are safe in signal handlers.
 int64_t nanoseconds_now() {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
@@ -50,7 +50,7 @@ bool is_ignored(int signal_number) {
 const std::atomic<bool>& stop_on_signals() {
   stop_requested = false;
   listen_to(SIGTERM);
-  // Where they are ignored, nohup or a script that started this with `&` has asked for it.
+  // If they are ignored, nohup or a script that started this program with `&` requested it.
   for (const int signal_number : {SIGINT, SIGHUP}) {
     if (!is_ignored(signal_number)) listen_to(signal_number);
   }

@@ -4,12 +4,12 @@
 
 namespace traceflow::cli {
 
-// From now on Ctrl-C, SIGTERM and a terminal that goes away (SIGHUP) set this, which starts as false, so that
-// a verb can end its work in good order; Ctrl-C and SIGHUP only where whoever started the program has not had
-// them ignored. The same one more than a second later ends the program at once, but for SIGHUP. Within that
-// second it is the same request: `timeout` signals a program and its group, and a shell passes on the hang-up
-// that the system sends too. A reader of the program's output that goes away and a limit on the size of files
-// do not end it: what they refuse is an error where it is written.
+// Returns a flag, false at first. From now on Ctrl-C, SIGTERM and SIGHUP (a closed terminal) set it, so that
+// a verb can finish cleanly. Ctrl-C and SIGHUP are left alone if the parent process had them ignored. A
+// second signal of the same kind more than a second later ends the program at once, except SIGHUP. Within
+// that second it counts as the same request: `timeout` signals a program and its group, and a shell forwards
+// the SIGHUP that the system also sends. A closed pipe and the file size limit do not end the program: they
+// become write errors.
 const std::atomic<bool>& stop_on_signals();
 
 }  // namespace traceflow::cli

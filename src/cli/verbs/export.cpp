@@ -18,7 +18,7 @@ struct ExportArguments {
 };
 
 void run_export(const ExportArguments& a) {
-  // The parser's range lets "nan" through.
+  // CLI11's range check accepts "nan".
   check_option(a.time >= 0 && a.time <= 1, "time", a.time, "0 to 1");
   const TrainedRun run = read_run(a.run);
   if (!run.note.empty()) std::cerr << run.note << std::endl;

@@ -32,7 +32,7 @@ void inspect_capture(const InspectArguments& arguments, const OptionArguments& g
   if (!arguments.picture.empty()) write_png(arguments.picture, viz::capture_picture(capture, found.findings));
   if (arguments.as_json) {
     const nlohmann::json report = report_json(capture, found, memory);
-    // In ASCII: beyond it too stands what commands a terminal, and names come from outside.
+    // In ASCII: names are untrusted, and other characters include terminal control codes.
     fmt::print("{}\n", report.dump(2, ' ', true, nlohmann::json::error_handler_t::replace));
   } else {
     print_report(capture, found, memory);

@@ -22,7 +22,7 @@ struct PrepareArguments {
   prepare::PrepareOptions options;
 };
 
-// What each step found, a line for each, and under it the step at work.
+// Prints a line for each finished step, and below it the progress of the present step.
 class Watcher {
  public:
   void found(const std::string& line) {
@@ -31,7 +31,7 @@ class Watcher {
   }
   void at_work(prepare::Step step, int64_t done, int64_t all) {
     const auto now = std::chrono::steady_clock::now();
-    // Every count of a step begins anew: its pictures are looked at, then written.
+    // A step may count several times: it first analyses images, then writes them.
     if (done == 0 || done < done_) began_ = now;
     done_ = done;
     progress_.show({prepare::step_name(step), "", done, all},

@@ -36,7 +36,7 @@ struct RenderArguments {
   }
 };
 
-// Where the pictures go: files, a film, or both.
+// Where the pictures go: files, a video, or both.
 class Output {
  public:
   Output(const RenderArguments& a, const ChosenShots& chosen, double scale)
@@ -78,7 +78,7 @@ class Output {
   viz::Painter painter_;
 };
 
-// The capture's times, where it is there.
+// The capture's times, if it is available.
 std::vector<float> times_for_tracks(const RenderArguments& a, const LoadedScene& scene,
                                     const ChosenShots& chosen) {
   const bool is_there =
@@ -87,7 +87,7 @@ std::vector<float> times_for_tracks(const RenderArguments& a, const LoadedScene&
   return times_of(capture_of(scene, a.shots.capture, a.shots.downscale));
 }
 
-// Renders until the end or Ctrl-C; how many shots it came to.
+// Renders until the end or Ctrl-C. Returns the number of rendered shots.
 size_t take(const std::vector<viz::Shot>& shots, const viz::Subject& subject,
             const viz::TrackFollower* follower, Output& output) {
   const std::atomic<bool>& stop = stop_on_signals();

@@ -42,14 +42,14 @@ struct TrainArguments {
   bool names_preset() const { return preset->count() > 0; }
 };
 
-// What a checkpoint says of the run that is resumed.
+// The data of the checkpoint of a resumed run.
 struct Checkpoint {
   TrainOptions options;
   std::string capture_folder;
 };
 
-// The settings of the run: of the checkpoint when resuming, else of the preset; the command line comes after
-// either.
+// The run's settings: from the checkpoint when resuming, else from the preset. The command line overrides
+// both.
 TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given,
                       const Checkpoint& checkpoint) {
   const auto with_given = [&](TrainOptions options) {
@@ -65,7 +65,7 @@ TrainOptions settings(const TrainArguments& arguments, const OptionArguments& gi
   return options;
 }
 
-// Nothing for a run that begins.
+// Empty for a new run.
 Checkpoint checkpoint_to_resume(const TrainArguments& arguments) {
   if (!arguments.resume) return {};
   std::string note;
@@ -80,8 +80,8 @@ void refuse_another_run(const TrainArguments& arguments) {
                    "add --resume to continue it, or choose another");
 }
 
-// The run's folder, held against other trainings. One that is not there yet is made when all else that was
-// given has been found good.
+// The run's folder, locked against other trainings. A new folder is created only after all other arguments
+// are valid.
 class HeldFolder {
  public:
   explicit HeldFolder(const TrainArguments& arguments) : arguments_(&arguments) {
@@ -96,7 +96,7 @@ class HeldFolder {
   void hold() {
     if (!arguments_->resume) make_folder(arguments_->output);
     const RunFolder run{arguments_->output};
-    if (arguments_->resume && !run.holds_a_run()) return;  // refused when it is read
+    if (arguments_->resume && !run.holds_a_run()) return;  // reading it reports the error
     lock_.emplace(run.lock(), run.folder, "training");
     refuse_another_run(*arguments_);
   }
@@ -105,7 +105,7 @@ class HeldFolder {
   std::optional<FolderLock> lock_;
 };
 
-// A quiet run still says why it ended early.
+// A quiet run still reports why it ended early.
 [[noreturn]] void end_with(int code, const TrainArguments& arguments, const events::Finished& end) {
   if (arguments.quiet && code != exit_interrupted) {
     std::cerr << fmt::format("traceflow: ended at iteration {}: {}\n", end.iteration, end.reason);
@@ -113,7 +113,7 @@ class HeldFolder {
   throw Exit{code};
 }
 
-// A training and those who watch it in a browser.
+// A training with its server for viewers.
 class Watched {
  public:
   Watched(Trainer& trainer, const TrainArguments& arguments, const ServerArguments& where,
@@ -129,7 +129,7 @@ class Watched {
     trainer.stream().listen([this](const events::Event& event) { view_(event); });
   }
 
-  // After the training, for as long as somebody looks.
+  // After the training: serves until the last page is closed.
   void stay(bool quiet) {
     if (!view_.is_wanted()) return;
     if (!quiet) std::cerr << "still shown to those who look; Ctrl-C ends it\n";
@@ -146,8 +146,8 @@ class Watched {
   std::unique_ptr<serve::Server> server_;
 };
 
-// What moves where masks are missing, of the first time or all: what the run was begun with, or what is found
-// now. Nothing where there is nothing to look for.
+// Masks of moving objects where the capture lacks them, for the first time or all times. A resumed run reads
+// those it was started with; a new run finds them. Returns nothing if none are needed.
 std::optional<FoundObjects> objects_for(Capture& capture, const TrainOptions& options,
                                         const TrainArguments& arguments, const std::atomic<bool>& stop) {
   const std::filesystem::path folder = RunFolder{arguments.output}.masks();
@@ -247,7 +247,7 @@ void add_train(CLI::App& program) {
       ->option_text("X")
       ->capture_default_str();
   const ServerArguments where(*verb, view);
-  // The presets differ in values alone, so any of them names the flags.
+  // Presets differ only in values, so any of them gives the flags.
   auto defaults = std::make_shared<TrainOptions>(preset(arguments->preset_name));
   auto given =
       std::make_shared<OptionArguments>(*verb, option_fields(*defaults), std::vector<std::string>{"capture"});

@@ -4,10 +4,9 @@ namespace CLI {
 class App;
 }
 
-// The program's verbs, one file each: NAME.cpp defines add_NAME and is thereby part of the program (the
-// build writes add_verbs from the files that are there). Every function adds its subcommand; the subcommand's
-// callback does the work. Errors travel as exceptions to the error boundary (error_boundary.h), which prints
-// one line and chooses the exit code.
+// The program's verbs, one file each. NAME.cpp defines add_NAME; the build generates add_verbs from the
+// existing files. Each function adds its subcommand, whose callback does the work. Errors are exceptions up
+// to the error boundary (error_boundary.h), which prints one line and chooses the exit code.
 namespace traceflow::cli {
 
 void add_train(CLI::App& program);
@@ -22,7 +21,7 @@ void add_prepare(CLI::App& program);
 void add_attach_priors(CLI::App& program);
 void add_view(CLI::App& program);
 
-// All verbs that are there, in alphabetical order.
+// Adds all verbs, in alphabetical order.
 void add_verbs(CLI::App& program);
 
 }  // namespace traceflow::cli

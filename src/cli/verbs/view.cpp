@@ -21,7 +21,7 @@ struct ViewArguments {
   int downscale = 0;
 };
 
-// What a .ply that does not tell its scene's size is taken for.
+// The extent of a .ply that does not store one.
 float extent_of(const Surfels& surfels, const serve::SceneInfo& info) {
   std::vector<viz::Shot> shots;
   for (const serve::CapturedCamera& view : info.train) shots.push_back({view.id, view.time, view.camera});
@@ -33,7 +33,7 @@ serve::RunView::Shown shown_of(TrainedRun run) {
   return {std::move(run.subject), run.iterations, run.options.iterations, std::move(run.note)};
 }
 
-// The capture, where there is one: a run can be looked at without its photographs.
+// The capture, if available: a run can be viewed without its photographs.
 std::optional<Capture> capture_beside(const ViewArguments& a, const LoadedScene& scene) {
   if (!a.capture.empty()) return capture_of(scene, a.capture, a.downscale);
   if (!scene.run) return std::nullopt;

@@ -12,7 +12,7 @@ namespace traceflow::prepare {
 
 namespace {
 
-// How the tracks that are nearest to a place go: the median of each coordinate.
+// The motion of the tracks nearest to a place: the median of each coordinate.
 std::optional<Vec2<double>> shift_around(const Vec2<double>& place, const std::vector<Track>& tracks) {
   constexpr size_t asked = 5;
   if (tracks.size() < asked) return std::nullopt;
@@ -44,7 +44,7 @@ double limit_of(const Motion& motion) {
 }
 
 void look_again(Motion& motion, const Pyramid& from, const Pyramid& to) {
-  constexpr int rounds = 3;  // each reaches a little farther into what did not obey
+  constexpr int rounds = 3;  // each extends a little farther into the tracks that do not follow
   constexpr double as_alike = 1.25, noise = 0.5;
   const double limit = limit_of(motion);
   for (int round = 0; round < rounds; ++round) {

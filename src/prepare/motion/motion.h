@@ -7,20 +7,21 @@
 
 namespace traceflow::prepare {
 
-// Tracks of one picture into another, and how the still part of the scene goes there.
+// Tracks from one image to another, and the motion of the static part of the scene.
 struct Motion {
   std::vector<Track> tracks;
   TwoView still;
 };
 
-constexpr double stillness = 1;  // pixels by which what stands still may seem to move
+constexpr double stillness = 1;  // apparent motion of static things, pixels
 
-// From this distance on a track does not obey, in pixels: what stands still is as exact as the tracks are.
+// Distance in pixels above which a track does not follow the static part. It adapts to the accuracy of the
+// tracks.
 double limit_of(const Motion& motion);
 
-// Where a pattern repeats, a track that starts from nothing may end one repetition off. Those that do not
-// obey are followed again from where what stands still around them goes; what is found there counts where it
-// looks as much alike and obeys.
+// Corrects tracks of repeating patterns, which may be off by one repetition. Tracks that do not follow the
+// static part are tracked again from the motion of static tracks around them. The new track is used if it
+// follows the static part and matches about as well.
 void look_again(Motion& motion, const Pyramid& from, const Pyramid& to);
 
 }  // namespace traceflow::prepare

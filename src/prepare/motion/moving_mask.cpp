@@ -13,15 +13,15 @@ namespace traceflow::prepare {
 
 namespace {
 
-constexpr int spacing = 8;      // pixels between tracks, and a side of the cells that votes are counted in
-constexpr int half_window = 3;  // cells over which a track speaks
-constexpr double least_voice = 0.3;  // weight of tracks without which nothing is known of a cell
+constexpr int spacing = 8;           // pixels between tracks, and the side of the cells that count votes
+constexpr int half_window = 3;       // a track votes in cells up to this far
+constexpr double least_voice = 0.3;  // total weight of votes below which a cell is unknown
 constexpr int64_t smallest_share = 300, margin_share = 120;
 constexpr std::array<int64_t, 4> neighbours{-2, -1, 1, 2};  // in steps
-constexpr std::array<int64_t, 4> steps{1, 2, 4, 8};         // pictures
-constexpr double enough_motion = 12;                        // pixels between pictures that are compared
+constexpr std::array<int64_t, 4> steps{1, 2, 4, 8};         // images
+constexpr double enough_motion = 12;                        // pixels between compared images
 
-// Cells: 1 what moves, −1 what stands still, 0 unknown.
+// Cells: 1 moving, −1 static, 0 unknown.
 Tensor<float> votes_of(const Motion& motion, int64_t rows, int64_t columns) {
   Tensor<float> moving({rows, columns}), heard({rows, columns});
   const double limit = limit_of(motion);
@@ -46,7 +46,7 @@ Tensor<float> votes_of(const Motion& motion, int64_t rows, int64_t columns) {
   return moving;
 }
 
-// Leaves out connected parts (cells that share a side) of fewer than `least` cells.
+// Removes connected parts (cells that share a side) of fewer than `least` cells.
 void drop_small_parts(Tensor<uint8_t>& cells, int64_t least) {
   const int64_t rows = cells.dim(0), columns = cells.dim(1);
   Tensor<uint8_t> seen({rows, columns});
@@ -71,7 +71,7 @@ void drop_small_parts(Tensor<uint8_t>& cells, int64_t least) {
   }
 }
 
-// Pixels within `margin` of a cell.
+// 1 for pixels within `margin` of a cell.
 Tensor<uint8_t> spread_to_pixels(const Tensor<uint8_t>& cells, const Shape& shape, int64_t margin) {
   Tensor<uint8_t> mask({shape[0], shape[1]});
   for (int64_t row = 0; row < cells.dim(0); ++row) {
@@ -96,8 +96,7 @@ Tensor<float> as_float(const Tensor<uint8_t>& picture) {
 
 using PictureOf = std::function<Tensor<uint8_t>(int64_t i)>;
 
-// How many pictures apart there is enough motion to tell what moves by itself: the median over three places
-// of the film.
+// The number of images between which there is enough motion: the median over three places of the video.
 int64_t choose_step(int64_t count, const PictureOf& picture) {
   std::vector<double> needed;
   for (const int64_t quarter : {1, 2, 3}) {

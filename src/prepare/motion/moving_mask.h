@@ -8,19 +8,19 @@
 #include "base/work.h"
 #include "prepare/motion/motion.h"
 
-// Where something moves by itself, told from motion alone.
+// Finds what moves independently of the camera, from motion alone.
 namespace traceflow::prepare {
 
-// H×W, 1 where something moves: where the tracks that do not obey outweigh those that do, in most of the
-// motions. Places without texture follow those around them. What is smaller than 1/300 of the picture is
-// dropped; the rest grows by a margin of 1/120 of the picture's longest side. Empty motions give an empty
-// mask (zeros).
+// H×W, 1 where something moves: where, in most of the motions, tracks that do not follow the static part
+// outweigh those that do. Places without texture take the result of those around them. Parts below 1/300 of
+// the image are dropped; the rest grows by a margin of 1/120 of the longest side. Without motions the mask is
+// zero.
 Tensor<uint8_t> moving_mask(const Shape& shape, const std::vector<Motion>& motions);
 
-// The same for every picture (8-bit grey, H×W×1, all of one size, in the order of time) from its motions to
-// the neighbours one and two steps away; a step is as many pictures (up to 8) as it takes for most of the
-// picture to move. `still` says how the still part goes from picture i to picture j, or nothing where that is
-// to be found from the tracks. `picture(i)` is called from several threads. Throws Stopped.
+// The mask of every image (8-bit grey, H×W×1, equal sizes, in time order), from the motions to the neighbours
+// one and two steps away. A step is the number of images (up to 8) after which most of the image has moved
+// enough. `still` gives the motion of the static part from image i to image j, or nothing if the tracks
+// should determine it. `picture(i)` is called from several threads. Throws Stopped.
 std::vector<Tensor<uint8_t>> moving_masks(
     int64_t count, const std::function<Tensor<uint8_t>(int64_t i)>& picture,
     const std::function<std::optional<TwoView>(int64_t i, int64_t j)>& still, const Work& work);

@@ -10,7 +10,7 @@ namespace {
 constexpr size_t n = 9;
 using Matrix = std::array<std::array<double, n>, n>;
 
-// Turns the plane of axes p and q so that a[p][q] becomes zero; the turns gather in v's columns.
+// Rotates the plane of axes p and q so that a[p][q] becomes zero. v's columns accumulate the rotations.
 void turn(Matrix& a, Matrix& v, size_t p, size_t q) {
   const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
   const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));

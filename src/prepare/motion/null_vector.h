@@ -7,9 +7,9 @@ namespace traceflow::prepare {
 // Homogeneous linear equations in nine unknowns, solved by least squares.
 class Equations9 {
  public:
-  // The equation row · x = 0.
+  // Adds the equation row · x = 0.
   void add(const std::array<double, 9>& row);
-  // The unit x whose sum of squared errors is least, by Jacobi rotations of the normal equations.
+  // The unit x with the least sum of squared errors, by Jacobi rotations of the normal equations.
   std::array<double, 9> least() const;
 
  private:

@@ -10,13 +10,13 @@ namespace traceflow::prepare {
 namespace {
 
 constexpr int64_t smallest_side = 16;
-constexpr int radius = 5;  // of the window that is compared
+constexpr int radius = 5;  // of the compared window
 constexpr int window = (2 * radius + 1) * (2 * radius + 1);
 constexpr int iterations = 12;
 constexpr double converged = 0.02;         // pixels
 constexpr double farthest_back = 0.5;      // pixels
 constexpr double largest_difference = 20;  // mean over the window, of 255
-constexpr double least_contrast = 8;  // gradient², mean over the window, in the direction that has least
+constexpr double least_contrast = 8;       // gradient², mean over the window, in its smallest direction
 
 Tensor<float> half_of(const Tensor<float>& image) {
   constexpr std::array<float, 5> weights{1 / 16.0F, 4 / 16.0F, 6 / 16.0F, 4 / 16.0F, 1 / 16.0F};
@@ -56,7 +56,7 @@ Vec2<double> gradient(const Tensor<float>& image, double x, double y) {
           0.5 * (sample(image, x, y + 1) - sample(image, x, y - 1))};
 }
 
-// Sums of products of the gradient over a window.
+// Sums of the products of gradients over a window.
 struct Structure {
   double xx = 0, xy = 0, yy = 0;
 
@@ -72,7 +72,7 @@ struct Structure {
   }
 };
 
-// What surrounds a place, on one level.
+// The surroundings of a point on one level.
 struct Patch {
   std::array<double, window> value;
   std::array<Vec2<double>, window> slope;
@@ -90,7 +90,7 @@ struct Patch {
   }
 };
 
-// f(k, difference) over the window around `at`; the differences' mean size.
+// Calls f(k, difference) over the window around `at`. Returns the mean absolute difference.
 template <class F>
 double compare(const Patch& patch, const Tensor<float>& image, const Vec2<double>& at, F&& f) {
   double sum = 0;
@@ -105,7 +105,7 @@ double compare(const Patch& patch, const Tensor<float>& image, const Vec2<double
   return sum / window;
 }
 
-// From the coarsest of `levels` on; `shift` in pixels.
+// Starts at the coarsest of `levels`; `shift` is in pixels.
 std::optional<Track> follow(const Pyramid& from, const Pyramid& to, const Vec2<double>& place, size_t levels,
                             Vec2<double> shift) {
   shift /= static_cast<double>(int64_t{1} << levels);

@@ -6,10 +6,10 @@
 #include "base/tensor.h"
 #include "math/types.h"
 
-// Where the places of one picture are in another: the method of Lucas and Kanade on pyramids.
+// Finds points of one image in another, with the method of Lucas and Kanade on image pyramids.
 namespace traceflow::prepare {
 
-// A grey picture at full size and at halves of it, as many as leave 16 pixels a side.
+// A grey image at full size and repeatedly halved, down to at least 16 pixels a side.
 struct Pyramid {
   std::vector<Tensor<float>> levels;  // H×W
 
@@ -18,21 +18,20 @@ struct Pyramid {
 };
 Pyramid make_pyramid(Tensor<float> grey);
 
-// In pixels; the centre of the first is (0, 0).
+// In pixels; the centre of the first pixel is (0, 0).
 struct Track {
   Vec2<double> from{0}, to{0};
-  double difference = 0;  // of the surroundings, mean over a window, of 255
+  double difference = 0;  // between the surroundings, mean over a window, of 255
 };
 
-// In every square of `spacing` pixels the place that can best be told from its neighbours, where one can.
+// The best corner in every square of `spacing` pixels, if there is one.
 std::vector<Vec2<double>> find_corners(const Pyramid& picture, int spacing);
 
-// The places found again in another picture. Left out: those that leave it, whose surroundings look different
-// there, or that the way back does not lead to within half a pixel of where they were.
+// Tracks points into another image. Drops those that leave it, whose surroundings look different there, or
+// that tracking back does not return to within half a pixel.
 std::vector<Track> track(const Pyramid& from, const Pyramid& to, const std::vector<Vec2<double>>& places);
 
-// The place found again near `from` + `shift` alone, a few pixels around: by no more than the finest two
-// levels.
+// Tracks one point near `from` + `shift`, a few pixels around, on at most the two finest levels.
 std::optional<Track> track_near(const Pyramid& from, const Pyramid& to, const Vec2<double>& place,
                                 const Vec2<double>& shift);
 

@@ -18,13 +18,13 @@ using Row = std::array<double, 9>;
 
 Vec3<double> homogeneous(const Vec2<double>& p) { return {p, 1}; }
 
-// Rows of nine numbers as a matrix, and back.
+// Converts rows of nine numbers to a matrix and back.
 Mat3<double> matrix_of(const Row& m) {
   return transpose(Mat3<double>(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]));
 }
 
-// Moves the mean to zero and makes the mean distance from it √2: without this the equations' sizes differ by
-// the square of the picture's width (Hartley 1997).
+// Moves the mean to zero and scales the mean distance from it to √2. Otherwise the coefficients would differ
+// by the square of the image width (Hartley 1997).
 Mat3<double> to_unit(const std::vector<Track>& tracks, Vec2<double> Track::*place) {
   Vec2<double> mean(0);
   double spread = 0;
@@ -38,7 +38,7 @@ Mat3<double> to_unit(const std::vector<Track>& tracks, Vec2<double> Track::*plac
   return m;
 }
 
-// The unit null vector of the equations that `add` makes of each track, between unit coordinates.
+// The unit null vector of the equations that `add` makes of each track, in normalised coordinates.
 template <class F>
 Mat3<double> null_matrix(const std::vector<Track>& tracks, const Mat3<double>& unit_from,
                          const Mat3<double>& unit_to, F&& equations_of) {
@@ -56,18 +56,18 @@ Mat3<double> normalised(const Mat3<double>& m) {
   return sum > 0 ? m / std::sqrt(sum) : m;
 }
 
-// The nearest matrix of rank 2: without its smallest singular value.
+// The nearest matrix of rank 2: removes the smallest singular value.
 Mat3<double> rank_two(const Mat3<double>& m) {
   const Vec3<double> null = symmetric_eigen(transpose(m) * m).vectors[0];
   return m - outerProduct(m * null, null);
 }
 
-// Bounded squares: tracks that do not obey cost the same, however far they are.
+// Sum of truncated squared errors: all outliers cost the same.
 double cost(const TwoView& model, const std::vector<Track>& tracks, double tolerance) {
   double sum = 0;
   for (const Track& t : tracks) {
     const double d = model.distance(t) / tolerance;
-    // Also for a NaN.
+    // Also for NaN.
     sum += d < 1 ? d * d : 1;
   }
   return sum;
@@ -96,7 +96,7 @@ TwoView fit(Kind kind, const std::vector<Track>& tracks) {
   return kind == Kind::homography ? fit_homography(tracks) : fit_fundamental(tracks);
 }
 
-// Samples until one without a track that disobeys was drawn with 99.9 %.
+// Samples until at least one sample contains only inliers with a probability of 99.9 %.
 TwoView sample_consensus(Kind kind, const std::vector<Track>& tracks, double tolerance, Random& random) {
   constexpr int refinements = 4;
   constexpr double most = 1500, least = 30, missed = 1e-3;
@@ -170,7 +170,7 @@ std::optional<TwoView> fit_two_view(const std::vector<Track>& tracks, double tol
 
 TwoView in_larger_pixels(const TwoView& view, double factor) {
   Mat3<double> larger(1 / factor);
-  // Places count from the first pixel's centre, which is not that of a larger one.
+  // Coordinates start at the centre of the first pixel, which moves when pixels become larger.
   larger[2] = Vec3<double>(0.5 / factor - 0.5, 0.5 / factor - 0.5, 1);
   const Mat3<double> back = inverse(larger);
   const bool is_plane = view.kind == Kind::homography;

@@ -7,28 +7,28 @@
 #include "math/types.h"
 #include "prepare/motion/track.h"
 
-// How the still part of a scene goes from one picture into another.
+// The motion of the static part of a scene from one image to another.
 namespace traceflow::prepare {
 
-// A map of the plane (a turning camera, a flat or distant scene), or lines that places lie on (a camera that
-// moves through depth).
+// A homography (a rotating camera, or a flat or distant scene) or epipolar lines (a camera that moves through
+// depth).
 struct TwoView {
   enum class Kind { homography, fundamental };
   Kind kind = Kind::homography;
   Mat3<double> matrix{1};
 
-  // How far a track is from obeying, in pixels: from where the homography leads, or by Sampson's first-order
-  // distance from the epipolar line.
+  // The error of a track in pixels: from the homography's target, or Sampson's first-order distance from the
+  // epipolar line.
   double distance(const Track& track) const;
 };
 
-// What most tracks obey to within `tolerance` pixels, by random sampling and least squares over those that
-// do: the homography where it explains nearly as many as the epipolar lines, which would explain much of what
-// moves as well. Nothing where fewer than 12 tracks obey either, which does not tell.
+// The model that most tracks fit within `tolerance` pixels, by RANSAC and least squares over the inliers. The
+// homography is preferred if it explains nearly as many tracks, since epipolar lines would also explain much
+// of what moves. Returns nothing if fewer than 12 tracks fit either model.
 std::optional<TwoView> fit_two_view(const std::vector<Track>& tracks, double tolerance, uint64_t seed);
 
-// The epipolar lines between two cameras of known place: x_to^T F x_from = 0 over pixels whose first has its
-// centre at (0, 0). Matrices are of the cameras' pixels from their directions.
+// The epipolar lines between two cameras with known poses: x_to^T F x_from = 0, in pixels with the centre of
+// the first at (0, 0). Matrices map from camera directions to pixels.
 struct PlacedCamera {
   Mat3<double> pixel_from_camera{1};
   Mat3<double> camera_from_world{1};
@@ -36,11 +36,11 @@ struct PlacedCamera {
 };
 TwoView epipolar_lines(const PlacedCamera& from, const PlacedCamera& to);
 
-// The same two views in pixels `factor` times as large.
+// The same motion in pixels that are `factor` times as large.
 TwoView in_larger_pixels(const TwoView& view, double factor);
 
-// Least squares: the unit matrix, up to sign, that fits at least 4 (8) tracks. A fundamental matrix has
-// rank 2.
+// Least squares: the matrix of unit norm, up to sign, that best fits at least 4 (8) tracks. A fundamental
+// matrix has rank 2.
 TwoView fit_homography(const std::vector<Track>& tracks);
 TwoView fit_fundamental(const std::vector<Track>& tracks);
 

@@ -7,9 +7,9 @@ namespace traceflow::serve {
 
 namespace {
 
-constexpr size_t max_questions = 32;  // that wait for an answer
-constexpr size_t max_in_flight = 2;   // frames sent that the page has not shown yet
-// After memory ran out: how long frames stay coarse, and how long none is tried.
+constexpr size_t max_questions = 32;  // waiting for an answer
+constexpr size_t max_in_flight = 2;   // frames sent but not yet displayed
+// After memory ran out: how long frames stay coarse, and how long none is rendered.
 constexpr std::chrono::seconds coarse_for{30}, retry_after{1};
 
 }  // namespace
@@ -81,7 +81,7 @@ Coarseness Client::coarseness(Clock::time_point now) const {
     chosen = pacer_.finer(pixels, shown_divisor_);
   }
   if (!lacks_memory(now) || chosen.divisor >= min_divisor_) return chosen;
-  // The finest that fits.
+  // The finest allowed.
   return {min_divisor_, chosen.quality, !look_->moving};
 }
 

@@ -12,7 +12,7 @@
 
 namespace traceflow::serve {
 
-// One picture or answer that a page waits for.
+// A picture or an answer that a page waits for.
 struct FrameJob {
   Look look;
   Coarseness coarseness;
@@ -33,10 +33,10 @@ struct Job {
 // A one-time request.
 using Question = std::variant<Probe, Still, Photo, Path>;
 
-// Which frames may be rendered now, where time is short. The first frame of a Look always may.
+// The frames that may be rendered now if time is short. The first frame of a Look is always allowed.
 struct Allowed {
-  bool refining = true;    // finer frames of what the page shows
-  bool refreshing = true;  // frames of a scene that has changed since
+  bool refining = true;    // finer frames of the shown picture
+  bool refreshing = true;  // frames of a scene that has changed
 };
 
 // The version of the scene, and how long a resting page waits for a newer one.
@@ -45,7 +45,7 @@ struct SceneState {
   std::chrono::steady_clock::duration refresh = {};
 };
 
-// One page: its camera, the frames that it has been sent, and what it waits for.
+// One page: its camera, the frames sent to it, and its pending requests.
 class Client {
  public:
   using Clock = std::chrono::steady_clock;
@@ -57,18 +57,18 @@ class Client {
   void look(const Look& look);
   void sleep() { asleep_ = true; }
   void seen(int64_t frame, Clock::time_point now);
-  // Returns false where too many are waiting.
+  // Returns false if too many are waiting.
   bool ask(const Question& question);
   // A Look that cannot be rendered is not tried again.
   void drop_look(int64_t look);
 
   bool is_awake() const { return !asleep_; }
   bool has_question() const { return !questions_.empty(); }
-  // Takes the oldest question. Where it needs a Look and there is none, refuses it and returns nothing.
+  // Takes the oldest question. If it needs a Look and there is none, refuses it and returns nothing.
   std::optional<Job> next_question();
   bool wants_frame(const Allowed& allowed, const SceneState& scene, Clock::time_point now) const;
   Job next_frame(Clock::time_point now);
-  // When its last frame was sent or started.
+  // The time when its last frame was sent or started.
   Clock::time_point served() const { return served_; }
 
   // The number of the next frame.

@@ -21,19 +21,19 @@ struct State {
   bool paused = false;
   bool over = false;  // the training has ended
   int64_t iteration = 0;
-  int64_t iterations = 0;  // 0 where nothing is trained
+  int64_t iterations = 0;  // 0 without training
   int64_t main_surfels = 0;
   int64_t environment_surfels = 0;
   bool operator==(const State&) const = default;
 };
 
-// The connected pages and what each of them waits for. The network thread delivers their messages; the thread
-// that renders takes jobs. Without an awake page there are no jobs.
+// The connected pages and their pending requests. The network thread delivers their messages; the rendering
+// thread takes jobs. There are no jobs if no page is awake.
 class Clients : public MessageHandler {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // on_command: pause, resume, save, stop; called on the network's thread. Without it the command is refused.
+  // on_command: pause, resume, save, stop; called on the network thread. Without it, commands are refused.
   explicit Clients(std::function<void(Do)> on_command = {}) : on_command_(std::move(on_command)) {}
 
   void on_connect(uint64_t number, Send send) override;
@@ -45,27 +45,26 @@ class Clients : public MessageHandler {
   void set_state(const State& state);
   // Sends lines of a training log (record/event_log.h) to the pages. reset: they replace the earlier lines.
   void add_log_lines(const std::vector<std::string>& events, bool reset = false);
-  // Shows a warning on every page until its text is set to an empty one. about: its key, as there may be
-  // several.
+  // Shows a warning on every page until it is set to an empty text. about: its key, since several can exist.
   void set_warning(const std::string& about, const std::string& text);
-  // The scene has changed. A page whose camera rests gets a new frame once `refresh` has passed since its
-  // last.
+  // Call after the scene has changed. A page with a resting camera gets a new frame once `refresh` has passed
+  // since its last.
   void scene_changed(Clock::duration refresh);
 
   // Waits until there is a job, at most for `timeout`. Returns whether there is one.
   bool wait(Clock::duration timeout);
-  // The next job, in turns among the pages. One-time requests come before frames.
+  // The next job, in turn from each page. One-time requests come before frames.
   std::optional<Job> next(const Allowed& allowed);
   std::optional<Job> next() { return next({}); }
 
-  // Sends the frame of a job. Adds the frame's number to the header. seconds: rendering and encoding; pixels:
-  // of the picture.
+  // Sends the frame of a job. Adds the frame's number to the header. seconds: for rendering and encoding;
+  // pixels: of the picture.
   void show_frame(const Job& job, nlohmann::ordered_json header, const std::string& picture, double pixels,
                   double seconds);
   void reply(uint64_t number, const Outgoing& message);
-  // The job failed.
+  // Reports that the job failed.
   void refuse(const Job& job, const std::string& why);
-  // Memory ran out for a frame: the page gets coarser frames for a while.
+  // Reports that memory ran out for a frame: the page gets coarser frames for a while.
   void no_memory_for(const Job& job);
   bool any_lacks_memory();
   bool is_connected(uint64_t number);

@@ -9,7 +9,7 @@ namespace {
 
 constexpr int64_t most_steps = 4000;
 
-// The iteration of a step; -1 for another event, -2 for a line that is none.
+// The iteration of a step; -1 for another event, -2 for an invalid line.
 int64_t step_of(const std::string& line) {
   const nlohmann::json json = nlohmann::json::parse(line, nullptr, false);
   if (!json.is_object() || !json.contains("event")) return -2;

@@ -11,7 +11,7 @@ namespace traceflow::serve {
 // run gets longer, so that the number of lines stays bounded.
 class History {
  public:
-  // A line of log.jsonl, or of a step between the logged ones.
+  // line: of log.jsonl, or a step between the logged ones.
   void add(const std::string& line);
   void clear();
   // In the order of arrival.
@@ -20,14 +20,14 @@ class History {
  private:
   struct Line {
     std::string text;
-    int64_t step;  // its iteration, or -1 for an event of another kind
+    int64_t step;  // the step's iteration, or -1 for other events
   };
   std::deque<Line> lines_;
   int64_t steps_ = 0;
   int64_t stride_ = 1;
 };
 
-// {"type": "events", …} of such lines.
+// {"type": "events", …} with these lines.
 std::string events_text(const std::vector<std::string>& lines, bool reset);
 
 }  // namespace traceflow::serve

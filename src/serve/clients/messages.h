@@ -8,23 +8,23 @@
 
 #include "scene/viewpoint.h"
 
-// The messages of a page over the WebSocket (docs/view.md, web/src/messages.ts). Units and axes are the
+// The messages from a page over the WebSocket (docs/view.md, web/src/messages.ts). Units and axes are the
 // capture's: camera axes x right, y down, z forward.
 namespace traceflow::serve {
 
 // One of the capture's views.
 struct PhotoRef {
-  bool test = false;  // of the test split, else of the training one
+  bool test = false;  // of the test split, else of the training split
   int64_t index = 0;
   bool operator==(const PhotoRef&) const = default;
 };
 
-// The camera and settings of the frames from now on.
+// The camera and settings of frames from now on.
 struct Look {
   int64_t id = 0;
   std::variant<Viewpoint, PhotoRef> camera;
   float time = 0;             // 0 to 1
-  int width = 0, height = 0;  // pixels, when the camera rests
+  int width = 0, height = 0;  // pixels, for a resting camera
   std::string layer = "rgb";
   float exposure = 0;  // stops
   std::string map = "viridis";
@@ -54,13 +54,13 @@ struct Still {
 // Asks for a photograph.
 struct Photo {
   PhotoRef photo;
-  int width = 0;  // pixels at most
+  int width = 0;  // maximum width in pixels
 };
 
 // Asks for the cameras along a camera path.
 struct Path {
   int64_t id = 0;
-  std::string path;  // JSON text, as in the file that `render --camera-path` takes
+  std::string path;  // JSON text, as in the file for `render --camera-path`
 };
 
 enum class Do { pause, resume, save, stop };
@@ -70,8 +70,8 @@ struct Command {
 
 using Request = std::variant<Look, Sleep, Seen, Probe, Still, Photo, Path, Command>;
 
-// Throws InputError naming the field, for text that is not JSON, is of no known type, lacks a field, or holds
-// values out of their range.
+// Throws InputError with the field for text that is not JSON, has no known type, lacks a field, or has values
+// out of range.
 Request parse_request(std::string_view text);
 
 }  // namespace traceflow::serve

@@ -7,13 +7,12 @@ namespace traceflow::serve {
 
 namespace {
 
-// Each has about half the pixels of the one before.
+// Each step about halves the number of pixels.
 constexpr std::array<double, 9> divisors = {1, 1.5, 2, 3, 4, 6, 8, 12, 16};
-constexpr double keep = 0.9;  // weight of the past at each new measurement
+constexpr double keep = 0.9;  // weight of earlier measurements at each new one
 constexpr int final_quality = 92;
 
-// A JPEG's quality while the camera moves, and its size relative to the first's, as pictures of scenes have
-// it.
+// A JPEG quality while the camera moves, and the typical size relative to the first.
 struct Quality {
   int quality;
   double size;
@@ -41,11 +40,11 @@ double CostLine::seconds(double size) const {
   if (weight_ <= 0) return 0;
   const double mean_size = size_ / weight_, mean_seconds = seconds_ / weight_;
   const double spread = size_size_ / weight_ - mean_size * mean_size;
-  // All of one size so far: the time goes with the size, as far as anybody can tell.
+  // With measurements of only one size, time is taken as proportional to size.
   if (!(spread > 1e-3 * mean_size * mean_size)) return mean_size > 0 ? mean_seconds * size / mean_size : 0;
   const double slope = std::max(0.0, (size_seconds_ / weight_ - mean_size * mean_seconds) / spread);
   const double fixed = mean_seconds - slope * mean_size;
-  // Noise can tilt the line until small frames cost less than nothing; then it goes through the origin.
+  // Noise can give the line a negative intercept. The line then goes through the origin.
   return fixed >= 0 ? fixed + slope * size : mean_seconds * size / mean_size;
 }
 
@@ -61,7 +60,7 @@ bool Pacer::can_be_transferred(double pixels, double relative_size) const {
 }
 
 Coarseness Pacer::moving(double pixels) const {
-  // The first frame of all tells what a frame costs; it had better be cheap.
+  // The first frame measures the cost, so it should be cheap.
   if (!rendering_cost_.is_known()) return {4, moving_qualities.front().quality, false};
   for (const double divisor : divisors) {
     const double rendered = pixels / (divisor * divisor);
@@ -82,7 +81,7 @@ Coarseness Pacer::finer(double pixels, double shown_divisor) const {
         can_be_transferred(rendered, final_size))
       return {divisor, final_quality, divisor == 1};
   }
-  // Nothing fits: at least twice as fine in every step, so that the last one comes at some time.
+  // If no divisor fits, each step at least halves the divisor, so that refinement ends.
   if (shown_divisor <= 2) return full();
   const Coarseness first = moving(pixels);
   return {std::min(first.divisor, shown_divisor / 2), final_quality, false};

@@ -20,13 +20,13 @@ class CostLine {
 // The resolution and quality of a frame: its sides are the requested ones divided by `divisor`.
 struct Coarseness {
   double divisor = 1;
-  int quality = 90;  // of its JPEG
+  int quality = 90;  // JPEG quality
   bool final = true;
 };
 
 struct PacerOptions {
   double moving_seconds = 0.06;    // to render a frame while the camera moves
-  double resting_seconds = 0.3;    // for a refining step that is not the last one
+  double resting_seconds = 0.3;    // for a refining step except the last one
   double transfer_seconds = 0.15;  // to transfer a frame to the page
 };
 
@@ -42,7 +42,7 @@ class Pacer {
 
   // While the camera moves. pixels: of the frame at full size.
   Coarseness moving(double pixels) const;
-  // At rest: finer than the frame that is shown now, whose divisor is given (infinity where there is none).
+  // At rest: finer than the displayed frame, whose divisor is given (infinity if there is none).
   Coarseness finer(double pixels, double shown_divisor) const;
   // The last refining step: full resolution.
   static Coarseness full();
@@ -53,7 +53,7 @@ class Pacer {
   PacerOptions options_;
   CostLine rendering_cost_;
   CostLine transfer_cost_;
-  double bytes_per_pixel_ = 0.15;  // at the quality of moving frames on a good line
+  double bytes_per_pixel_ = 0.15;  // at the quality of moving frames on a fast connection
 };
 
 }  // namespace traceflow::serve

@@ -12,7 +12,7 @@ namespace traceflow::serve {
 // Messages to pages, as in web/src/messages.ts.
 Outgoing text_message(std::string text);
 Outgoing json_message(const nlohmann::ordered_json& json);
-// A picture: length of its header (32 bit, little endian), header, picture.
+// A picture message: length of its header (32 bit, little endian), header, picture.
 Outgoing picture_message(const nlohmann::ordered_json& header, const std::string& picture);
 // Refuses the request of this type and number; `why` is shown to the user.
 Outgoing refusal(const std::string& request, int64_t id, const std::string& why);

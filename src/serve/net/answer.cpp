@@ -74,7 +74,7 @@ Answer answer(const RequestGuard& guard, std::span<const EmbeddedFile> page, con
     if (request.upgrade) return {101, {}, {}, {}};
     return plain_answer(426, "This address is for the page's live connection.");
   }
-  // A name is looked for among those of the page as it stands: no folder is ever read.
+  // Looks up the name in the embedded page only: no folder is ever read.
   const std::string_view name = path == "/" ? "index.html" : path.substr(1);
   const auto file =
       std::find_if(page.begin(), page.end(), [&](const EmbeddedFile& f) { return f.name == name; });

@@ -14,7 +14,7 @@ struct Answer {
   int status = 200;  // 101: the connection becomes a WebSocket
   std::string type;  // of the body
   std::string body;
-  std::vector<std::pair<std::string, std::string>> fields;  // beside those that every answer has
+  std::vector<std::pair<std::string, std::string>> fields;  // in addition to those that every answer has
 };
 
 // The answer to a request.
@@ -27,11 +27,11 @@ Answer plain_answer(int status, std::string text);
 std::span<const Field> safety_fields();
 
 struct Form {
-  bool body = true;    // false: the answer to a HEAD
-  bool stays = false;  // the connection may be used again
+  bool body = true;    // false: the answer to HEAD
+  bool stays = false;  // keep-alive
 };
 
-// The answer as it goes over the wire, in HTTP/1.1.
+// The answer's bytes in HTTP/1.1.
 std::string wire_text(const Answer& answer, const Form& form);
 
 }  // namespace traceflow::serve

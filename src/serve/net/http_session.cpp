@@ -36,7 +36,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   bool is_authenticated() const override { return is_authenticated_; }
 
  private:
-  // One deadline for the whole request, so that trickling bytes gain nothing.
+  // One deadline for the whole request, so that slow clients cannot extend it.
   void read() {
     parser_.emplace();
     set_limits(*parser_, shared_.limits);
@@ -65,7 +65,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   }
 
   void upgrade() {
-    // Our page sends nothing before the upgrade is answered.
+    // The viewer's page sends nothing before the upgrade is answered.
     if (buffer_.size() > 0) return send(plain_answer(400, "The request is followed by more."), {});
     deadline_.clear();
     const auto socket = start_websocket_session(std::move(stream_), shared_, parser_->release());
@@ -93,7 +93,7 @@ class HttpSession final : public Session, public std::enable_shared_from_this<Ht
   Stream stream_;
   SharedState& shared_;
   Deadline deadline_;
-  boost::beast::flat_buffer buffer_;  // its size is the limit: the parser's own counts the first line apart
+  boost::beast::flat_buffer buffer_;  // its size is the limit: the parser's own limit excludes the first line
   std::optional<Parser> parser_;
   std::string out_;
   LingeringClose<HttpSession> lingering_close_;

@@ -15,7 +15,7 @@ void Mailbox::put(Outgoing message) {
     bytes_ += message.bytes->size();
     waiting_.push_back(std::move(message));
   }
-  // Under the lock, so that no wake comes after close().
+  // With the lock held, so that wake is never called after close().
   if (idle || overflowed_) wake_();
 }
 

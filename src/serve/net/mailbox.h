@@ -13,15 +13,15 @@ namespace traceflow::serve {
 // A bounded queue of messages to one page. Any thread puts messages in; the network thread takes them out.
 class Mailbox {
  public:
-  // messages, bytes: the capacity; the message that reaches it still fits. wake: called by the thread that
-  // puts a message into the empty, open queue; must return at once and not touch the queue.
+  // messages, bytes: the capacity; the message that reaches it is still accepted. wake: called by the thread
+  // that puts a message into the empty, open queue; must return at once and not use the queue.
   Mailbox(size_t messages, size_t bytes, std::function<void()> wake);
 
   void put(Outgoing message);
   std::optional<Outgoing> take();
-  // Whether more was put in than fits. The queue's contents are then incomplete.
+  // Whether messages were lost because the queue was full.
   bool overflowed() const;
-  // Afterwards put() does nothing, and wake is not called.
+  // After this, put() does nothing and wake is not called.
   void close();
 
  private:

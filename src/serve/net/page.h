@@ -6,7 +6,7 @@
 
 namespace traceflow::serve {
 
-// The viewer's page and what belongs to it, from web/page/.
+// The viewer's page and its files, from web/page/.
 std::span<const EmbeddedFile> embedded_files();
 
 }  // namespace traceflow::serve

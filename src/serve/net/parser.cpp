@@ -13,7 +13,7 @@ std::string_view view(boost::beast::string_view text) { return {text.data(), tex
 
 void set_limits(Parser& parser, const Limits& limits) {
   parser.header_limit(static_cast<uint32_t>(limits.header_bytes));
-  // To the parser, "none" is less than any length.
+  // The parser would treat "none" as less than any length.
   parser.body_limit(std::numeric_limits<uint64_t>::max());
 }
 

@@ -12,10 +12,10 @@ namespace traceflow::serve {
 using Parser = boost::beast::http::request_parser<boost::beast::http::empty_body>;
 using ParsedRequest = Parser::value_type;
 
-// Refuses what is longer than the limit. Bodies are not its business: none is read.
+// Makes the parser refuse headers longer than the limit. Bodies are never read, so they have no limit.
 void set_limits(Parser& parser, const Limits& limits);
 
-// What was parsed, as views into it.
+// The parsed request, as views into the parser's result.
 Request request_of(const ParsedRequest& parsed);
 
 }  // namespace traceflow::serve

@@ -10,8 +10,8 @@ namespace traceflow::serve {
 
 namespace {
 
-// A page of another site asks, without the user having gone to our address. Browsers call other ports of this
-// machine the same site, so that only the same origin is ours.
+// Whether another site's page sent the request, except when the user follows a link to the page. Browsers
+// treat other ports of this machine as the same site, so only the same origin is accepted.
 bool is_cross_site(const Request& request) {
   const auto sites = request.all("Sec-Fetch-Site");
   const bool foreign = std::any_of(sites.begin(), sites.end(), [](std::string_view site) {
@@ -66,7 +66,7 @@ bool RequestGuard::is_host(std::string_view text) const {
   return std::any_of(hosts_.begin(), hosts_.end(), [&](const auto& host) { return same_word(host, text); });
 }
 
-// One good cookie is enough: a server on another port of this machine can set one of the same name.
+// One valid cookie is enough: a server on another port of this machine can set a cookie of the same name.
 bool RequestGuard::has_cookie(const Request& request) const {
   bool found = false;
   for (std::string_view rest : request.all("Cookie")) {

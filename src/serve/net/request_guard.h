@@ -16,16 +16,16 @@ struct Refusal {
 // Decides which requests are answered (docs/view.md, Safety). Any web page can make a browser send requests
 // to this machine (cross-site request forgery), and any host name can be made to resolve to it (DNS
 // rebinding). So a request must name this server (Host), come from its own page or from the user (Origin,
-// Sec-Fetch-Site), and carry the token of the address that the terminal printed.
+// Sec-Fetch-Site), and carry the token of the printed address.
 class RequestGuard {
  public:
-  // hosts: what Host may be, "name:port".
+  // hosts: accepted values of Host, "name:port".
   RequestGuard(std::string token, int port, std::vector<std::string> hosts);
 
-  // Why a request is refused; nothing where it may pass.
+  // Why a request is refused; nothing if it is allowed.
   std::optional<Refusal> refusal(const Request& request) const;
 
-  // Whether a request for the page holds the token in its address, and so is to be given the cookie.
+  // Whether a request for the page has the token in its address, so that the answer should set the cookie.
   bool brings_token(const Request& request) const;
   // The value of Set-Cookie.
   std::string cookie() const;

@@ -48,7 +48,7 @@ Acceptor listen(asio::io_context& io, const ServerOptions& options) {
   error_code error;
   acceptor.open(where.protocol(), error);
   if (!error) close_on_exec(acceptor.native_handle());
-  // Without it the port stays in TIME_WAIT for a minute after the server has ended.
+  // Without it the port would be unavailable for a minute after the server has ended (TIME_WAIT).
   if (!error) acceptor.set_option(tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(where, error);
   if (!error) acceptor.listen(asio::socket_base::max_listen_connections, error);
@@ -56,8 +56,8 @@ Acceptor listen(asio::io_context& io, const ServerOptions& options) {
   return acceptor;
 }
 
-// The values of Host that the server answers to; the first one is printed. Only the user knows which names
-// resolve to this machine from outside (allowed_hosts).
+// The accepted values of Host; the first one is printed. Only the user knows which names resolve to this
+// machine from outside (allowed_hosts).
 std::vector<std::string> host_names(const ServerOptions& options, const tcp::endpoint& bound) {
   std::vector<std::string> names;
   const auto add = [&](const std::string& name) {
@@ -73,7 +73,7 @@ std::vector<std::string> host_names(const ServerOptions& options, const tcp::end
   }
   if (address.is_unspecified() || address.is_loopback()) add("localhost");
   if (address.is_unspecified() && address.is_v6()) add("[::1]");
-  // Browsers leave the port out of Host where it is HTTP's own.
+  // Browsers omit HTTP's default port in Host.
   for (size_t i = 0, count = names.size(); i < count; ++i) {
     if (names[i].ends_with(":80")) names.push_back(names[i].substr(0, names[i].size() - 3));
   }
@@ -133,7 +133,7 @@ struct Server::State {
     sessions.push_back(start_http_session(Stream(std::move(socket)), shared, full));
   }
 
-  // Clients without the token cannot keep out those that have it: the oldest of the former is closed.
+  // Clients without the token must not block those that have it: closes the oldest without the token.
   void close_unauthenticated() {
     auto& sessions = shared.sessions;
     const auto unauthenticated = std::find_if(sessions.begin(), sessions.end(), [](const auto& s) {
@@ -150,7 +150,7 @@ struct Server::State {
       try {
         io.run();
         return;
-      } catch (...) {  // the session that threw has ended; the others go on
+      } catch (...) {  // only the session that threw has ended
       }
     }
   }
@@ -179,7 +179,7 @@ struct Server::State {
 Server::Server(const ServerOptions& options, std::span<const EmbeddedFile> page, MessageHandler& handler,
                const Limits& limits)
     : state_(std::make_unique<State>(options, page, handler, limits)) {
-  // Signals must interrupt the main thread and not this one.
+  // Signals should interrupt the main thread and not this one.
   sigset_t all;
   sigset_t before;
   sigfillset(&all);

@@ -21,7 +21,8 @@ bool is_port(std::string_view text) {
   return std::stoi(std::string(text)) <= 65535;
 }
 
-// As a browser writes it in Host: a name, an IPv4 address, or an IPv6 address in brackets, and a port.
+// Whether the text is a host as a browser writes it in Host: a name, an IPv4 address, or an IPv6 address in
+// brackets, and a port.
 bool is_host(std::string_view text) {
   const size_t colon = text.rfind(':');
   if (colon == std::string_view::npos || colon == 0 || !is_port(text.substr(colon + 1))) return false;

@@ -20,8 +20,8 @@ namespace traceflow::serve {
 // Everything here runs on the one thread of an io_context.
 using Executor = boost::asio::io_context::executor_type;
 
-// Any stream of bytes: TCP, or what stands in for it. A class of its own, so that async_teardown() of
-// socket.cpp is found.
+// Any byte stream: TCP, or a substitute for it. A separate class, so that async_teardown() of
+// websocket_session.cpp is found.
 class Stream : public boost::asio::basic_stream_socket<boost::asio::generic::stream_protocol, Executor> {
  public:
   using basic_stream_socket::basic_stream_socket;
@@ -36,32 +36,32 @@ class Session {
   virtual ~Session() = default;
   // Closes the connection and so cancels its pending operations.
   virtual void end() = 0;
-  // Whether the client has shown the token.
+  // Whether the client has sent the token.
   virtual bool is_authenticated() const = 0;
 };
 
-// What all connections of a server share. Outlives them.
+// State shared by all connections of a server. Must outlive them.
 struct SharedState {
   RequestGuard guard;
   std::span<const EmbeddedFile> page;
   MessageHandler& handler;
   Limits limits;
-  uint64_t clients = 0;  // that ever were
+  uint64_t clients = 0;  // number of clients so far
   std::vector<std::weak_ptr<Session>> sessions = {};
 };
 
-// Ends a session when its time is over, whatever happened in between.
+// Ends a session when its time is over, whatever has happened in between.
 class Deadline {
  public:
   explicit Deadline(const Executor& executor) : timer_(executor) {}
 
-  // From now; takes the place of the last one.
+  // Starts now and replaces the previous deadline.
   void set(std::chrono::milliseconds time, std::weak_ptr<Session> session) {
     timer_.expires_after(time);
     timer_.async_wait([this, watched = std::move(session)](const boost::system::error_code& error) {
       if (error) return;
       const auto alive = watched.lock();
-      // A deadline that was reached just when the next one was set does not count.
+      // A deadline that expired just as the next one was set does not count.
       if (alive && timer_.expiry() <= std::chrono::steady_clock::now()) alive->end();
     });
   }
@@ -71,8 +71,8 @@ class Deadline {
   Timer timer_;
 };
 
-// Closes a connection after its last answer. Reads what the client still sends for a moment, since closing at
-// once would reset the connection and the client might lose the answer (RFC 9112, section 9.6).
+// Closes a connection after its last answer. Reads for a moment what the client still sends: closing at once
+// would reset the connection, and the client might lose the answer (RFC 9112, section 9.6).
 template <class Session>
 class LingeringClose {
  public:

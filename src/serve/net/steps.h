@@ -4,8 +4,8 @@
 
 namespace traceflow::serve {
 
-// The completion handler of an asynchronous operation: calls a member function of the session with the error.
-// It keeps the session alive until then. An exception ends this session and no other.
+// The completion handler of an asynchronous operation: calls a member function of the session with the error
+// and keeps the session alive until then. An exception ends only this session.
 template <class Session>
 auto step(Session& session, void (Session::*next)(boost::system::error_code)) {
   return [self = session.shared_from_this(), next](boost::system::error_code error, auto...) {

@@ -10,7 +10,7 @@ namespace traceflow::serve {
 
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
-  // Up to 256 bytes come whole or not at all.
+  // getrandom returns up to 256 bytes completely or fails.
   const ssize_t got = getrandom(bytes.data(), bytes.size(), 0);
   require(got == static_cast<ssize_t>(bytes.size()), "the system gives random bytes", std::to_string(got));
   constexpr std::string_view digits = "0123456789abcdef";
@@ -24,7 +24,7 @@ std::string random_token() {
 
 bool same_secret(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
-  volatile unsigned char differing = 0;  // volatile: no early way out that a compiler might see
+  volatile unsigned char differing = 0;  // volatile: the compiler cannot add an early exit
   for (size_t i = 0; i < a.size(); ++i) differing = differing | static_cast<unsigned char>(a[i] ^ b[i]);
   return differing == 0;
 }

@@ -5,10 +5,10 @@
 
 namespace traceflow::serve {
 
-// 128 bits of the system's randomness, as 32 hex digits. Throws InternalError where the system gives none.
+// 128 random bits from the system, as 32 hex digits. Throws InternalError if the system provides none.
 std::string random_token();
 
-// Whether two secrets are equal, in a time that depends on their lengths alone.
+// Compares two secrets in a time that depends only on their lengths.
 bool same_secret(std::string_view a, std::string_view b);
 
 }  // namespace traceflow::serve

@@ -25,8 +25,8 @@ namespace asio = boost::asio;
 namespace websocket = boost::beast::websocket;
 using boost::system::error_code;
 
-// Messages are sent in fragments, so that pings fit between them, and so that a deadline for each fragment
-// tells a slow connection from a dead one.
+// Messages are sent in fragments, so that pings fit between them and a deadline for each fragment
+// distinguishes a slow connection from a dead one.
 constexpr size_t piece_bytes = 256 << 10;
 
 class WebSocketSession final : public Session, public std::enable_shared_from_this<WebSocketSession> {
@@ -119,7 +119,7 @@ class WebSocketSession final : public Session, public std::enable_shared_from_th
     flush({});
   }
 
-  // Returns false where the handler throws; the connection is then being closed.
+  // Returns false if the handler throws; the connection is then being closed.
   template <class Message>
   bool notify(Message message) {
     try {
@@ -136,7 +136,7 @@ class WebSocketSession final : public Session, public std::enable_shared_from_th
     deadline_.set(shared_.limits.linger, weak_from_this());
     websocket::close_reason reason(code);
     size_t size = std::min(why.size(), reason.reason.max_size());
-    // Does not cut a UTF-8 character in two.
+    // Does not split a UTF-8 character.
     while (size < why.size() && size > 0 && (static_cast<unsigned char>(why[size]) & 0xC0) == 0x80) --size;
     reason.reason.assign(why.data(), size);
     stream_.async_close(reason, step(*this, &WebSocketSession::on_closed));
@@ -156,11 +156,11 @@ class WebSocketSession final : public Session, public std::enable_shared_from_th
     mailbox_.reset();
     try {
       shared_.handler.on_disconnect(client_);
-    } catch (...) {  // the client has disconnected either way
+    } catch (...) {  // the client has disconnected in any case
     }
   }
 
-  websocket::stream<Stream, false> stream_;  // false: without compression, as pictures are compressed already
+  websocket::stream<Stream, false> stream_;  // false: no compression, since pictures are already compressed
   SharedState& shared_;
   Deadline deadline_;  // of a fragment, then of the close
   LingeringClose<WebSocketSession> lingering_close_;
@@ -168,8 +168,8 @@ class WebSocketSession final : public Session, public std::enable_shared_from_th
   boost::beast::flat_buffer received_;
   uint64_t client_ = 0;
   std::shared_ptr<Mailbox> mailbox_;  // while the client is connected
-  Outgoing sending_;                  // what is being written
-  size_t sent_ = 0;                   // of it
+  Outgoing sending_;                  // the message being sent
+  size_t sent_ = 0;                   // bytes of it
 };
 
 }  // namespace

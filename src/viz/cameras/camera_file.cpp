@@ -21,7 +21,7 @@ std::vector<JsonField> cameras_in(const JsonFile& file) {
   return cameras;
 }
 
-// Of an entry that has none, its place.
+// The entry's id, or its index if it has none.
 std::string id_of(const JsonField& entry, size_t place) {
   if (!entry.has("id")) return fmt::format("{:05}", place);
   const JsonField id = entry["id"];
@@ -30,8 +30,8 @@ std::string id_of(const JsonField& entry, size_t place) {
   return id.json().dump();
 }
 
-// 3DGS and 2DGS put test and training views into one list, under the bare names of their images: of a
-// NeRF-synthetic scene both splits have an r_0.
+// 3DGS and 2DGS put test and training views into one list, with plain image names: both splits of a
+// NeRF-synthetic scene have an r_0.
 std::string name_of(const JsonField& entry, size_t place, const std::set<std::string>& taken) {
   if (!entry.has("img_name")) return id_of(entry, place);
   std::string name = entry["img_name"].text();

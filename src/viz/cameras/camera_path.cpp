@@ -33,7 +33,7 @@ void check_format(const JsonField& json) {
   if (version.json() != 1) version.expect("1, the version that this program knows");
 }
 
-// Whether the path goes on from this keyframe to another.
+// Whether a segment of the path starts at this keyframe.
 bool counts(const CameraPath& path, size_t keyframe) {
   return path.closed || keyframe + 1 < path.keyframes.size();
 }

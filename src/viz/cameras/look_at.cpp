@@ -44,7 +44,7 @@ Aim aim_of(const std::vector<Camera<float>>& cameras) {
   aim.up = unit(-down, V{0, -1, 0});
   aim.forward = unit(forward, V{0, 0, 1});
 
-  // A little ridge keeps parallel axes solvable.
+  // A small ridge term keeps parallel axes solvable.
   Mat3<double> a(1e-6);
   V b(0);
   for (const Camera<float>& c : cameras) {
@@ -54,9 +54,9 @@ Aim aim_of(const std::vector<Camera<float>>& cameras) {
     b += project * (V(c.position) - aim.middle);
   }
   aim.target = aim.middle + inverse(a) * b;
-  // Of cameras at one place, or with parallel axes, it is their own place, which rounding puts a little
-  // before or behind them: by less than this share of their distance from the origin, which bounds both the
-  // size of their numbers and how far they stand from each other.
+  // For cameras at one place, or with parallel axes, the solution is at the cameras. Rounding moves it
+  // slightly forward or backward, by less than this fraction of their distance from the origin. That distance
+  // bounds both the size of the coordinates and the distances between cameras.
   constexpr double rounding = 1e-6;
   double ahead = 0, farthest = 0;
   for (const Camera<float>& c : cameras) {

@@ -5,36 +5,36 @@
 #include "base/tensor.h"
 #include "math/camera.h"
 
-// What cameras look at, and cameras that look at something.
+// What cameras look at, and cameras that look at a target.
 namespace traceflow::viz {
 
-// v as a unit vector, or `otherwise` where it has no direction.
+// v normalised, or `otherwise` if v is too short.
 Vec3<double> unit(const Vec3<double>& v, const Vec3<double>& otherwise);
 
-// Any unit vector at right angles to the unit vector v.
+// Any unit vector perpendicular to the unit vector v.
 Vec3<double> perpendicular(const Vec3<double>& v);
 
 // A camera's x (0), y (1) or z (2) axis in world.
 Vec3<double> axis_of(const Camera<float>& camera, int axis);
 
-// The camera moved to `from`, looking along the unit vector `forward` with `up` (unit) above.
+// The camera moved to `from`, looking along the unit vector `forward`, with `up` (unit) pointing up.
 Camera<float> looking(Camera<float> camera, const Vec3<double>& from, const Vec3<double>& forward,
                       const Vec3<double>& up);
 
-// What a set of cameras is about.
+// The common target of a set of cameras.
 struct Aim {
-  Vec3<double> middle{0};         // of the cameras
-  Vec3<double> forward{0, 0, 1};  // unit; the mean of their own
-  Vec3<double> up{0, -1, 0};      // unit; likewise
-  double spread = 1;              // largest distance of a camera from the middle, at least 1
-  // The point nearest to all optical axes in the least-squares sense; `spread` ahead of the middle where
-  // there is none before them, as of cameras at one place or with parallel axes.
+  Vec3<double> middle{0};         // mean position of the cameras
+  Vec3<double> forward{0, 0, 1};  // unit; the cameras' mean
+  Vec3<double> up{0, -1, 0};      // unit; the cameras' mean
+  double spread = 1;              // largest distance of a camera from the mean position, at least 1
+  // The least-squares nearest point to all optical axes. If it is not in front of the cameras, as for cameras
+  // at one place or with parallel axes, the point `spread` ahead of the mean position.
   Vec3<double> target{0};
 };
-// There must be a camera.
+// There must be at least one camera.
 Aim aim_of(const std::vector<Camera<float>>& cameras);
 
-// Middle value per axis of P×3 points, which a few strays do not move; zero without points.
+// Median per axis of P×3 points, robust to outliers; zero without points.
 Vec3<double> median_point(const Tensor<float>& points);
 
 }  // namespace traceflow::viz

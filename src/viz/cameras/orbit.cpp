@@ -15,12 +15,12 @@ namespace {
 using V = Vec3<double>;
 constexpr double pi = std::numbers::pi;
 
-// A circle (or an arc of it) that looks at its target.
+// Cameras on a circle, or an arc of it, that look at the target.
 struct Circle {
   V target{0}, up{0, -1, 0};
-  V start{0, 0, -1};  // unit, at right angles to up: where angle 0 is
+  V start{0, 0, -1};  // unit, perpendicular to up: the direction of angle 0
   double radius = 1, height = 0;
-  double swing = pi;  // largest angle to either side; pi goes round
+  double swing = pi;  // largest angle to each side; pi is a full circle
 };
 
 Circle circle_from(const std::vector<Camera<float>>& cameras) {

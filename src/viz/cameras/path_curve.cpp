@@ -21,7 +21,7 @@ Q product(const Q& a, const Q& b) {
 }
 Q inverse(const Q& q) { return {q[0], -q[1], -q[2], -q[3]}; }
 
-// Half the turn from a to b, seen from a: the shorter of the two ways.
+// Half the rotation vector from a to b in the axes of a, the shorter way.
 V half_turn(const Q& a, const Q& b) {
   Q d = product(inverse(a), b);
   if (d[0] < 0) d = -d;
@@ -35,10 +35,10 @@ Q from_half_turn(const V& v) {
   return {std::cos(angle), axis.x, axis.y, axis.z};
 }
 
-// Of a rotation matrix, by its largest component.
+// Converts a rotation matrix by its largest component.
 Q quaternion_of(const Mat3<double>& r) {
   const auto at = [&](int row, int column) { return r[column][row]; };
-  std::array<double, 4> squares{};  // four times each component's square
+  std::array<double, 4> squares{};  // four times the square of each component
   for (size_t i = 0; i < 4; ++i) {
     const auto sign = [&](size_t axis) { return i == 0 || i == axis ? 1.0 : -1.0; };
     squares[i] = 1 + sign(1) * at(0, 0) + sign(2) * at(1, 1) + sign(3) * at(2, 2);
@@ -62,7 +62,7 @@ Q quaternion_of(const Mat3<double>& r) {
 
 Q between(const Q& a, const Q& b, double u) { return product(a, from_half_turn(u * half_turn(a, b))); }
 
-// The quaternions' Bézier curve by de Casteljau.
+// The quaternion Bézier curve by de Casteljau's algorithm.
 Q bezier(std::array<Q, 4> q, double u) {
   for (size_t level = 3; level > 0; --level) {
     for (size_t i = 0; i < level; ++i) q.at(i) = between(q.at(i), q.at(i + 1), u);
@@ -70,7 +70,7 @@ Q bezier(std::array<Q, 4> q, double u) {
   return q[0] / length(q[0]);
 }
 
-// The cubic from a to b with these slopes at its ends, h apart.
+// The cubic from a to b with these slopes at its ends, over an interval of length h.
 template <class T>
 T hermite(const T& a, const T& slope_a, const T& b, const T& slope_b, double h, double u) {
   const double v = 1 - u;
@@ -78,9 +78,8 @@ T hermite(const T& a, const T& slope_a, const T& b, const T& slope_b, double h, 
          slope_b * (h * u * u * v);
 }
 
-// Of values at keys `steps` apart, slopes between which the cubics stay monotone (Fritsch, Butland): the
-// secants' harmonic mean, or 0 at a turning point. Where the path goes round, the first and the last key are
-// one.
+// Slopes that keep the cubics monotone (Fritsch, Butland), for values at keys `steps` apart: the harmonic
+// mean of the secants, or 0 at an extremum. For a closed path, the first and the last key are the same.
 std::vector<double> monotone_slopes(const std::vector<double>& values, const std::vector<double>& steps,
                                     bool round) {
   const size_t segments = steps.size();
@@ -99,8 +98,8 @@ std::vector<double> monotone_slopes(const std::vector<double>& values, const std
   return slopes;
 }
 
-// The non-uniform mean of two slopes at a key, that of the shorter side counting more; at rest where either
-// side is.
+// The non-uniform mean of two slopes at a key, which weights the shorter side more; 0 if either side is at
+// rest.
 V joined(const V& before, double h, const V& after, double k) {
   const double a = length(before), b = length(after);
   if (!(a > 0 && b > 0)) return V(0);
@@ -146,9 +145,9 @@ PathCurve::PathCurve(const CameraPath& path) : closed_(path.closed), keys_(path.
 void PathCurve::turn(const std::vector<double>& durations) {
   const size_t segments = durations.size();
   turns_.assign(keys_.size(), V(0));
-  // In the axes of the key that is turned away from, and towards: a turn's axis is the same in both.
+  // A rotation's axis is the same in the axes of both of its keys.
   const auto rate = [&](size_t i) { return half_turn(rotations_[i], rotations_[i + 1]) / durations[i]; };
-  // As for monotone values: no faster than thrice the slower side.
+  // As for monotone values: at most three times the speed of the slower side.
   const auto joint = [&](size_t before, size_t after) {
     const V a = rate(before), b = rate(after);
     const V mean = joined(a, durations[before], b, durations[after]);

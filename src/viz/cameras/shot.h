@@ -8,10 +8,10 @@
 
 namespace traceflow::viz {
 
-// One picture to be taken: from where, when, and the name of its files.
+// One picture to render: camera, time and file name.
 struct Shot {
   std::string name;
-  std::optional<float> time;  // in [0, 1]; the asker's choice where absent
+  std::optional<float> time;  // in [0, 1]; if absent, the caller chooses
   Camera<float> camera;       // in the scene's units
 };
 

@@ -19,7 +19,7 @@ constexpr double turns = 2;
 constexpr double depth_turns = 1;
 constexpr double least_share = 1.0 / 50;
 
-// How far nine of ten cameras stand from the mean along an axis, at most.
+// The 90th percentile of the cameras' distances from the mean along an axis.
 double reach_along(const std::vector<Camera<float>>& cameras, const V& middle, const V& axis) {
   std::vector<double> distances;
   distances.reserve(cameras.size());
@@ -39,7 +39,7 @@ std::vector<Shot> spiral_around_cameras(const std::vector<Camera<float>>& camera
   const double distance = length(aim.target - middle);
   const double wide = std::max(reach_along(cameras, middle, x), least_share * distance);
   const double high = std::max(reach_along(cameras, middle, y), least_share * distance);
-  // Never through what is looked at.
+  // Never moves through the target.
   const double deep = std::min(reach_along(cameras, middle, z), distance / 2);
 
   std::vector<Shot> shots;

@@ -11,15 +11,15 @@ namespace traceflow::viz {
 
 namespace {
 
-constexpr double margin = 24;          // pixels around what the map holds
+constexpr double margin = 24;          // pixels around the map's content
 constexpr double look_length = 16;     // pixels
-constexpr int64_t most_points = 4000;  // that the window is chosen by
+constexpr int64_t most_points = 4000;  // used to choose the window
 
 Vec3<double> axis_of(const View& view, const Vec3<float>& in_camera) {
   return Vec3<double>(in_camera * view.camera.camera_from_world);
 }
 
-// Any direction across another.
+// Any unit vector perpendicular to v.
 Vec3<double> across(const Vec3<double>& v) {
   const Vec3<double> other = std::abs(v.x) < 0.7 ? Vec3<double>(1, 0, 0) : Vec3<double>(0, 1, 0);
   return normalize(cross(v, other));
@@ -30,10 +30,10 @@ Vec3<double> unit_or(const Vec3<double>& v, const Vec3<double>& otherwise) {
   return length(v) > shortest ? normalize(v) : otherwise;
 }
 
-// What all cameras' x axes are level against, as far as they turn enough to tell, and else what the cameras
-// have up.
+// The direction perpendicular to all cameras' x axes, if they rotate enough to determine it; else the
+// cameras' mean up direction.
 Vec3<double> up_of(const Capture& capture) {
-  constexpr double trust = 0.005;  // in the cameras' own up: less than a turn of some degrees brings
+  constexpr double trust = 0.005;  // of the mean up direction: outweighed by rotations of a few degrees
   Vec3<double> mean(0);
   Mat3<double> spread(0);
   for (const View& view : capture.train) {
@@ -47,7 +47,7 @@ Vec3<double> up_of(const Capture& capture) {
   return dot(up, mean) < 0 ? -up : up;
 }
 
-// The points that a quarter of the training views have in their images; all where there are none.
+// The points that a quarter of the training views have in their images; all points if there are none.
 std::vector<Vec3<double>> subject_of(const Capture& capture) {
   const int64_t step = 1 + capture.points.size() / 3 / most_points;
   std::vector<Vec3<double>> all, seen;
@@ -121,7 +121,7 @@ class Map {
             0.5 * static_cast<double>(picture_.dim(0)) - from_middle.y};
   }
 
-  // The more points, the brighter.
+  // More points in a pixel make it brighter.
   void draw_points() {
     const int64_t width = picture_.dim(1), height = picture_.dim(0);
     std::vector<int> counts(static_cast<size_t>(width * height), 0);
@@ -153,7 +153,7 @@ class Map {
     if (marks_.contains(view.id)) draw_ring(at, 6.5, 8.5, alarm_ink, picture_);
   }
 
-  // A bar of a round length.
+  // A scale bar of a round length.
   void draw_scale() {
     const double wanted = 0.25 * static_cast<double>(picture_.dim(1)) / scale_;
     const double decade = std::pow(10, std::floor(std::log10(wanted)));

@@ -10,8 +10,8 @@ namespace {
 constexpr Pixel map_size{(picture_width - picture_gap) / 2, 460};
 constexpr int64_t legend_height = 26;
 
-// A finding about many views says nothing of any one of them. Of several about one view the first is told,
-// but that it stands apart before all others, as the maps go by it.
+// A finding about many views does not mark any of them. For several findings about one view the first is
+// shown, except that "apart" takes precedence, since the maps depend on it.
 Marks marks_of(const Capture& capture, const std::vector<Finding>& findings) {
   const size_t few = 1 + (capture.train.size() + capture.test.size()) / 4;
   Marks marks;

@@ -8,7 +8,7 @@
 #include "viz/colour_map.h"
 #include "viz/drawing.h"
 
-// What the parts of the capture's picture share.
+// Shared by the parts of the capture's picture.
 namespace traceflow::viz {
 
 inline constexpr int64_t picture_width = 1200, picture_gap = 6;
@@ -20,9 +20,9 @@ inline Ink time_ink(float time) {
   return {to_8bit(colour.x), to_8bit(colour.y), to_8bit(colour.z)};
 }
 
-// View id → the kind of what was found about it.
+// View id → the kind of the finding about it.
 using Marks = std::map<std::string, std::string>;
-// Of cameras that stand apart from the others.
+// The kind for cameras apart from the others.
 inline constexpr const char* apart_kind = "camera-apart";
 
 }  // namespace traceflow::viz

@@ -35,7 +35,7 @@ std::vector<Tile> all_tiles(const Capture& capture) {
   return tiles;
 }
 
-// Adds up to `count` of the tiles for which `wanted` holds to the places, spread evenly.
+// Adds up to `count` evenly spaced tiles among those for which `wanted` holds.
 template <class F>
 void choose(const std::vector<Tile>& tiles, size_t count, F&& wanted, std::set<size_t>& places) {
   std::vector<size_t> candidates;
@@ -60,7 +60,7 @@ std::vector<Tile> choose_tiles(const Capture& capture, const Marks& marks) {
   return tiles;
 }
 
-// The pixels of the object that have a neighbour outside it, on the small picture's grid.
+// The mask's pixels with a neighbour outside it, on the grid of the thumbnail.
 void outline(const Tensor<uint8_t>& mask, Tensor<uint8_t>& picture) {
   const int64_t height = picture.dim(0), width = picture.dim(1);
   const auto is_on = [&](int64_t y, int64_t x) {
@@ -76,7 +76,7 @@ void outline(const Tensor<uint8_t>& mask, Tensor<uint8_t>& picture) {
   }
 }
 
-// In the place of a view that cannot be decoded.
+// Replaces a view that cannot be decoded.
 Tensor<uint8_t> blank(const View& view) {
   const int64_t height = cell_width * view.camera.height / std::max(1, view.camera.width);
   Tensor<uint8_t> picture(Shape{std::clamp(height, 2 * line_height, tallest_cell), cell_width, 3});
@@ -84,7 +84,7 @@ Tensor<uint8_t> blank(const View& view) {
   return picture;
 }
 
-// The view, within cell_width × tallest_cell pixels.
+// The view's image within cell_width × tallest_cell pixels.
 Tensor<uint8_t> thumbnail(const Capture& capture, const View& view) {
   try {
     const auto pixels = load_pixels(capture, view);
@@ -96,7 +96,7 @@ Tensor<uint8_t> thumbnail(const Capture& capture, const View& view) {
   }
 }
 
-// The end of what is too long says more than its beginning.
+// Cuts the start of a long text, since the end says more.
 std::string cut(const std::string& text, size_t longest) {
   return text.size() <= longest ? text : ".." + text.substr(text.size() - longest + 2);
 }

@@ -4,8 +4,7 @@
 
 namespace traceflow::viz {
 
-// Up to 24 views in the order of time, in six columns: those that are marked, up to eight of them, and others
-// spread evenly.
+// Up to 24 views in time order, in six columns: up to eight marked views, and evenly spaced others.
 Tensor<uint8_t> view_tiles(const Capture& capture, const Marks& marks);
 
 }  // namespace traceflow::viz
