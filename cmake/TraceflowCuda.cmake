@@ -55,7 +55,7 @@ function(traceflow_join_sources list)
   set(${list} ${joined} PARENT_SCOPE)
 endfunction()
 
-# traceflow_cuda: the .cu files of all rooms as objects, so that each of their names finds the weak ones that call it.
+# traceflow_cuda: the .cu files of all libraries as objects, so that each of their names finds the weak ones that call it.
 # Programs link it; where CUDA is left out it is empty.
 function(traceflow_cuda_library)
   add_library(traceflow_cuda INTERFACE)

@@ -56,13 +56,14 @@ if(TRACEFLOW_SANITIZE)
 endif()
 
 # traceflow_library(ops_raster LINKS base math scene [SYSTEM packages...])
-# One library per folder: all .cpp files beside the CMakeLists.txt and in its cpu/ and cuda/. LINKS are the libraries that it may include; SYSTEM
+# One library per folder: all .cpp files beside the CMakeLists.txt, in cpu/, in cuda/ and in FOLDERS. LINKS are the libraries that it may include; SYSTEM
 # are outside packages. The compiler still finds the headers of other libraries, but their code does not link.
 # Its .cu files are noted for the CUDA code, which is one library for all (traceflow_cuda): a library's
 # own library calls it by weak names, which stay null in programs that are not linked with it.
 function(traceflow_library name)
-  cmake_parse_arguments(ARG "" "" "LINKS;SYSTEM" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS *.cpp cpu/*.cpp cuda/*.cpp)
+  cmake_parse_arguments(ARG "" "" "LINKS;SYSTEM;FOLDERS" ${ARGN})
+  list(TRANSFORM ARG_FOLDERS APPEND "/*.cpp")
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp cpu/*.cpp cuda/*.cpp ${ARG_FOLDERS})
   # Highway compiles these once for each instruction set, by including them again: no file can stand before or after.
   foreach(source IN LISTS sources)
     file(STRINGS ${source} vectorised REGEX "foreach_target" LIMIT_COUNT 1)

@@ -13,7 +13,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "base/robust.h"
-#include "capture/formats/nerfies_writer.h"
+#include "capture/formats/nerfies/nerfies_writer.h"
 #include "capture/lens/resample.h"
 #include "files/npy.h"
 #include "files/png.h"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "base/work.h"
-#include "capture/formats/colmap_model.h"
+#include "capture/formats/colmap/colmap_model.h"
 #include "prepare/frames.h"
 
 // Writes images, masks and a COLMAP model as a capture in NeRF-DS's layout.

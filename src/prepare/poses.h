@@ -5,7 +5,7 @@
 #include <string>
 
 #include "base/work.h"
-#include "capture/formats/colmap_model.h"
+#include "capture/formats/colmap/colmap_model.h"
 #include "prepare/frames.h"
 #include "prepare/programs.h"
 

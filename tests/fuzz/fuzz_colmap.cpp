@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "capture/formats/colmap_model.h"
+#include "capture/formats/colmap/colmap_model.h"
 #include "fuzz/scratch_file.h"
 
 using namespace traceflow;

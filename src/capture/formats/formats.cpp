@@ -4,11 +4,11 @@
 #include <array>
 
 #include "base/error.h"
-#include "capture/formats/colmap.h"
-#include "capture/formats/dycheck.h"
+#include "capture/formats/colmap/colmap.h"
 #include "capture/formats/image_names.h"
-#include "capture/formats/nerfies.h"
-#include "capture/formats/transforms.h"
+#include "capture/formats/nerfies/dycheck.h"
+#include "capture/formats/nerfies/nerfies.h"
+#include "capture/formats/transforms/transforms.h"
 #include "capture/formats/unregistered.h"
 
 namespace traceflow {

@@ -6,7 +6,7 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/option_fields.h"
-#include "capture/formats/nerfies_writer.h"
+#include "capture/formats/nerfies/nerfies_writer.h"
 #include "capture/synth/synth.h"
 #include "files/npy.h"
 #include "files/png.h"

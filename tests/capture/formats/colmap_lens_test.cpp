@@ -1,4 +1,4 @@
-#include "capture/formats/colmap_lens.h"
+#include "capture/formats/colmap/colmap_lens.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "capture/formats/colmap_model.h"
+#include "capture/formats/colmap/colmap_model.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "capture/formats/colmap_rows.h"
+#include "capture/formats/colmap/colmap_rows.h"
 #include "support/colmap_writer.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"

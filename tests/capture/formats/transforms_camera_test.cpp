@@ -1,4 +1,4 @@
-#include "capture/formats/transforms_camera.h"
+#include "capture/formats/transforms/transforms_camera.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "capture/formats/nerfies_camera.h"
+#include "capture/formats/nerfies/nerfies_camera.h"
 
 #include <vector>
 

@@ -1,4 +1,4 @@
-#include "capture/formats/transforms_camera.h"
+#include "capture/formats/transforms/transforms_camera.h"
 
 #include <algorithm>
 #include <array>

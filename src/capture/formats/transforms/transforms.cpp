@@ -1,4 +1,4 @@
-#include "capture/formats/transforms.h"
+#include "capture/formats/transforms/transforms.h"
 
 #include <algorithm>
 #include <iterator>
@@ -13,7 +13,7 @@
 #include "capture/formats/image_names.h"
 #include "capture/formats/normalise.h"
 #include "capture/formats/ply_points.h"
-#include "capture/formats/transforms_file.h"
+#include "capture/formats/transforms/transforms_file.h"
 #include "files/image.h"
 
 namespace traceflow {

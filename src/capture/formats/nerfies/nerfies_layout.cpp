@@ -1,4 +1,4 @@
-#include "capture/formats/nerfies_layout.h"
+#include "capture/formats/nerfies/nerfies_layout.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

@@ -4,8 +4,8 @@
 #include <span>
 
 #include "base/error.h"
-#include "capture/formats/colmap_lens.h"
-#include "capture/formats/colmap_rows.h"
+#include "capture/formats/colmap/colmap_lens.h"
+#include "capture/formats/colmap/colmap_rows.h"
 
 namespace traceflow {
 

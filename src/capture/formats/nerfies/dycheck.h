@@ -1,6 +1,6 @@
 #pragma once
 
-#include "capture/formats/nerfies_layout.h"
+#include "capture/formats/nerfies/nerfies_layout.h"
 
 namespace traceflow {
 

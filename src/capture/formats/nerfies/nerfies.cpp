@@ -1,11 +1,11 @@
-#include "capture/formats/nerfies.h"
+#include "capture/formats/nerfies/nerfies.h"
 
 #include "base/error.h"
 #include "base/parallel.h"
-#include "capture/formats/dycheck.h"
 #include "capture/formats/image_names.h"
-#include "capture/formats/nerfies_camera.h"
-#include "capture/formats/nerfies_layout.h"
+#include "capture/formats/nerfies/dycheck.h"
+#include "capture/formats/nerfies/nerfies_camera.h"
+#include "capture/formats/nerfies/nerfies_layout.h"
 #include "files/limits.h"
 #include "files/npy.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "capture/formats/transforms_camera.h"
+#include "capture/formats/transforms/transforms_camera.h"
 #include "files/file_tree.h"
 
 namespace traceflow {

@@ -1,4 +1,4 @@
-#include "capture/formats/transforms_file.h"
+#include "capture/formats/transforms/transforms_file.h"
 
 #include "base/error.h"
 #include "capture/formats/image_names.h"

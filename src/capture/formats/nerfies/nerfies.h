@@ -11,7 +11,7 @@ namespace traceflow {
 bool is_nerfies(const FileTree& tree);
 // Throws InputError.
 FoundCapture read_nerfies(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);
-// Reads DyCheck's captures, whose splits differ (capture/formats/dycheck.h). Throws InputError.
+// Reads DyCheck's captures, whose splits differ (capture/formats/nerfies/dycheck.h). Throws InputError.
 FoundCapture read_dycheck(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options);
 
 }  // namespace traceflow

@@ -1,11 +1,11 @@
-#include "capture/formats/colmap.h"
+#include "capture/formats/colmap/colmap.h"
 
 #include <algorithm>
 #include <array>
 #include <map>
 
 #include "base/error.h"
-#include "capture/formats/colmap_model.h"
+#include "capture/formats/colmap/colmap_model.h"
 #include "capture/formats/image_names.h"
 #include "capture/formats/normalise.h"
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "base/error.h"
-#include "capture/formats/colmap_rows.h"
+#include "capture/formats/colmap/colmap_rows.h"
 
 namespace traceflow {
 

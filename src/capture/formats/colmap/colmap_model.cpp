@@ -1,12 +1,12 @@
-#include "capture/formats/colmap_model.h"
+#include "capture/formats/colmap/colmap_model.h"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "base/error.h"
-#include "capture/formats/colmap_lens.h"
-#include "capture/formats/colmap_rows.h"
+#include "capture/formats/colmap/colmap_lens.h"
+#include "capture/formats/colmap/colmap_rows.h"
 #include "math/rotation.h"
 
 namespace traceflow {

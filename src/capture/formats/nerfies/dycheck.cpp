@@ -1,4 +1,4 @@
-#include "capture/formats/dycheck.h"
+#include "capture/formats/nerfies/dycheck.h"
 
 #include <set>
 

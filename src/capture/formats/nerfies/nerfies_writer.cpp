@@ -1,4 +1,4 @@
-#include "capture/formats/nerfies_writer.h"
+#include "capture/formats/nerfies/nerfies_writer.h"
 
 #include <nlohmann/json.hpp>
 
