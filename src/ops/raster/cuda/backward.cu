@@ -1,3 +1,5 @@
+#include <cstddef>
+
 #include "ops/raster/cuda/stages.h"
 #include "ops/raster/cuda/tile.h"
 
@@ -8,7 +10,31 @@ namespace traceflow::raster::cuda_stage {
 namespace {
 
 constexpr int backward_batch = 32;
-constexpr int sums_used = 22;
+// The places of SplatGradient's fields among its numbers.
+namespace sum_of {
+enum Place : int {
+  u_x = offsetof(SplatGradient, u_x) / sizeof(float),
+  u_y = offsetof(SplatGradient, u_y) / sizeof(float),
+  u_1 = offsetof(SplatGradient, u_1) / sizeof(float),
+  v_x = offsetof(SplatGradient, v_x) / sizeof(float),
+  v_y = offsetof(SplatGradient, v_y) / sizeof(float),
+  v_1 = offsetof(SplatGradient, v_1) / sizeof(float),
+  w_x = offsetof(SplatGradient, w_x) / sizeof(float),
+  w_y = offsetof(SplatGradient, w_y) / sizeof(float),
+  w_1 = offsetof(SplatGradient, w_1) / sizeof(float),
+  z_plane = offsetof(SplatGradient, z_plane) / sizeof(float),
+  centre_x = offsetof(SplatGradient, centre_x) / sizeof(float),
+  centre_y = offsetof(SplatGradient, centre_y) / sizeof(float),
+  z_centre = offsetof(SplatGradient, z_centre) / sizeof(float),
+  log_opacity = offsetof(SplatGradient, log_opacity) / sizeof(float),
+  colour = offsetof(SplatGradient, colour) / sizeof(float),
+  tint = offsetof(SplatGradient, tint) / sizeof(float),
+  normal = offsetof(SplatGradient, normal) / sizeof(float),
+  roughness = offsetof(SplatGradient, roughness) / sizeof(float),
+  count = roughness + 1
+};
+}  // namespace sum_of
+
 constexpr int sums_stored = sizeof(SplatGradient) / sizeof(float);
 static_assert(sums_stored <= cuda::warp_lanes && backward_batch == cuda::warp_lanes);
 
@@ -103,27 +129,27 @@ struct PixelGradient {
       const float grad_nu = -gw * u;
       const float grad_nv = -gw * v;
       const float grad_w = gw * (u * u + v * v) - zw * z_hit;
-      sums[0] += grad_nu * f.x;
-      sums[1] += grad_nu * f.y;
-      sums[2] += grad_nu;
-      sums[3] += grad_nv * f.x;
-      sums[4] += grad_nv * f.y;
-      sums[5] += grad_nv;
-      sums[6] += grad_w * f.x;
-      sums[7] += grad_w * f.y;
-      sums[8] += grad_w;
-      sums[9] += zw;
+      sums[sum_of::u_x] += grad_nu * f.x;
+      sums[sum_of::u_y] += grad_nu * f.y;
+      sums[sum_of::u_1] += grad_nu;
+      sums[sum_of::v_x] += grad_nv * f.x;
+      sums[sum_of::v_y] += grad_nv * f.y;
+      sums[sum_of::v_1] += grad_nv;
+      sums[sum_of::w_x] += grad_w * f.x;
+      sums[sum_of::w_y] += grad_w * f.y;
+      sums[sum_of::w_1] += grad_w;
+      sums[sum_of::z_plane] += zw;
     } else {
       // The low-pass: ρ = rho_per_pixel2 (dx² + dy²).
-      sums[10] += g * f.dx;
-      sums[11] += g * f.dy;
-      sums[12] += grad_z;
+      sums[sum_of::centre_x] += g * f.dx;
+      sums[sum_of::centre_y] += g * f.dy;
+      sums[sum_of::z_centre] += grad_z;
     }
-    sums[13] += g;
-    for (int c = 0; c < 3; ++c) sums[14 + c] += weight * colour[c];
-    sums[17] += weight * tint;
-    for (int c = 0; c < 3; ++c) sums[18 + c] += weight * normal[c];
-    sums[21] += weight * roughness;
+    sums[sum_of::log_opacity] += g;
+    for (int c = 0; c < 3; ++c) sums[sum_of::colour + c] += weight * colour[c];
+    sums[sum_of::tint] += weight * tint;
+    for (int c = 0; c < 3; ++c) sums[sum_of::normal + c] += weight * normal[c];
+    sums[sum_of::roughness] += weight * roughness;
   }
 };
 
@@ -248,10 +274,10 @@ __global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, Gradient
       done += share;
       const float own = g.by_weight(o, s, at);
       const float grad_alpha = transmittance * own - (all - done) / (1.0F - alpha);
-      float sums[sums_used] = {};
+      float sums[sum_of::count] = {};
       g.add(o, s, at, weight, grad_alpha, g.median_place == taken, sums);
       float* const to = &gradients[saved.entries[begin + place].entry].u_x;
-      for (int j = 0; j < sums_used; ++j) {
+      for (int j = 0; j < sum_of::count; ++j) {
         if (sums[j] != 0) atomicAdd(to + j, sums[j]);
       }
     });
