@@ -83,6 +83,17 @@ struct SplatGradient {
 };
 static_assert(sizeof(SplatGradient) == 24 * sizeof(float));
 
+// The outputs that have a gradient. The loops skip the others.
+enum class Asked {
+  colour,    // colour, tint, silhouette, roughness and alpha
+  geometry,  // also normal and expected depth
+  all        // also median depth and distortion
+};
+inline Asked asked_by(const OutputGradient& g) {
+  if (!g.median_depth.empty() || !g.distortion.empty()) return Asked::all;
+  return g.normal.empty() && g.depth.empty() ? Asked::colour : Asked::geometry;
+}
+
 // What forward saves for backward, for 16 pixels. A vector is loaded at once.
 struct SavedBlock {
   alignas(64) float transmittance[pixels_per_block];

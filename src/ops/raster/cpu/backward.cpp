@@ -71,13 +71,6 @@ HWY_INLINE void load_block(const OutputGradient& g, const Vec3<float>& backgroun
   }
 }
 
-// The outputs that have a gradient. The loops skip the others.
-enum class Asked {
-  colour,    // colour, tint, silhouette, roughness and alpha
-  geometry,  // also normal and expected depth
-  all        // also median depth and distortion
-};
-
 // The sums of a surfel over pixels, one per lane, in the order of SplatGradient.
 template <class D>
 struct Sums {
@@ -335,9 +328,10 @@ void blend_backward_tile(SortOrder order, const KernelOptions& o, int64_t index,
     load_block(grad_output, o.background, lists.block_x(block), lists.block_y(block), saved.width,
                saved.height, blocks[block], state.blocks[block]);
   }
-  if (!grad_output.distortion.empty() || !grad_output.median_depth.empty()) {
+  const Asked asked_outputs = asked_by(grad_output);
+  if (asked_outputs == Asked::all) {
     blend_backward<Asked::all>(order, o, lists, blocks, saved, state);
-  } else if (!grad_output.normal.empty() || !grad_output.depth.empty()) {
+  } else if (asked_outputs == Asked::geometry) {
     blend_backward<Asked::geometry>(order, o, lists, blocks, saved, state);
   } else {
     blend_backward<Asked::colour>(order, o, lists, blocks, saved, state);

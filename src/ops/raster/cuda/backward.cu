@@ -38,13 +38,6 @@ enum Place : int {
 constexpr int sums_stored = sizeof(SplatGradient) / sizeof(float);
 static_assert(sums_stored <= cuda::warp_lanes && backward_batch == cuda::warp_lanes);
 
-// The outputs that have a gradient. The loops skip the others.
-enum class Asked {
-  colour,    // colour, tint, silhouette, roughness and alpha
-  geometry,  // also normal and expected depth
-  all        // also median depth and distortion
-};
-
 // Addresses; null for an output without gradient.
 struct GradientView {
   const float *colour, *alpha, *tint, *silhouette, *roughness, *normal, *depth, *median_depth, *distortion;
@@ -319,9 +312,10 @@ void blend_backward(const Options& options, const Saved& saved, const OutputGrad
   const GradientView grad{asked(g.colour),     asked(g.alpha),        asked(g.tint),
                           asked(g.silhouette), asked(g.roughness),    asked(g.normal),
                           asked(g.depth),      asked(g.median_depth), asked(g.distortion)};
-  if (!g.median_depth.empty() || !g.distortion.empty()) {
+  const Asked asked_outputs = asked_by(g);
+  if (asked_outputs == Asked::all) {
     blend_backward<Asked::all>(options, saved, grad);
-  } else if (!g.normal.empty() || !g.depth.empty()) {
+  } else if (asked_outputs == Asked::geometry) {
     blend_backward<Asked::geometry>(options, saved, grad);
   } else {
     blend_backward<Asked::colour>(options, saved, grad);
