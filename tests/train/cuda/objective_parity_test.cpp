@@ -85,7 +85,7 @@ Stepped step(Device device) {
   gradient.main.rotation(17, 2) = std::numeric_limits<float>::quiet_NaN();
   gradient.main.rotation(40, 0) = 1e30F;
   gradient.main.sh(3, 1, 1) = std::numeric_limits<float>::infinity();
-  const auto move = [&](const char*, Tensor<float>& t) { t = t.on(device); };
+  const auto move = [&](const std::string&, Tensor<float>& t) { t = t.on(device); };
   result.scene.main.for_each(move);
   gradient.main.for_each(move);
   const TrainOptions options;
@@ -106,8 +106,9 @@ TEST_F(TrainOnDevice, TheOptimiserAgreesWithTheCpuAndNamesTheFirstBadGradient) {
   std::vector<const Tensor<float>*> tensors;
   expected.scene.main.for_each([&](const std::string&, const Tensor<float>& t) { tensors.push_back(&t); });
   size_t k = 0;
-  found.scene.main.for_each(
-      [&](const char* name, const Tensor<float>& t) { expect_close_on_host(t, *tensors[k++], 1e-6, name); });
+  found.scene.main.for_each([&](const std::string& name, const Tensor<float>& t) {
+    expect_close_on_host(t, *tensors[k++], 1e-6, name.c_str());
+  });
 }
 
 }  // namespace
