@@ -36,21 +36,20 @@ struct GlobalArguments {
 void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
   program.set_version_flag("--version", std::string("traceflow ") + version());
   program.add_flag("--help-options", arguments.help_options,
-                   "Print every option of a training, with its value in each preset, and exit");
+                   "Print all training options with their values in each preset, and exit");
   program
       .add_option("--threads", arguments.threads,
-                  "Threads to use; 0 for OMP_NUM_THREADS or all cores. The results do not depend on it")
+                  "Number of threads; 0: OMP_NUM_THREADS or all cores. The results do not depend on it")
       ->check(CLI::Range(0, 4096))
       ->option_text("N");
   constexpr auto names = enum_names(Instructions{});
   program
       .add_option("--instructions", arguments.instructions,
-                  "The most of the processor's vector instructions to use: automatic (all), sse4, avx2 or "
-                  "avx512. Unlike "
-                  "processors give the same bytes under the same limit")
+                  "Highest level of vector instructions to use: automatic (all that the processor has), "
+                  "sse4, avx2 or avx512. Different processors give the same bytes with the same limit")
       ->check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())))
       ->option_text("NAME");
-  program.add_flag("--profile", arguments.profile, "Print where the time went");
+  program.add_flag("--profile", arguments.profile, "Print how much time each part of the program took");
 }
 
 Instructions instructions_of(const std::string& name) {

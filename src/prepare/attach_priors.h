@@ -23,15 +23,14 @@ struct AttachOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("normals", normals, "",
-            "An .npz or .npy array T×H×W×3 of normals, a film of pictures of them, or a folder of such "
-            "pictures.");
-    v.field("masks", masks, "", "A folder or film with the moving object white.");
+            "Normals: an .npz or .npy array T×H×W×3, a video, or a folder of images.");
+    v.field("masks", masks, "", "Masks: a folder or video with the moving object in white.");
     v.field("tracks", tracks, "",
-            "An .npz array of points that were tracked: tracks (T×N×2, pixels) and visibility (T×N).");
+            "Point tracks: an .npz file with the arrays tracks (T×N×2, pixels) and visibility (T×N).");
     v.field("tracks_width", tracks_width, "pixels",
-            "Width of the pictures that were tracked; 0: that of the photographs.");
-    v.field("axes", axes, "", "Axes of the normals; automatic: by agreement with the capture's points.");
-    v.field("force", force, "", "Replaces normals, masks and tracks that are there.");
+            "Width of the tracked images; 0: the width of the capture's images.");
+    v.field("axes", axes, "", "Axes of the normals; automatic: determined with the capture's points.");
+    v.field("force", force, "", "Replace existing normals, masks and tracks.");
   }
   void validate() const;
 };

@@ -46,25 +46,28 @@ struct PrepareOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("frames", frames, "frames", "How many are taken, spread evenly over the time.");
+    v.field("frames", frames, "frames", "Number of frames, spread evenly over time.");
     v.field("rate", rate, "frames/s",
-            "How many are taken of each second, instead of --frames; 0: by --frames.");
-    v.field("start", start, "s", "What comes before is left out.");
-    v.field("end", end, "s", "What comes after is left out; 0: nothing.");
-    v.field("size", size, "pixels", "Longest side of the pictures; larger ones are scaled down.");
+            "Number of frames per second of video, instead of --frames; 0: use --frames.");
+    v.field("start", start, "s", "Start of the part of the video to use.");
+    v.field("end", end, "s", "End of the part of the video to use; 0: the end of the video.");
+    v.field("size", size, "pixels", "Longest side of the images; larger images are scaled down.");
     v.field("masks", masks, "",
-            "Where something moves: estimate, none, or a folder or film with the moving object white.");
+            "Masks of what moves: estimate, none, or a folder or video with the moving object in white.");
     v.field("matcher", matcher, "",
-            "Which pictures are compared: each with those near in time, or all; automatic: all up to 80.");
-    v.field("overlap", overlap, "frames", "How many pictures the sequential matcher looks ahead.");
-    v.field("features", features, "features/picture", "Most features that COLMAP takes of a picture.");
-    v.field("camera_model", camera_model, "", "COLMAP's lens.");
-    v.field("least_registered", least_registered, "", "Share of the frames whose poses must be found.");
-    v.field("test_every", test_every, "frames", "Every n-th picture tests.");
+            "Pairs of frames to compare: sequential (near in time), exhaustive (all), or automatic "
+            "(exhaustive up to 80 frames).");
+    v.field("overlap", overlap, "frames",
+            "Number of following frames that the sequential matcher compares with.");
+    v.field("features", features, "features/picture",
+            "Maximum number of features that COLMAP extracts from an image.");
+    v.field("camera_model", camera_model, "", "Camera model of COLMAP.");
+    v.field("least_registered", least_registered, "", "Minimum share of the frames that must get a pose.");
+    v.field("test_every", test_every, "frames", "Every n-th frame is a test view.");
     v.field("test_video", test_video, "",
-            "A second camera's film, started at the same moment, whose pictures test.");
-    v.field("test_offset", test_offset, "s", "How much later than the first film the second was started.");
-    v.field("until", until, "", "The last step to do.");
+            "Video of a second camera, started at the same moment; its frames are the test views.");
+    v.field("test_offset", test_offset, "s", "Time by which the second video starts after the first.");
+    v.field("until", until, "", "The last step to run.");
   }
   void validate() const;
 };

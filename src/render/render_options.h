@@ -42,31 +42,33 @@ struct RenderOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("sort", sort, "", "Blending order: centre (as 2DGS) or hit (exact per pixel) (method §3.3).");
-    v.field("near_plane", near_plane, "extents", "Nearest camera depth that is drawn (method §3.4).");
-    v.field("far_plane", far_plane, "extents", "Far end of the distortion's depth mapping (method §3.5).");
-    v.field("low_pass", low_pass, "", "Screen-space low-pass of 2DGS (method §3.2).");
-    v.field("samples", samples, "samples", "Samples along each side of a pixel (method §3.6).");
-    v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
-    v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
+    v.field("near_plane", near_plane, "extents", "Minimum camera depth that is drawn (method §3.4).");
+    v.field("far_plane", far_plane, "extents",
+            "Far end of the depth mapping of the distortion (method §3.5).");
+    v.field("low_pass", low_pass, "", "Use the screen-space low-pass filter of 2DGS (method §3.2).");
+    v.field("samples", samples, "samples", "Number of samples along each side of a pixel (method §3.6).");
+    v.field("alpha_min", alpha_min, "", "Hits with a lower opacity are skipped (method §3.3).");
+    v.field("alpha_max", alpha_max, "", "Maximum opacity of a hit; higher values are clamped (method §3.3).");
     v.field("transmittance_min", transmittance_min, "",
-            "A ray ends before its transmittance falls under this.");
+            "A ray ends before its transmittance falls below this.");
     v.field("depth_ratio", depth_ratio, "",
-            "Surface depth from expected (0) to median (1) depth (method §4.1).");
+            "Depth of the surface: 0 is the expected depth, 1 the median depth, and values between blend "
+            "both (method §4.1).");
     v.field("trace_from", trace_from, "extents",
             "Reflected hits nearer than this are ignored (method §5.2).");
     v.field("trace_alpha_min", trace_alpha_min, "",
-            "Opacity under which a reflected hit is skipped (method §5.1).");
+            "Reflected hits with a lower opacity are skipped (method §5.1).");
     v.field("hits_per_pass", hits_per_pass, "hits",
-            "Hits held at a time by the tracer; changes speed, not the image.");
+            "Number of hits that the tracer holds at a time; affects the speed, not the image.");
     v.field("background", background, "", "Colour behind the main surfels (method §3.5).");
     v.field("specular_background", specular_background, "", "Colour behind the environment (method §5.4).");
     v.group("select", select);
     v.field("precision", precision, "", "Arithmetic of the fields' hidden layers: fp32 or bf16.");
     v.field("tracks_frames", tracks.frames, "times",
-            "Layer tracks: times of the capture that a path goes back.");
-    v.field("tracks_most", tracks.most, "points", "Layer tracks: points that have a path, at most.");
+            "Layer tracks: length of a track, as a number of frames of the capture.");
+    v.field("tracks_most", tracks.most, "points", "Layer tracks: maximum number of points with a track.");
     v.field("tracks_least_move", tracks.least_move, "extents",
-            "Layer tracks: how far a point gets over the whole film, at least, to have a path.");
+            "Layer tracks: minimum distance that a point must move within the video to get a track.");
   }
   void validate() const;
 

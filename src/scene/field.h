@@ -18,13 +18,14 @@ struct NetworkOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("depth", depth, "layers", "Linear layers before the heads (method §1.2).");
+    v.field("depth", depth, "layers", "Number of linear layers before the heads (method §1.2).");
     v.field("width", width, "units", "Width of the hidden layers.");
     v.field("skip", skip, "layer",
-            "Layer (from 0) before which the encoding is concatenated again; 0 for none.");
+            "Layer (counted from 0) before which the encoding is concatenated again; 0: none.");
     v.field("position_frequencies", position_frequencies, "octaves",
-            "Frequencies of the position's encoding.");
-    v.field("time_frequencies", time_frequencies, "octaves", "Frequencies of the time's encoding.");
+            "Number of frequencies in the encoding of the position.");
+    v.field("time_frequencies", time_frequencies, "octaves",
+            "Number of frequencies in the encoding of the time.");
   }
   void validate() const;
   // Numbers in the encoding of (x, t): 3·(1 + 2·L_x) + 1 + 2·L_t.

@@ -27,36 +27,37 @@ struct TrackOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("warm_up", warm_up, "iterations",
-            "Training on the first time alone; at most an eighth of the run.");
-    v.field("map_each", map_each, "iterations", "Training between one time and the next, poses held.");
-    v.field("steps", steps, "", "Gauss-Newton steps for the poses of a new time.");
-    v.field("again", again, "times", "Recent times whose poses are solved again before each new one.");
-    v.field("window", window, "times", "How far back these lie at most.");
-    v.field(
-        "rounds", rounds, "",
-        "All poses are solved again, depths held, at the end of each of so many equal parts of the run, at "
-        "least every 2,000 iterations; 0: never.");
+            "Training on the first frame alone; at most an eighth of the run.");
+    v.field("map_each", map_each, "iterations", "Training between one frame and the next, with fixed poses.");
+    v.field("steps", steps, "", "Number of Gauss-Newton steps for the poses of a new frame.");
+    v.field("again", again, "times",
+            "Number of earlier frames whose poses are solved again before each new frame.");
+    v.field("window", window, "times",
+            "Number of recent frames from which the earlier frames (deform.track.again) are chosen.");
+    v.field("rounds", rounds, "",
+            "The run is divided into this many equal parts. All poses are solved again at the end of each "
+            "part, and at least every 2,000 iterations, with fixed depths; 0: never.");
     v.field("adjust", adjust, "",
-            "Photometric bundle adjustment of bodies that may bend and whose texture is seen to move with "
-            "them: steps on photographs of each size; 0: none.");
-    v.field(
-        "still", still, "",
-        "Bodies whose silhouettes at rest are off by less, over the film, stand still and are not followed; "
-        "a share of the masks' area; 0: all are followed.");
-    v.field("blur", blur, "pixels", "Blur of the first step's residuals; 0.7 of it at each that follows.");
-    v.field("silhouette", silhouette, "", "Weight of the silhouette's residual.");
-    v.field("normal", normal, "", "Weight of the residual of normals.");
+            "Photometric bundle adjustment of bodies that may deform and whose texture moves with them: "
+            "maximum number of steps for each blur of the photographs; 0: no adjustment.");
+    v.field("still", still, "",
+            "Bodies are not tracked if the mean error of their silhouettes at rest, over the video, is less "
+            "than this share of the masks' area; 0: bodies are always tracked.");
+    v.field("blur", blur, "pixels",
+            "Blur of the residuals at the first step; each further step has 0.7 of the blur before it.");
+    v.field("silhouette", silhouette, "", "Weight of the silhouette residual.");
+    v.field("normal", normal, "", "Weight of the normal residual.");
     v.field("colour", colour, "",
-            "Weight of the residual of colour, on bodies whose colour is seen to turn with them.");
+            "Weight of the colour residual, for bodies whose colour is found to rotate with them.");
     v.field("tracks", tracks, "",
-            "Weight of the capture's tracked points, on bodies that they are seen to turn with.");
+            "Weight of the capture's point tracks, for bodies with which the tracks are found to rotate.");
     v.field("new_surface", new_surface, "",
-            "Add surfels inside masks where no body has any, at each new time.");
+            "Add surfels inside masks where no body has any, at each new frame.");
     v.field("prior_turn", prior_turn, "",
-            "Turn normal priors in masks, once all times have been followed, by the one rotation in the "
-            "camera's axes that makes them agree with the normals of the rendered depth.");
+            "After tracking, rotate the normal priors in masks by one rotation in camera axes, so that they "
+            "agree with the normals of the rendered depth.");
     v.field("true_poses", true_poses, "",
-            "Take poses from the capture's true motion, for tests: an upper bound for tracking.");
+            "Use the poses of the capture's true motion, for tests: an upper bound for tracking.");
   }
   void validate() const;
 };
@@ -73,17 +74,21 @@ struct BendOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("nodes", nodes, "nodes", "Nodes of a body that bends; 0: bodies are rigid.");
-    v.field("every", every, "times", "Nodes have a turn and a shift at one of so many times.");
+    v.field("nodes", nodes, "nodes", "Number of nodes of a body that deforms; 0: bodies are rigid.");
+    v.field(
+        "every", every, "times",
+        "Nodes have a rotation and a translation at every n-th frame, with linear interpolation between.");
     v.field("misfit", misfit, "",
-            "Bodies bend where silhouettes are off by so many times as much as at the first time.");
+            "All bodies deform if the mean error of the silhouettes exceeds this many times the error in the "
+            "first view.");
     v.field("better", better, "",
-            "So do bodies whose photographs differ by so many times as much with nodes as without.");
+            "A body also deforms if its photometric cost with nodes is less than this share of its cost "
+            "without nodes.");
     v.field("strain", strain, "", "Weight of the loss that keeps neighbouring nodes together.");
     v.field("haste", haste, "", "Weight of the loss that keeps nodes slow.");
     v.field("travel", travel, "",
-            "Weight of the loss that keeps nodes at their anchors: where they were at first, or were "
-            "adjusted to.");
+            "Weight of the loss that keeps nodes near their anchors: their rest positions, or the result of "
+            "photometric bundle adjustment.");
   }
   void validate() const;
 };

@@ -31,23 +31,28 @@ struct ScheduleOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("length", length, "iterations",
-            "Length in which the schedule's marks are counted; runs scale them.");
+            "Length of the run for which the iteration numbers of the schedule are given; other lengths "
+            "scale them.");
     v.field("deform_from", deform_from, "iteration", "The main field starts (method §7.1).");
     v.field("normal_from", normal_from, "iteration", "The normal losses start (method §7.1).");
     v.field("specular_from", specular_from, "iteration",
-            "Phase 2: the environment trains alone (method §7.2).");
-    v.field("joint_from", joint_from, "iteration", "Phase 3: everything trains (method §7.3).");
+            "Phase 2 starts: the environment trains, and the main surfels are frozen except their tint and "
+            "roughness (method §7.2).");
+    v.field("joint_from", joint_from, "iteration", "Phase 3 starts: everything trains (method §7.3).");
     v.field("sh_every", sh_every, "iterations",
-            "The harmonics' degree grows by one this often (method §7.6).");
+            "Interval at which the degree of the spherical harmonics grows by one (method §7.6).");
     v.field("time_jitter", time_jitter, "frames",
-            "Noise on the time at the start, annealed to zero (method §7.6).");
-    v.field("time_jitter_until", time_jitter_until, "iteration", "Where the noise on the time ends.");
+            "Initial noise on the time; it falls to zero (method §7.6).");
+    v.field("time_jitter_until", time_jitter_until, "iteration", "The noise on the time ends.");
     v.field("first_times", first_times, "",
-            "Share of the capture's duration, from its start, whose views are trained on at first.");
+            "Without bodies, training first uses only views from the start of the capture, up to this share "
+            "of its duration.");
     v.field("all_times_from", all_times_from, "iteration",
-            "The share has grown to the whole duration, in proportion to the iterations.");
-    v.field("samples_from", samples_from, "iteration",
-            "From where on pixels have the samples of render.samples, before it one.");
+            "Training uses all views from this iteration on; until then the share of the duration "
+            "(schedule.first_times) grows linearly.");
+    v.field(
+        "samples_from", samples_from, "iteration",
+        "From this iteration on, pixels have the samples of render.samples; before, they have one sample.");
   }
   void validate() const;
 };
@@ -77,28 +82,35 @@ struct RateOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("position", position, "extents", "Positions, first iteration.");
-    v.field("position_end", position_end, "extents", "Positions, last iteration (log-linear between).");
-    v.field("sh", sh, "", "Harmonics of degree 0.");
-    v.field("sh_rest_divisor", sh_rest_divisor, "", "Higher harmonics learn this many times slower.");
-    v.field("opacity", opacity, "", "Opacity logits.");
-    v.field("log_scale", log_scale, "", "Log-scales.");
-    v.field("rotation", rotation, "", "Quaternions.");
-    v.field("tint", tint, "", "Specular-tint logits.");
-    v.field("roughness", roughness, "", "Logits of the roughness (initial.roughness).");
-    v.field("field", field, "", "Residual fields, first iteration.");
-    v.field("field_end", field_end, "", "Residual fields, last iteration (log-linear between).");
-    v.field("motion", motion, "radians", "Poses of bodies, first iteration; shifts in extents.");
+    v.field("position", position, "extents", "Learning rate of positions, first iteration.");
+    v.field("position_end", position_end, "extents",
+            "Learning rate of positions, last iteration (log-linear between).");
+    v.field("sh", sh, "", "Learning rate of the spherical harmonics of degree 0.");
+    v.field("sh_rest_divisor", sh_rest_divisor, "",
+            "The learning rate of higher degrees is that of degree 0 divided by this.");
+    v.field("opacity", opacity, "", "Learning rate of opacity logits.");
+    v.field("log_scale", log_scale, "", "Learning rate of log-scales.");
+    v.field("rotation", rotation, "", "Learning rate of quaternions.");
+    v.field("tint", tint, "", "Learning rate of specular-tint logits.");
+    v.field("roughness", roughness, "", "Learning rate of roughness logits (initial.roughness).");
+    v.field("field", field, "", "Learning rate of the residual fields, first iteration.");
+    v.field("field_end", field_end, "",
+            "Learning rate of the residual fields, last iteration (log-linear between).");
+    v.field("motion", motion, "radians",
+            "Learning rate of the poses of bodies, first iteration; translations in extents.");
     v.field("motion_end", motion_end, "radians",
-            "Poses of bodies, last iteration, of longer runs the 8,000th (log-linear, and on beyond it).");
-    v.field("lighting", lighting, "", "Logarithms of brightness (deform.lighting).");
-    v.field("map", map, "", "Environment map, first iteration.");
-    v.field("map_end", map_end, "", "Environment map, last iteration (log-linear between).");
+            "Learning rate of the poses of bodies, last iteration, or the 8,000th of longer runs (log-linear "
+            "between; it continues to fall after that).");
+    v.field("lighting", lighting, "", "Learning rate of the logarithm of brightness (deform.lighting).");
+    v.field("map", map, "", "Learning rate of the environment map, first iteration.");
+    v.field("map_end", map_end, "",
+            "Learning rate of the environment map, last iteration (log-linear between).");
     v.field("camera", camera, "radians",
-            "Poses of training cameras, first iteration, of the last a hundredth (log-linear); shifts in "
-            "extents. 0: they stay as the capture has them (not in the paper).");
-    v.field("beta1", beta1, "", "Adam's decay of the first moment.");
-    v.field("beta2", beta2, "", "Adam's decay of the second moment.");
+            "Learning rate of the poses of training cameras, first iteration; a hundredth of it at the last "
+            "iteration (log-linear between); translations in extents. 0: cameras are not refined (not in the "
+            "paper).");
+    v.field("beta1", beta1, "", "Adam's decay rate of the first moment.");
+    v.field("beta2", beta2, "", "Adam's decay rate of the second moment.");
     v.field("epsilon", epsilon, "", "Adam's ε.");
   }
   void validate() const;
@@ -122,28 +134,30 @@ struct LossOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("ssim", ssim, "", "Share of 1 - SSIM in the photometric loss; L1 takes the rest (method §7.4).");
-    v.field("normal", normal, "", "Normal consistency L_norm (method §7.4).");
+    v.field("ssim", ssim, "",
+            "Weight of 1 - SSIM in the photometric loss; L1 has the remaining weight (method §7.4).");
+    v.field("normal", normal, "", "Weight of the normal consistency L_norm (method §7.4).");
     v.field("normal_prior", normal_prior, "",
-            "Agreement with the capture's normal priors, L_tc-norm (method §7.4).");
+            "Weight of the agreement with the capture's normal priors, L_tc-norm (method §7.4).");
     v.field("normal_prior_on_mirrors", normal_prior_on_mirrors, "",
-            "Factor on normal priors where the tint is 1; it is 1 where the tint is 0 and while bodies are "
-            "followed (not in the paper).");
-    v.field("distortion", distortion, "", "Depth distortion (method §7.4).");
+            "Factor on the weight of normal priors where the tint is 1; the factor is 1 where the tint is 0 "
+            "and while bodies are tracked (not in the paper).");
+    v.field("distortion", distortion, "", "Weight of the depth distortion (method §7.4).");
     v.field("rigidity", rigidity, "",
-            "Neighbouring main surfels keep their distances while the field moves them (not in the paper).");
+            "Weight of the loss that keeps the distances between neighbouring main surfels while the field "
+            "moves them (not in the paper).");
     v.field("rigidity_strain", rigidity_strain, "",
-            "Relative stretch from which neighbours count as parted.");
+            "Relative stretch above which neighbours count as separated.");
     v.field("silhouette", silhouette, "",
-            "Bodies cover what the capture's masks cover (deform.kind = nodes; not in the paper).");
-    v.field(
-        "environment_residual", environment_residual, "",
-        "The environment stays as it is where no photograph needs it to change: the mean norm of what its "
-        "field adds to a surfel (not in the paper).");
-    v.field("lpips", lpips, "", "Perceptual distance LPIPS, late in training (method §7.4).");
-    v.field("lpips_from", lpips_from, "iteration", "Where that starts.");
+            "Weight of the loss that fits the silhouettes of bodies to the capture's masks (deform.kind = "
+            "nodes; not in the paper).");
+    v.field("environment_residual", environment_residual, "",
+            "Weight of the mean norm of what the environment's field adds to a surfel; it keeps the "
+            "environment constant unless photographs require a change (not in the paper).");
+    v.field("lpips", lpips, "", "Weight of the perceptual distance LPIPS, late in training (method §7.4).");
+    v.field("lpips_from", lpips_from, "iteration", "The LPIPS loss starts.");
     v.field("lpips_weights", lpips_weights, "",
-            "The network's weights, as scripts/export_lpips.py writes them.");
+            "File with the weights of the LPIPS network, as written by scripts/export_lpips.py.");
   }
   void validate() const;
 };
@@ -169,31 +183,33 @@ struct DensityOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("from", from, "iteration", "First density control.");
+    v.field("from", from, "iteration", "Density control starts.");
     v.field("every", every, "iterations", "Interval of density control.");
-    v.field("until", until, "iteration", "Where density control ends.");
+    v.field("until", until, "iteration", "Density control ends.");
     v.field("gradient_threshold", gradient_threshold, "",
-            "Mean centre gradient above which a surfel multiplies.");
-    v.field("clone_below", clone_below, "extents",
-            "Largest scale up to which it is cloned; above, it is split.");
-    v.field("clones_share_opacity", clones_share_opacity, "",
-            "A cloned surfel and its clone become so faint that together they cover what the surfel did.");
-    v.field("growth", growth, "",
-            "At most this share of the set multiplies at a time, the strongest signals first.");
-    v.field("prune_opacity", prune_opacity, "", "Surfels fainter than this go.");
-    v.field("prune_above", prune_above, "extents", "Surfels wider than this go.");
+            "Surfels whose mean centre gradient is above this are cloned or split.");
     v.field(
-        "prune_above_cloud", prune_above_cloud, "clouds",
-        "Likewise, in radii of the cloud of points; of the environment, in halves of its box's diagonal.");
+        "clone_below", clone_below, "extents",
+        "Surfels to clone or split are cloned if their larger scale is at most this, and split otherwise.");
+    v.field("clones_share_opacity", clones_share_opacity, "",
+            "A cloned surfel and its clone get a lower opacity, so that together they cover as much as the "
+            "one surfel did.");
+    v.field("growth", growth, "",
+            "Maximum share of the set that is cloned or split at a time, the strongest signals first.");
+    v.field("prune_opacity", prune_opacity, "", "Surfels with a lower opacity are removed.");
+    v.field("prune_above", prune_above, "extents", "Surfels with a larger scale are removed.");
+    v.field("prune_above_cloud", prune_above_cloud, "clouds",
+            "The same as prune_above, but in radii of the point cloud, or for the environment in halves of "
+            "the diagonal of its box; the smaller limit counts.");
     v.field("longest_needle", longest_needle, "clouds",
-            "Standard deviation that a surfel more than ten times as long as wide has at most; in the same "
-            "radii. 0: any.");
-    v.field("prune_above_from", prune_above_from, "iteration", "From where on the wide ones go.");
+            "Maximum standard deviation of surfels that are more than ten times as long as wide, in the unit "
+            "of prune_above_cloud; 0: no limit.");
+    v.field("prune_above_from", prune_above_from, "iteration", "The removal of large surfels starts.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
-            "Interval of opacity resets; 0 for none. None either where half of it, in the run's own "
-            "iterations, is under \"every\": opacities could not recover.");
-    v.field("opacity_reset", opacity_reset, "", "Opacity that a reset leaves at most.");
-    v.field("max_surfels", max_surfels, "surfels", "Hard cap on the set's size.");
+            "Interval of opacity resets; 0: no resets. There are also none if half the interval, in "
+            "iterations of this run, is less than \"every\", because opacities could not recover.");
+    v.field("opacity_reset", opacity_reset, "", "Maximum opacity after a reset.");
+    v.field("max_surfels", max_surfels, "surfels", "Maximum number of surfels in the set.");
   }
   void validate(const std::string& group) const;
 };
@@ -210,11 +226,13 @@ struct LightingOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("cells", cells, "cells",
-            "Cells of the grid along the longest side of the box around bodies; 0: the light stays.");
-    v.field("every", every, "times", "Brightness changes from one of so many times to the next.");
-    v.field("bodies", bodies, "", "Light on bodies changes too.");
-    v.field("size", size, "", "Weight of the loss on brightness other than 1.");
-    v.field("haste", haste, "", "Weight of the loss that keeps brightness slow.");
+            "Number of grid cells along the longest side of the box around bodies; 0: the brightness is "
+            "constant.");
+    v.field("every", every, "times",
+            "Brightness has values at every n-th frame, with linear interpolation between.");
+    v.field("bodies", bodies, "", "The brightness of bodies changes too.");
+    v.field("size", size, "", "Weight of the loss that keeps brightness near 1.");
+    v.field("haste", haste, "", "Weight of the loss that keeps changes of brightness slow.");
     v.field("roughness", roughness, "", "Weight of the loss that keeps brightness smooth in space.");
   }
   void validate() const;
@@ -235,14 +253,14 @@ struct DeformOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("kind", kind, "",
-            "How main surfels move: network (a residual field), or nodes (bodies, which masks or the film "
-            "show, are tracked and bend where they must; of all else the field moves what is seen to move; "
-            "network where there are none).");
-    v.field("main", main, "", "The main surfels move.");
-    v.field("environment", environment, "", "The environment moves.");
+            "How main surfels move: network (a residual field), or nodes (moving things in the masks or the "
+            "video are tracked as bodies and deform if needed; the field moves only other surfels that are "
+            "found to move; as network if there are no bodies).");
+    v.field("main", main, "", "The main surfels can move.");
+    v.field("environment", environment, "", "The environment can move.");
     v.field("find", find, "iterations",
-            "Without masks: training of a still scene that finds what moves, at most two fifths of the run "
-            "(kind = nodes); 0: nothing is looked for.");
+            "Without masks: training of a static scene to find what moves, at most two fifths of the run "
+            "(kind = nodes); 0: no search.");
     v.group("track", track);
     v.group("bend", bend);
     v.group("lighting", lighting);
@@ -274,34 +292,39 @@ struct InitialOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("max_points", max_points, "points", "At most this many of the capture's points become surfels.");
-    v.field("sh_degree", sh_degree, "", "Degree of the main surfels' harmonics.");
-    v.field("environment_sh_degree", environment_sh_degree, "", "Degree of the environment's harmonics.");
-    v.field("opacity", opacity, "", "First opacity of main surfels.");
-    v.field("tint", tint, "", "First specular tint; short schedules want 0.1.");
-    v.field(
-        "tint_in_mask", tint_in_mask, "",
-        "First tint of surfels that the capture's masks show on the moving object; 0: masks do not matter.");
-    v.field("tint_outside_mask", tint_outside_mask, "", "Then the first tint of the others.");
-    v.field(
-        "roughness", roughness, "",
-        "First roughness of mirrors: the standard deviation of the directions that one is mirrored into, as "
-        "a tangent; under 0.25. 0: all are perfect mirrors, as in the paper. With "
-        "specular=environment-map it has no effect (method §4.5).");
+    v.field("max_points", max_points, "points",
+            "Maximum number of the capture's points that become main surfels.");
+    v.field("sh_degree", sh_degree, "", "Degree of the main surfels' spherical harmonics.");
+    v.field("environment_sh_degree", environment_sh_degree, "",
+            "Degree of the environment's spherical harmonics.");
+    v.field("opacity", opacity, "", "Initial opacity of main surfels.");
+    v.field("tint", tint, "", "Initial specular tint; use 0.1 for short schedules.");
+    v.field("tint_in_mask", tint_in_mask, "",
+            "Initial tint of surfels inside the capture's masks of the moving object; 0: masks do not affect "
+            "the tint.");
+    v.field("tint_outside_mask", tint_outside_mask, "",
+            "Initial tint of the other surfels, if initial.tint_in_mask is not 0.");
+    v.field("roughness", roughness, "",
+            "Initial roughness of mirrors: the standard deviation of the mirrored directions, as a tangent, "
+            "under 0.25; 0: all are perfect mirrors, as in the paper. It has no effect with "
+            "specular=environment-map (method §4.5).");
     v.field("colours_from_views", colours_from_views, "",
-            "First colours from photographs near time 0, else grey.");
+            "Initial colours are those of photographs near time 0; otherwise grey.");
     v.field("normals_from_points", normals_from_points, "",
-            "First orientation from neighbouring points, else random.");
+            "Initial orientations are computed from neighbouring points; otherwise random.");
     v.field("environment_cells", environment_cells, "cells",
-            "Cells along each side of the environment's box.");
-    v.field("environment_per_cell", environment_per_cell, "surfels", "Environment surfels in each cell.");
-    v.field("environment_opacity", environment_opacity, "", "First opacity of environment surfels.");
-    v.field("environment_box", environment_box, "", "Size of that box, in boxes around cameras and points.");
+            "Number of cells along each side of the environment's box.");
+    v.field("environment_per_cell", environment_per_cell, "surfels",
+            "Number of environment surfels in each cell.");
+    v.field("environment_opacity", environment_opacity, "", "Initial opacity of environment surfels.");
+    v.field("environment_box", environment_box, "",
+            "Size of the environment's box, relative to the box around cameras and points.");
     v.field("environment_points", environment_points, "points",
-            "So many of the capture's points outside its masks start as environment surfels too.");
+            "Maximum number of the capture's points outside its masks that also become environment surfels.");
     v.field("far_size", far_size, "texels",
-            "Side of a face of the cube map behind the environment surfels; 0: none (method §5.4).");
-    v.field("map_size", map_size, "texels", "Side of a face of the environment map.");
+            "Side length of a face of the cube map behind the environment surfels; 0: no cube map (method "
+            "§5.4).");
+    v.field("map_size", map_size, "texels", "Side length of a face of the environment map.");
   }
   void validate() const;
 };
@@ -338,17 +361,17 @@ struct TrainOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("iterations", iterations, "iterations",
-            "Length of the run; every mark of the schedule scales with it.");
-    v.field("seed", seed, "", "Seed of every random choice.");
+            "Length of the run; all iteration numbers of the schedule scale with it.");
+    v.field("seed", seed, "", "Seed of all random choices.");
     v.field("specular", specular, "",
-            "Where reflections come from: none, environment-gaussians, environment-map.");
+            "Source of reflections: none, environment-gaussians, or environment-map.");
     v.field("memory_budget", memory_budget, "MiB",
-            "Memory that the run may take on its device; 0 for three quarters of what is free.");
+            "Maximum memory of the run on its device; 0: three quarters of the free memory.");
     v.field("save_every", save_every, "iterations", "Interval of checkpoints.");
     v.field("non_finite", non_finite, "",
-            "A gradient that is not finite stops the run, or is dropped and counted.");
+            "If a gradient is not finite: stop the run, or drop the gradient and count it.");
     v.field("collapse_decibels", collapse_decibels, "dB",
-            "Fall of the mean PSNR under its best that ends the run; 0: never.");
+            "The run ends if the mean PSNR falls by more than this below its best value; 0: never.");
     v.group("capture", capture);
     v.group("initial", initial);
     v.group("deform", deform);

@@ -45,21 +45,23 @@ struct CaptureOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("format", format, "",
-            "Layout of the capture: automatic (looks), nerfies (and HyperNeRF, NeRF-DS), dycheck, colmap, "
-            "transforms (NeRF-synthetic, instant-ngp, nerfstudio, D-NeRF).");
+            "Format of the capture: automatic (detected from its files), nerfies (also HyperNeRF, NeRF-DS), "
+            "dycheck, colmap, or transforms (NeRF-synthetic, instant-ngp, nerfstudio, D-NeRF).");
     v.field("downscale", downscale, "",
-            "Trains on images of 1/K the size: rgb/Kx or images_K where it exists, else box-filtered.");
+            "Use images of 1/K the size: from rgb/Kx or images_K if it exists, otherwise reduced with a box "
+            "filter.");
     v.field("times", times, "",
-            "When views were taken: automatic (as the format says), names (in the order of their names), "
-            "none (the scene stands still).");
-    v.field("test_every", test_every, "views",
-            "Every so many-th view tests where the format does not say which; 0: none.");
+            "Times of the views: automatic (as the format defines), names (order of the file names), or none "
+            "(a static scene).");
+    v.field(
+        "test_every", test_every, "views",
+        "Every n-th view is a test view, if the format does not define the test views; 0: no test views.");
     v.field("background", background, "",
-            "Colour behind transparent pixels: automatic (the format's custom), black, white, grey.");
+            "Colour behind transparent pixels: automatic (default of the format), black, white, or grey.");
     v.field("prior_axes", prior_axes, "",
             "Axes of the normal priors: automatic, opengl (x right, y up, z to the viewer), "
             "opencv, or stable-normal (opencv negated).");
-    v.field("cache_mebibytes", cache_mebibytes, "MiB", "Memory that decoded images may take.");
+    v.field("cache_mebibytes", cache_mebibytes, "MiB", "Maximum memory for decoded images.");
   }
   void validate() const;
 };

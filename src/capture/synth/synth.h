@@ -37,16 +37,16 @@ struct SynthOptions {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("scene", scene, "",
-            "What is seen: balls, mirror, tumble (things turned by hand) or soft (one that bends).");
-    v.field("frames", frames, "frames", "Times at which the left (training) camera takes a picture.");
-    v.field("width", width, "pixels", "Width of the pictures.");
-    v.field("height", height, "pixels", "Height of the pictures.");
-    v.field("seed", seed, "", "Seed of the picture noise, the priors' errors and the points.");
-    v.field("samples", samples, "paths/pixel", "Light paths for each pixel.");
+            "Scene: balls, mirror, tumble (objects turned as if by hand), or soft (an object that bends).");
+    v.field("frames", frames, "frames", "Number of frames that the left (training) camera takes.");
+    v.field("width", width, "pixels", "Width of the images.");
+    v.field("height", height, "pixels", "Height of the images.");
+    v.field("seed", seed, "", "Seed of the image noise, the errors of the priors and the points.");
+    v.field("samples", samples, "paths/pixel", "Light paths per pixel.");
     v.field("test_every", test_every, "frames", "The right (test) camera takes every n-th frame.");
     v.field("prior_noise", prior_noise, "",
-            "Errors of the normal priors: 0 exact, 1 as of a monocular estimator.");
-    v.field("points", points, "points", "Surface points at time 0.");
+            "Errors of the normal priors: 0 for exact priors, 1 for the errors of a monocular estimator.");
+    v.field("points", points, "points", "Number of surface points at time 0.");
   }
   void validate() const;
 };

@@ -28,13 +28,13 @@ struct DeviceArguments::State {
 };
 
 DeviceArguments::DeviceArguments(CLI::App& verb) : state_(std::make_shared<State>()) {
-  verb.add_option("--device", state_->device, "auto (CUDA where a device answers), cpu or cuda")
+  verb.add_option("--device", state_->device, "auto (CUDA if a device is available), cpu or cuda")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->option_text("DEVICE")
       ->capture_default_str();
   verb.add_flag("--deterministic", state_->deterministic,
-                "On CUDA: sums in a fixed order, the same bytes every run, somewhat slower. On the CPU they "
-                "always are");
+                "On CUDA: sum in a fixed order, so that every run gives the same bytes; somewhat slower. The "
+                "CPU always does this");
 }
 
 Device DeviceArguments::choose(bool quiet) const {

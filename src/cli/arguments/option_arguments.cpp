@@ -125,7 +125,7 @@ OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>&
       ->expected(1)
       ->take_all()
       ->group("Settings");
-  verb.add_option("--config", state_->config, "A TOML file of options; --set and flags come after it")
+  verb.add_option("--config", state_->config, "TOML file of options; --set and flags override it")
       ->option_text("FILE")
       ->group("Settings");
 }

@@ -28,18 +28,18 @@ ServerArguments::ServerArguments(CLI::App& verb, CLI::Option* needs) : state_(st
     if (needs != nullptr) option->needs(needs);
     return option;
   };
-  for_viewer(verb.add_option("--port", state_->port, "Port of the viewer's page; 0 for any [7180, or any]"))
+  for_viewer(verb.add_option("--port", state_->port,
+                             "Port of the viewer's page; 0: any free port [7180, or any free port]"))
       ->check(CLI::Range(0, 65535))
       ->option_text("PORT");
   for_viewer(
       verb.add_option("--bind", state_->bind,
-                      "Address to listen on; others than 127.0.0.1 can be reached from other machines"))
+                      "Address to listen on; any address but 127.0.0.1 can be reached from other machines"))
       ->option_text("ADDRESS")
       ->capture_default_str();
-  for_viewer(
-      verb.add_option("--allow-host", state_->allowed_hosts,
-                      "NAME:PORT that the page is opened under, where it is reached by another way; may be "
-                      "repeated"))
+  for_viewer(verb.add_option("--allow-host", state_->allowed_hosts,
+                             "NAME:PORT in the page's address, if it is not the server's own, as behind a "
+                             "proxy; may be repeated"))
       ->option_text("NAME:PORT");
 }
 

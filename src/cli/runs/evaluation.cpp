@@ -65,20 +65,20 @@ void put_log(const std::filesystem::path& log, eval::ReportPage& page) {
 }  // namespace
 
 void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& a) {
-  verb.add_option("RUN", a.run, "Folder of the run")->required();
+  verb.add_option("RUN", a.run, "The run's folder")->required();
   verb.add_option("--split", a.split, "Views to measure: test or train")
       ->check(CLI::IsMember({"test", "train"}))
       ->capture_default_str();
   verb.add_option("-d,--data", a.capture,
-                  "The capture, a folder or a zip archive, where it is not where the run found it")
+                  "The capture, a folder or a zip archive, if it has moved since training")
       ->option_text("CAPTURE");
-  verb.add_option("--downscale", a.downscale, "Measure at another size than the run was trained at")
+  verb.add_option("--downscale", a.downscale,
+                  "Measure at 1/K of the full image size; default: the size used in training")
       ->check(CLI::Range(1, 64));
-  verb.add_flag(
-      "--align-cameras", a.align_cameras,
-      "Also measure with cameras from which the scene looks most like the photographs; always where "
-      "the run refined its cameras and held-out views are measured");
-  verb.add_option("--lpips", a.lpips, "Weights for LPIPS, as scripts/export_lpips.py writes them")
+  verb.add_flag("--align-cameras", a.align_cameras,
+                "Also measure with cameras aligned to the photographs; always on for held-out views of a run "
+                "that refined its cameras");
+  verb.add_option("--lpips", a.lpips, "Weights of the LPIPS network, as written by scripts/export_lpips.py")
       ->envname("TRACEFLOW_LPIPS");
 }
 

@@ -239,35 +239,39 @@ void ShotArguments::check() const {
 }
 
 void add_shot_arguments(CLI::App& verb, ShotArguments& a) {
-  verb.add_option("--split", a.split, "The capture's views of this split: test (default) or train")
+  verb.add_option("--split", a.split, "Cameras of the capture's views in this split: test (default) or train")
       ->check(CLI::IsMember({"test", "train"}));
-  verb.add_option("--cameras", a.cameras, "Cameras, a cameras.json as 3DGS and 2DGS write it");
-  verb.add_option("--camera-path", a.camera_path, "A smooth path through keyframes, as the viewer saves it");
-  verb.add_flag("--orbit", a.orbit, "A path around what the cameras look at");
-  verb.add_flag("--spiral", a.spiral, "A spiral around the cameras' mean, as LLFF and NeRF film");
+  verb.add_option("--cameras", a.cameras, "Cameras of a cameras.json, as written by 3DGS and 2DGS");
+  verb.add_option("--camera-path", a.camera_path,
+                  "Smooth path through keyframes, from a file that the viewer saved");
+  verb.add_flag("--orbit", a.orbit, "Path around the point that the cameras look at");
+  verb.add_flag("--spiral", a.spiral, "Spiral around the mean of the cameras, as in LLFF and NeRF");
   verb.add_option("--freeze-camera", a.freeze_camera,
-                  "One captured view's camera, by its id or its place in --split, while time runs")
+                  "Camera of one captured view, by its id or its index in --split (from 0), while time runs")
       ->option_text("ID|N");
-  verb.add_option("--time,--freeze-time", a.time, "One time for all pictures, 0 to 1; else each its own")
+  verb.add_option("--time,--freeze-time", a.time,
+                  "One time for all pictures, 0 to 1; otherwise each has its own")
       ->check(CLI::Range(0.0, 1.0));
-  verb.add_option(
-          "--frames", a.frames,
-          fmt::format("Frames of an orbit or a spiral ({}), or of a frozen camera (the capture's times)",
-                      usual_frames))
+  verb.add_option("--frames", a.frames,
+                  fmt::format("Number of frames of an orbit or a spiral (default {}), or of a frozen camera "
+                              "(default: the capture's times)",
+                              usual_frames))
       ->check(CLI::Range(1, 100000));
   verb.add_option_function<std::string>(
           "--size", [&a](const std::string& text) { a.size = parse_size(text); },
-          "Size of the pictures of a path; else the cameras', or 640x360 for a .ply's orbit")
+          "Size of the pictures of a path; default: that of the cameras, or 640x360 for the orbit of a .ply")
       ->option_text("WIDTHxHEIGHT");
-  verb.add_option("--fps", a.frames_per_second, "Frames a second of a film; 30, or what the camera path says")
+  verb.add_option("--fps", a.frames_per_second,
+                  "Frames per second of the video; default: 30, or the value in the camera path")
       ->check(CLI::Range(0.1, 1000.0));
   verb.add_flag(
       "--compare", a.compare,
-      "Put the photograph left of the render: of captured views, or at each time of a frozen camera");
+      "Put the photograph left of the render, for captured views or at each time of a frozen camera");
   verb.add_option("-d,--data", a.capture,
-                  "The capture, a folder or a zip archive, where it is not where the run found it")
+                  "The capture, a folder or a zip archive, if it has moved since training")
       ->option_text("CAPTURE");
-  verb.add_option("--downscale", a.downscale, "Another size of the capture than the run was trained at")
+  verb.add_option("--downscale", a.downscale,
+                  "Use the capture at 1/K of the full image size; default: the size used in training")
       ->check(CLI::Range(1, 64));
 }
 

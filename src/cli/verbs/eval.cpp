@@ -56,13 +56,14 @@ void add_eval(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("eval", "Measure a run on views of its capture");
   const auto a = std::make_shared<EvalArguments>();
   add_evaluation_arguments(*verb, a->evaluation);
-  verb->add_option("--layers", a->layers, "Layers to write as pictures, with commas between; all; or none")
+  verb->add_option("--layers", a->layers, "Layers to write as pictures, separated by commas; all; or none")
       ->capture_default_str();
-  verb->add_option("--contact-sheet", a->sheet, "Also write one picture of every layer of a few views");
-  verb->add_option("--sheet-views", a->sheet_views, "Views on the contact sheet")
+  verb->add_option("--contact-sheet", a->sheet,
+                   "Also write one picture with every layer of some views to this file");
+  verb->add_option("--sheet-views", a->sheet_views, "Number of views on the contact sheet")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  verb->add_option("--sheet-width", a->sheet_width, "Columns of one picture on it, pixels")
+  verb->add_option("--sheet-width", a->sheet_width, "Width of each picture on the contact sheet, in pixels")
       ->check(CLI::Range(16, 4096))
       ->capture_default_str();
   const DeviceArguments devices(*verb);

@@ -37,12 +37,13 @@ void run_export(const ExportArguments& a) {
 void add_export(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("export", "Write a run's surfels as 2DGS .ply files");
   const auto a = std::make_shared<ExportArguments>();
-  verb->add_option("RUN", a->run, "Folder of the run")->required();
-  verb->add_option("-o,--output", a->output, "Folder for main.ply and environment.ply")->required();
-  CLI::Option* time = verb->add_option("--time", a->time, "Time at which the surfels are posed, 0 to 1")
+  verb->add_option("RUN", a->run, "The run's folder")->required();
+  verb->add_option("-o,--output", a->output, "Output folder for main.ply and environment.ply")->required();
+  CLI::Option* time = verb->add_option("--time", a->time, "Time of the exported surfels, 0 to 1")
                           ->check(CLI::Range(0.0, 1.0))
                           ->capture_default_str();
-  verb->add_flag("--undeformed", a->undeformed, "The surfels as they are stored, without the residual fields")
+  verb->add_flag("--undeformed", a->undeformed,
+                 "Export the surfels as they are stored, without motion and light changes")
       ->excludes(time);
   verb->callback([a] { run_export(*a); });
 }

@@ -49,11 +49,13 @@ void add_inspect(CLI::App& program) {
       ->required()
       ->option_text("CAPTURE");
   verb->add_flag("--json", arguments->as_json, "Print one JSON object (docs/inspect.md)");
-  verb->add_option("--picture", arguments->picture, "Draw views, cameras and points into this PNG")
+  verb->add_option("--picture", arguments->picture, "Draw views, cameras and points into this PNG file")
       ->option_text("FILE");
-  verb->add_flag("--quick", arguments->quick, "Decode 32 views of each split and do not compare neighbours");
+  verb->add_flag("--quick", arguments->quick,
+                 "Decode only 32 views of each split, and do not compare neighbours");
   verb->add_option("--preset", arguments->preset_name,
-                   "Whose memory is told, with the settings below, whose defaults are paper's: as in train")
+                   "Preset whose training memory is estimated, with the settings below, as in train; the "
+                   "defaults shown are those of paper")
       ->option_text("NAME")
       ->capture_default_str();
   const auto defaults = std::make_shared<TrainOptions>(preset(arguments->preset_name));

@@ -143,20 +143,21 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
 void add_render(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("render", "Render a run or a 2DGS .ply");
   const auto a = std::make_shared<RenderArguments>();
-  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder that export wrote")
+  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder written by export")
       ->required();
-  verb->add_option("-o,--output", a->output, "Folder for LAYER/NAME.png or .npy");
-  verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
+  verb->add_option("-o,--output", a->output, "Output folder for LAYER/NAME.png or .npy");
+  verb->add_option("--environment", a->environment,
+                   "A second .ply, with the surfels that the first one reflects");
   add_shot_arguments(*verb, a->shots);
-  verb->add_option(
-          "--layers", a->layers,
-          "Of rgb, diffuse, specular, tint, roughness, alpha, normal, depth, median-depth, distortion, "
-          "surfels, tracks, with commas between; or all")
+  verb->add_option("--layers", a->layers,
+                   "Layers to render, separated by commas: rgb, diffuse, specular, tint, roughness, alpha, "
+                   "normal, depth, median-depth, distortion, surfels, tracks; or all")
       ->capture_default_str();
-  verb->add_option("--format", a->format, "png for the eye or npy (float32)")
+  verb->add_option("--format", a->format,
+                   "Format of the output files: png (for viewing) or npy (float32 values)")
       ->check(CLI::IsMember({"png", "npy"}))
       ->capture_default_str();
-  verb->add_option("--video", a->video, "Film of the first layer, by ffmpeg: FILE.mp4");
+  verb->add_option("--video", a->video, "Video of the first layer, encoded with ffmpeg: FILE.mp4");
   const auto defaults = std::make_shared<RenderOptions>();
   const OptionArguments options(*verb, option_fields(*defaults));
   verb->footer(

@@ -34,7 +34,7 @@ void add_report(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("report", "Make one HTML page of all that is known of a run");
   const auto a = std::make_shared<ReportArguments>();
   add_evaluation_arguments(*verb, a->evaluation);
-  verb->add_option("-o,--output", a->output, "The page; RUN/report.html unless said");
+  verb->add_option("-o,--output", a->output, "Output file; default: RUN/report.html");
   const DeviceArguments devices(*verb);
   verb->callback([a, devices] { run_report(*a, devices); });
 }

@@ -17,7 +17,8 @@ void add_synth(CLI::App& program) {
   CLI::App* verb =
       program.add_subcommand("synth", "Make a synthetic capture of moving things, with its truth");
   const auto arguments = std::make_shared<Arguments>();
-  verb->add_option("OUT", arguments->folder, "Folder to fill: new, empty, or an earlier synthetic capture")
+  verb->add_option("OUT", arguments->folder,
+                   "Output folder: new, empty, or an earlier synthetic capture, which is replaced")
       ->required();
   const OptionArguments flags(*verb, option_fields(arguments->options));
   verb->callback([arguments, flags] {

@@ -67,11 +67,12 @@ void add_trace(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("trace", "Trace rays through the surfels of a .ply");
   const auto a = std::make_shared<TraceArguments>();
   a->options.t_min = 0;
-  verb->add_option("FILE", a->ply, "Surfels, a 2DGS .ply")->required();
+  verb->add_option("FILE", a->ply, "The surfels, a 2DGS .ply")->required();
   verb->add_option("--rays", a->rays,
-                   "Rays, a .npy of Nx6: origin and direction; or Nx7: the width of a cone too")
+                   "The rays, a .npy of Nx6 (origin and direction) or Nx7 (also the width of a cone)")
       ->required();
-  verb->add_option("-o,--output", a->output, "Folder for colour.npy, alpha.npy and distance.npy")->required();
+  verb->add_option("-o,--output", a->output, "Output folder for colour.npy, alpha.npy and distance.npy")
+      ->required();
   const OptionArguments options(*verb, option_fields(a->options));
   const DeviceArguments devices(*verb);
   verb->callback([a, options, devices] {

@@ -227,22 +227,21 @@ void add_train(CLI::App& program) {
   auto arguments = std::make_shared<TrainArguments>();
   verb->add_option("-d,--data", arguments->data, "The capture: a folder or a zip archive")
       ->option_text("CAPTURE");
-  verb->add_option("-o,--output", arguments->output, "The run's folder: checkpoints and log")
+  verb->add_option("-o,--output", arguments->output, "The run's folder, for checkpoints and log")
       ->required()
       ->option_text("RUN");
   arguments->preset =
-      verb->add_option(
-              "--preset", arguments->preset_name,
-              "paper (60,000 iterations; its values are the defaults below), cpu (a quarter of an hour on "
-              "two cores at 240x135) or demo (minutes)")
+      verb->add_option("--preset", arguments->preset_name,
+                       "Preset: paper (60,000 iterations; its values are the defaults below), cpu (a quarter "
+                       "of an hour on two cores at 240x135) or demo (a few minutes)")
           ->option_text("NAME")
           ->capture_default_str();
   verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint, with its settings");
-  verb->add_flag("-q,--quiet", arguments->quiet, "Print nothing but warnings and errors");
+  verb->add_flag("-q,--quiet", arguments->quiet, "Print only warnings and errors");
   CLI::Option* view =
       verb->add_flag("--view", arguments->view, "Show the training in a browser (docs/view.md)");
   verb->add_option("--view-share", arguments->view_options.share,
-                   "Share of the time that the page may take while somebody looks")
+                   "Maximum share of the training time that open pages may use")
       ->needs(view)
       ->option_text("X")
       ->capture_default_str();

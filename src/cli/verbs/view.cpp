@@ -71,13 +71,16 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
 void add_view(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("view", "Look at a run or a .ply in a browser");
   const auto a = std::make_shared<ViewArguments>();
-  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder that export wrote")
+  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder written by export")
       ->required();
-  verb->add_option("--environment", a->environment, "Surfels that a .ply reflects, a .ply as well");
-  verb->add_option("-d,--data", a->capture,
-                   "The capture, a folder or a zip archive, where it is not where the run found it")
+  verb->add_option("--environment", a->environment,
+                   "A second .ply, with the surfels that the first one reflects");
+  verb->add_option(
+          "-d,--data", a->capture,
+          "The capture, a folder or a zip archive, if it has moved since training or SCENE is a .ply")
       ->option_text("CAPTURE");
-  verb->add_option("--downscale", a->downscale, "Another size of the capture than the run was trained at")
+  verb->add_option("--downscale", a->downscale,
+                   "Use the capture at 1/K of the full image size; default: the size used in training")
       ->check(CLI::Range(1, 64));
   const ServerArguments where(*verb);
   const DeviceArguments devices(*verb);

@@ -37,10 +37,10 @@ struct SelectOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.field("min_alpha", min_alpha, "", "Alpha under which a pixel reflects nothing (method §4.4).");
-    v.field("min_tint", min_tint, "", "Specular tint under which a pixel is not traced (method §4.4).");
+    v.field("min_alpha", min_alpha, "", "Pixels with a lower alpha reflect nothing (method §4.4).");
+    v.field("min_tint", min_tint, "", "Pixels with a lower specular tint are not traced (method §4.4).");
     v.field("probe_share", probe_share, "",
-            "Share of the other pixels that training traces, so that a tint can grow.");
+            "Share of the pixels below min_tint that training traces anyway, so that their tint can grow.");
   }
   void validate() const;
 };

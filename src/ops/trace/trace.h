@@ -25,12 +25,13 @@ struct Options {
   template <class Visitor>
   void visit(Visitor& v) {
     v.field("t_min", t_min, "scene units", "Hits nearer than this are ignored (method §5.2).");
-    v.field("alpha_min", alpha_min, "", "Opacity under which a hit is skipped (method §3.3).");
-    v.field("alpha_max", alpha_max, "", "Opacity at which a hit is clamped (method §3.3).");
+    v.field("alpha_min", alpha_min, "", "Hits with a lower opacity are skipped (method §3.3).");
+    v.field("alpha_max", alpha_max, "", "Maximum opacity of a hit; higher values are clamped (method §3.3).");
     v.field("transmittance_min", transmittance_min, "",
-            "A ray ends before its transmittance falls under this.");
-    v.field("hits_per_pass", hits_per_pass, "hits",
-            "Hits gathered before looking whether a ray has ended; changes speed, not the image.");
+            "A ray ends before its transmittance falls below this.");
+    v.field(
+        "hits_per_pass", hits_per_pass, "hits",
+        "Number of hits collected before testing whether a ray has ended; affects the speed, not the image.");
   }
   void validate() const;
 };
