@@ -132,24 +132,26 @@ bool cublas_lt_answers(std::string&) { return true; }
 bool supported(const GemmDescription& gemm) { return epilogues_allowed || !gemm.has_epilogue(); }
 void allow_epilogues(bool allowed) { epilogues_allowed = allowed; }
 
-void multiply(const GemmDescription& p, const GemmAddresses& at) {
+void multiply(const GemmDescription& gemm, const GemmAddresses& at) {
   const profile::Scope scope("matrix product");
-  require(supported(p), "the product is supported");
-  check(p);
-  check(p, at);
+  require(supported(gemm), "the product is supported");
+  check(gemm);
+  check(gemm, at);
   const emulation::DeviceAccess access;
-  std::vector<float> row(static_cast<size_t>(p.n));
-  for (int64_t batch = 0; batch < p.batches; ++batch) {
-    const auto a = dense(p.operands, at.a, batch * p.batch_a, p.m, p.k, p.stride_a, p.transposed_a);
-    const auto b = dense(p.operands, at.b, batch * p.batch_b, p.k, p.n, p.stride_b, p.transposed_b);
-    for (int64_t i = 0; i < p.m; ++i) {
+  std::vector<float> row(static_cast<size_t>(gemm.n));
+  for (int64_t batch = 0; batch < gemm.batches; ++batch) {
+    const auto a =
+        dense(gemm.operands, at.a, batch * gemm.batch_a, gemm.m, gemm.k, gemm.stride_a, gemm.transposed_a);
+    const auto b =
+        dense(gemm.operands, at.b, batch * gemm.batch_b, gemm.k, gemm.n, gemm.stride_b, gemm.transposed_b);
+    for (int64_t i = 0; i < gemm.m; ++i) {
       std::fill(row.begin(), row.end(), 0.0F);
-      for (int64_t l = 0; l < p.k; ++l) {
-        const float factor = a[static_cast<size_t>(i * p.k + l)];
-        const float* const from = b.data() + l * p.n;
-        for (int64_t j = 0; j < p.n; ++j) row[static_cast<size_t>(j)] += factor * from[j];
+      for (int64_t l = 0; l < gemm.k; ++l) {
+        const float factor = a[static_cast<size_t>(i * gemm.k + l)];
+        const float* const from = b.data() + l * gemm.n;
+        for (int64_t j = 0; j < gemm.n; ++j) row[static_cast<size_t>(j)] += factor * from[j];
       }
-      finish_row(p, at, batch, i, row);
+      finish_row(gemm, at, batch, i, row);
     }
   }
 }

@@ -224,7 +224,7 @@ LossValues Trainer::step() {
   evaluate_objective(inputs, {grad_frame_, grad_rest_}, means_);
   leave_unknown(target, grad_frame_.colour);
   if (review_) review_(frame, target, grad_frame_);
-  const LossValues terms = means_.read();
+  LossValues terms = means_.read();
   const bool learns = std::isfinite(terms.total);
   if (learns) learn(view, frame, request, trainable);
   ++iteration_;

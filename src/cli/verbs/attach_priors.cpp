@@ -19,7 +19,7 @@ void add_attach_priors(CLI::App& program) {
     prepare::AttachOptions options;
   };
   CLI::App* verb = program.add_subcommand("attach-priors",
-                                          "Put normals, masks and tracks of other programs into a capture.");
+                                          "Add normals, masks and tracks of other programs to a capture.");
   const auto a = std::make_shared<Arguments>();
   verb->add_option("-d,--data", a->capture, "The capture's folder")->required()->option_text("CAPTURE");
   const OptionArguments given(*verb, option_fields(a->options));

@@ -53,7 +53,7 @@ void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
 }  // namespace
 
 void add_eval(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("eval", "Measure a run on views of its capture");
+  CLI::App* verb = program.add_subcommand("eval", "Measure a run on the views of its capture");
   const auto a = std::make_shared<EvalArguments>();
   add_evaluation_arguments(*verb, a->evaluation);
   verb->add_option("--layers", a->layers, "Layers to write as pictures, separated by commas; all; or none")

@@ -43,7 +43,7 @@ void inspect_capture(const InspectArguments& arguments, const OptionArguments& g
 
 void add_inspect(CLI::App& program) {
   CLI::App* verb =
-      program.add_subcommand("inspect", "Tell what a capture holds, what it lacks, and what looks wrong.");
+      program.add_subcommand("inspect", "List what a capture holds and lacks, and what looks wrong.");
   const auto arguments = std::make_shared<InspectArguments>();
   verb->add_option("-d,--data", arguments->data, "The capture: a folder or a zip archive")
       ->required()

@@ -57,7 +57,7 @@ void run_prepare(const PrepareArguments& a) {
 }  // namespace
 
 void add_prepare(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("prepare", "Make a capture of a film, with ffmpeg and COLMAP.");
+  CLI::App* verb = program.add_subcommand("prepare", "Make a capture from a video, with ffmpeg and COLMAP.");
   const auto a = std::make_shared<PrepareArguments>();
   verb->add_option("INPUT", a->input, "A video, or a folder of images")->required();
   verb->add_option("-o,--output", a->capture, "The capture's folder")->required()->option_text("CAPTURE");

@@ -31,7 +31,7 @@ void run_report(const ReportArguments& a, const DeviceArguments& devices) {
 }  // namespace
 
 void add_report(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("report", "Make one HTML page of all that is known of a run");
+  CLI::App* verb = program.add_subcommand("report", "Write an HTML report of a run");
   const auto a = std::make_shared<ReportArguments>();
   add_evaluation_arguments(*verb, a->evaluation);
   verb->add_option("-o,--output", a->output, "Output file; default: RUN/report.html");

@@ -15,7 +15,7 @@ void add_synth(CLI::App& program) {
     SynthOptions options;
   };
   CLI::App* verb =
-      program.add_subcommand("synth", "Make a synthetic capture of moving things, with its truth");
+      program.add_subcommand("synth", "Make a synthetic capture of moving objects, with ground truth");
   const auto arguments = std::make_shared<Arguments>();
   verb->add_option("OUT", arguments->folder,
                    "Output folder: new, empty, or an earlier synthetic capture, which is replaced")

@@ -84,8 +84,8 @@ Answer answer(const RequestGuard& guard, std::span<const EmbeddedFile> page, con
   return found;
 }
 
-Answer plain_answer(int status, std::string words) {
-  Answer answer{status, "text/plain; charset=utf-8", std::move(words) + "\n", {}};
+Answer plain_answer(int status, std::string text) {
+  Answer answer{status, "text/plain; charset=utf-8", std::move(text) + "\n", {}};
   if (status == 405) answer.fields.emplace_back("Allow", "GET, HEAD");
   if (status == 426) answer.fields.emplace_back("Upgrade", "websocket");
   return answer;
