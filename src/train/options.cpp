@@ -49,7 +49,6 @@ TrainOptions cpu_preset() {
   o.loss.normal_prior = 0.3F;
   o.loss.normal_prior_on_mirrors = 7;
   o.loss.rigidity = 0.05F;
-  o.loss.environment_residual = 0.03F;
   o.rates.position = 1.5e-3F;
   o.rates.position_end = 1.5e-5F;
   o.rates.tint = 0.003F;
@@ -89,7 +88,6 @@ TrainOptions demo_preset() {
   o.density.max_surfels = 16000;
   o.initial.max_points = 8000;
   o.environment_density.max_surfels = 8000;
-  o.loss.environment_residual = 0;  // the scene that its balls mirror moves
   return o;
 }
 
