@@ -24,6 +24,20 @@ void expect_near(const Tensor<float>& a, const Tensor<float>& b, float tolerance
     ASSERT_NEAR(a[i], b[i], tolerance * (1 + std::abs(b[i]))) << name << " " << i;
 }
 
+TEST(Visibility, AllowsForTheLargestDisplacement) {
+  Fixture f;
+  const Camera<float>& camera = f.request.camera;
+  const Vec3<float> aside = camera.position + Vec3<float>(-10, 0, 3) * camera.camera_from_world;
+  for (int64_t i = 0; i < f.scene.main.count(); ++i) store3(f.scene.main.position.row(i), aside);
+  f.scene.main.log_scale.fill(-5);
+  Tensor<float> moved({1});
+  for (const float far : {1.0F, 20.0F}) {
+    moved[0] = far;
+    EXPECT_EQ(surfels_in_view(f.scene.main, camera, 0.01F, moved.data()).size(),
+              far > 10 ? f.scene.main.count() : 0);
+  }
+}
+
 TEST(Renderer, CullingChangesNoPixel) {
   Fixture f;
   Renderer renderer(RenderOptions{});
