@@ -24,6 +24,23 @@ void expect_near(const Tensor<float>& a, const Tensor<float>& b, float tolerance
     ASSERT_NEAR(a[i], b[i], tolerance * (1 + std::abs(b[i]))) << name << " " << i;
 }
 
+TEST(ConeWidths, GradientAgreesWithCentralDifferences) {
+  const int32_t pixel = 0;
+  const float roughness = 0.2F, alpha = 0.8F, step = 1e-3F, grad_width = 3;
+  const auto width_of = [&](float r, float a) {
+    float width = 0;
+    ConeWidths{&pixel, &r, &a, &width}(0);
+    return width;
+  };
+  const float width = width_of(roughness, alpha);
+  float by_roughness = 0, by_alpha = 0;
+  ConeWidthsBackward{&pixel, &alpha, &width, &grad_width, &by_roughness, &by_alpha}(0);
+  const auto slope = [&](float high, float low) { return grad_width * (high - low) / (2 * step); };
+  EXPECT_NEAR(by_roughness, slope(width_of(roughness + step, alpha), width_of(roughness - step, alpha)),
+              1e-3);
+  EXPECT_NEAR(by_alpha, slope(width_of(roughness, alpha + step), width_of(roughness, alpha - step)), 1e-3);
+}
+
 TEST(Visibility, AllowsForTheLargestDisplacement) {
   Fixture f;
   const Camera<float>& camera = f.request.camera;
