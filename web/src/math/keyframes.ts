@@ -55,7 +55,7 @@ export function rounded_path(path: CameraPath): CameraPath {
   return { ...path, keyframes };
 }
 
-// The ranges of what a path holds are those of src/show/camera_path.cpp.
+// The ranges of what a path holds are those of src/viz/cameras/camera_path.cpp.
 const is_number = (x: unknown): x is number => typeof x === 'number' && Number.isFinite(x);
 const is_in = (x: unknown, low: number, high: number): x is number => is_number(x) && x >= low && x <= high;
 const is_side = (x: unknown): x is number => is_in(x, 1, 16384) && Number.isInteger(x);
