@@ -103,10 +103,13 @@ void ssim_metric_on_device(benchmark::State& state) {
 
 void normal_consistency_on_device(benchmark::State& state) {
   if (bench::no_device(state)) return;
+  const Shape shape{bench::frame_height, bench::frame_width};
+  const Tensor<float> alpha = bench::noise_on_device(shape, 0, 1, 3);
+  Tensor<float> grad_alpha(shape, Device::cuda);
   measure_on_device(
-      state, 3, floor_of(6, 6),
-      [](const auto& normal, const auto& pseudo, auto& gradient, auto& other, const auto& slot) {
-        loss::normal_consistency(normal, pseudo, 0.05, gradient, other, slot);
+      state, 3, floor_of(7, 7),
+      [&](const auto& normal, const auto& pseudo, auto& gradient, auto& other, const auto& slot) {
+        loss::normal_consistency(normal, alpha, pseudo, 0.05, gradient, grad_alpha, other, slot);
       });
 }
 

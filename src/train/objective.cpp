@@ -39,9 +39,10 @@ std::span<const LossTerm> loss_terms() {
        }},
       {"normal", normal_weight,
        [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         g.frame.alpha.reset(in.frame.raster.alpha.shape());
          g.frame.pseudo_normal.reset(in.frame.raster.normal.shape());
-         loss::normal_consistency(in.frame.raster.normal, in.frame.pseudo_normal, weight, g.frame.normal,
-                                  g.frame.pseudo_normal, slot);
+         loss::normal_consistency(in.frame.raster.normal, in.frame.raster.alpha, in.frame.pseudo_normal,
+                                  weight, g.frame.normal, g.frame.alpha, g.frame.pseudo_normal, slot);
        }},
       {"normal_prior", normal_prior_weight,
        [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
@@ -128,7 +129,7 @@ void evaluate_objective(const LossInputs& inputs, const LossGradient& gradient, 
   const Shape none{0};
   gradient.frame.colour.place(device).reset(frame.colour.shape());
   gradient.frame.silhouette.place(device).reset(frame.raster.silhouette.shape());
-  for (Tensor<float>* unused : {&gradient.frame.pseudo_normal, &gradient.frame.distortion,
+  for (Tensor<float>* unused : {&gradient.frame.pseudo_normal, &gradient.frame.alpha, &gradient.frame.distortion,
                                 &gradient.frame.main_position, &gradient.frame.environment_residuals})
     unused->place(device).reset(none);
   gradient.rest.place(device).reset(none);

@@ -160,7 +160,8 @@ class Graph {
     for (int64_t i = 0; i < by_mean.size(); ++i) by_mean[i] *= -raster_.depth[i];
     const Tensor<double> own = shared_among_samples(grad_.depth, &weights_, &sampled_.depth, n);
     g.alpha = shared_among_samples(by_mean, &weights_, nullptr, n);
-    for (int64_t i = 0; i < own.size(); ++i) g.alpha[i] += own[i];
+    const Tensor<double> direct = shared_among_samples(grad_.alpha, nullptr, nullptr, n);
+    for (int64_t i = 0; i < own.size(); ++i) g.alpha[i] += own[i] + direct[i];
     return g;
   }
 
@@ -235,12 +236,13 @@ class Graph {
   double losses() {
     grad_colour_.reset(colour_.shape());
     grad_.normal.reset(raster_.normal.shape());
+    grad_.alpha.reset(raster_.alpha.shape());
     grad_pseudo_.reset(raster_.normal.shape());
     const Weights& w = s_.weights;
     double total = w.l1 * loss::l1_reference(colour_, s_.target, w.l1, grad_colour_);
     total += w.ssim * loss::ssim_loss_reference(colour_, s_.target, w.ssim, grad_colour_);
-    total += w.normal * loss::normal_consistency_reference(raster_.normal, pseudo_, w.normal, grad_.normal,
-                                                           grad_pseudo_);
+    total += w.normal * loss::normal_consistency_reference(raster_.normal, raster_.alpha, pseudo_, w.normal,
+                                                           grad_.normal, grad_.alpha, grad_pseudo_);
     total += w.normal_prior *
              loss::normal_prior_reference(raster_.normal, s_.prior, {}, 1, w.normal_prior, grad_.normal);
     const auto pixels = static_cast<double>(raster_.distortion.size());

@@ -89,12 +89,13 @@ FrameGradient frame_gradient(const Frame& frame, const reference::Setting& s) {
   FrameGradient g;
   g.colour.place(device).reset(frame.colour.shape());
   g.normal.place(device).reset(frame.raster.normal.shape());
+  g.alpha.place(device).reset(frame.raster.alpha.shape());
   g.pseudo_normal.place(device).reset(frame.raster.normal.shape());
   g.distortion.place(device).reset(frame.raster.distortion.shape());
   loss::l1(frame.colour, target, s.weights.l1, g.colour);
   loss::ssim_loss(frame.colour, target, s.weights.ssim, g.colour);
-  loss::normal_consistency(frame.raster.normal, frame.pseudo_normal, s.weights.normal, g.normal,
-                           g.pseudo_normal);
+  loss::normal_consistency(frame.raster.normal, frame.raster.alpha, frame.pseudo_normal, s.weights.normal,
+                           g.normal, g.alpha, g.pseudo_normal);
   loss::normal_prior(frame.raster.normal, prior, s.weights.normal_prior, g.normal);
   loss::distortion(frame.raster.distortion, s.weights.distortion, g.distortion);
   return g;

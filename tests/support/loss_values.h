@@ -15,10 +15,11 @@ inline double ssim_loss(const Tensor<float>& image, const Tensor<float>& target,
   return value_of(image.device(),
                   [&](const MeanSlot& slot) { ssim_loss(image, target, weight, grad_image, slot); });
 }
-inline double normal_consistency(const Tensor<float>& normal, const Tensor<float>& pseudo, double weight,
-                                 Tensor<float>& grad_normal, Tensor<float>& grad_pseudo) {
+inline double normal_consistency(const Tensor<float>& normal, const Tensor<float>& alpha,
+                                 const Tensor<float>& pseudo, double weight, Tensor<float>& grad_normal,
+                                 Tensor<float>& grad_alpha, Tensor<float>& grad_pseudo) {
   return value_of(normal.device(), [&](const MeanSlot& slot) {
-    normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo, slot);
+    normal_consistency(normal, alpha, pseudo, weight, grad_normal, grad_alpha, grad_pseudo, slot);
   });
 }
 inline double normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, double weight,

@@ -58,9 +58,11 @@ void l1(const Tensor<float>& image, const Tensor<float>& target, double weight, 
   mean(l1_sum(image, target, scale, grad_image));
 }
 
-void normal_consistency(const Tensor<float>& normal, const Tensor<float>& pseudo, double weight,
-                        Tensor<float>& grad_normal, Tensor<float>& grad_pseudo, const MeanSlot& value) {
-  mean_normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo, value.on(normal.device()));
+void normal_consistency(const Tensor<float>& normal, const Tensor<float>& alpha, const Tensor<float>& pseudo,
+                        double weight, Tensor<float>& grad_normal, Tensor<float>& grad_alpha,
+                        Tensor<float>& grad_pseudo, const MeanSlot& value) {
+  mean_normal_consistency(normal, alpha, pseudo, weight, grad_normal, grad_alpha, grad_pseudo,
+                          value.on(normal.device()));
 }
 
 void normal_prior(const Tensor<float>& normal, const Tensor<float>& prior, const Tensor<float>& tint,

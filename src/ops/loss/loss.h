@@ -25,13 +25,16 @@ double ssim_loss_reference(const Tensor<double>& image, const Tensor<double>& ta
 // is non-zero. NaN if there are none. The host waits for it.
 double ssim(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& mask);
 
-// L_norm = mean (1 − n·N_d) over pixels where N_d is not zero (method §7.4). normal: the blended normal,
-// H×W×3, not normalised (its length contains alpha); pseudo: H×W×3 unit or zero. Differentiable in both. The
-// mean divides by H·W, so that a half-empty frame weighs half.
-void normal_consistency(const Tensor<float>& normal, const Tensor<float>& pseudo, double weight,
-                        Tensor<float>& grad_normal, Tensor<float>& grad_pseudo, const MeanSlot& value);
-double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& pseudo, double weight,
-                                    Tensor<double>& grad_normal, Tensor<double>& grad_pseudo);
+// L_norm = mean (α − n·N_d) over pixels where N_d is not zero (method §7.4), which is Σ w (1 − n_i·N_d) for the
+// hits of a pixel. normal: the blended normal, H×W×3, not normalised (its length contains alpha); alpha: H×W;
+// pseudo: H×W×3 unit or zero. Differentiable in all three. With 1 in place of α, a faint pixel would gain by
+// becoming opaque. The mean divides by H·W, so that a half-empty frame weighs half.
+void normal_consistency(const Tensor<float>& normal, const Tensor<float>& alpha, const Tensor<float>& pseudo,
+                        double weight, Tensor<float>& grad_normal, Tensor<float>& grad_alpha,
+                        Tensor<float>& grad_pseudo, const MeanSlot& value);
+double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& alpha,
+                                    const Tensor<double>& pseudo, double weight, Tensor<double>& grad_normal,
+                                    Tensor<double>& grad_alpha, Tensor<double>& grad_pseudo);
 
 // L_tc-norm = mean w (1 − n̂·N_e) over pixels that have a prior (N_e not zero) and a blended normal (method
 // §7.4). n̂ is the normalised blended normal; the mean divides by the number of such pixels. prior: H×W×3,

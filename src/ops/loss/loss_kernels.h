@@ -148,18 +148,19 @@ struct RowNorm {
 // Method §7.4, L_norm: compares a pixel's normal with the geometry around it.
 template <class T>
 struct NormalConsistency {
-  const T *normal, *pseudo;
+  const T *normal, *alpha, *pseudo;
   T scale;
-  T *grad_normal, *grad_pseudo;
+  T *grad_normal, *grad_alpha, *grad_pseudo;
 
   TRACEFLOW_HD double operator()(int64_t i) const {
     const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(pseudo + 3 * i);
     if (is_zero(p)) return 0;
     if (is_finite(n) && is_finite(p)) {
+      grad_alpha[i] += scale;
       add3(grad_normal + 3 * i, -scale * p);
       add3(grad_pseudo + 3 * i, -scale * n);
     }
-    return 1 - static_cast<double>(dot(n, p));
+    return static_cast<double>(alpha[i]) - static_cast<double>(dot(n, p));
   }
 };
 

@@ -109,10 +109,11 @@ double row_norm_reference(const Tensor<double>& rows, double weight, Tensor<doub
   return count > 0 ? sum / count : 0;
 }
 
-double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& pseudo, double weight,
-                                    Tensor<double>& grad_normal, Tensor<double>& grad_pseudo) {
+double normal_consistency_reference(const Tensor<double>& normal, const Tensor<double>& alpha,
+                                    const Tensor<double>& pseudo, double weight, Tensor<double>& grad_normal,
+                                    Tensor<double>& grad_alpha, Tensor<double>& grad_pseudo) {
   Mean mean{};
-  mean_normal_consistency(normal, pseudo, weight, grad_normal, grad_pseudo, &mean);
+  mean_normal_consistency(normal, alpha, pseudo, weight, grad_normal, grad_alpha, grad_pseudo, &mean);
   return mean.value;
 }
 

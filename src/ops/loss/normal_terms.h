@@ -7,15 +7,23 @@
 namespace traceflow::loss {
 
 template <class T>
-void mean_normal_consistency(const Tensor<T>& normal, const Tensor<T>& pseudo, double weight,
-                             Tensor<T>& grad_normal, Tensor<T>& grad_pseudo, Mean* mean) {
+void mean_normal_consistency(const Tensor<T>& normal, const Tensor<T>& alpha, const Tensor<T>& pseudo,
+                             double weight, Tensor<T>& grad_normal, Tensor<T>& grad_alpha,
+                             Tensor<T>& grad_pseudo, Mean* mean) {
   check_is_image(normal);
   check_same_shape(normal, pseudo, grad_normal);
   check_same_shape(normal, pseudo, grad_pseudo);
   const int64_t pixels = normal.size() / 3;
+  require(alpha.size() == pixels && grad_alpha.size() == pixels, "each pixel has an alpha",
+          alpha.shape().to_string() + ", gradient " + grad_alpha.shape().to_string());
   const auto count = static_cast<double>(pixels);
-  const NormalConsistency<T> step{normal.data(), pseudo.data(), static_cast<T>(weight / count),
-                                  grad_normal.data(), grad_pseudo.data()};
+  const NormalConsistency<T> step{normal.data(),
+                                  alpha.data(),
+                                  pseudo.data(),
+                                  static_cast<T>(weight / count),
+                                  grad_normal.data(),
+                                  grad_alpha.data(),
+                                  grad_pseudo.data()};
   ordered_sum<double>(normal.device(), "loss: normal consistency", pixels, step, MeanOver{count, mean},
                       block_pixels);
 }

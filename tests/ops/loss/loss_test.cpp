@@ -16,12 +16,13 @@ constexpr float nan_f = std::numeric_limits<float>::quiet_NaN();
 // Normals of every length up to one, and unit normals to compare them with; every seventh of either is
 // missing.
 struct Normals {
-  Tensor<double> blended, unit;
+  Tensor<double> blended, unit, alpha;
 
   Normals(int64_t height, int64_t width) {
     Random random(1);
     blended = random_tensor<double>({height, width, 3}, random, -0.5, 0.5);
     unit = random_tensor<double>({height, width, 3}, random, -1, 1);
+    alpha = random_tensor<double>({height, width}, random, 0, 1);
     for (int64_t i = 0; i < height * width; ++i) {
       double* u = unit.data() + 3 * i;
       const double length = std::sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2]);
@@ -64,33 +65,56 @@ TEST(L1, GradientAgreesWithCentralDifferences) {
 }
 
 TEST(NormalConsistency, IsZeroWhereTheyAgreeAndTwoWhereTheyOppose) {
-  Tensor<float> normal({1, 2, 3}), pseudo({1, 2, 3}), a({1, 2, 3}), b({1, 2, 3});
+  Tensor<float> normal({1, 2, 3}), alpha({1, 2}), pseudo({1, 2, 3}), a({1, 2, 3}), b({1, 2}), c({1, 2, 3});
   normal[2] = pseudo[2] = 1;
-  EXPECT_DOUBLE_EQ(normal_consistency(normal, pseudo, 1, a, b), 0);  // the second pixel has no pseudo-normal
+  alpha.fill(1);
+  // The second pixel has no pseudo-normal.
+  EXPECT_DOUBLE_EQ(normal_consistency(normal, alpha, pseudo, 1, a, b, c), 0);
   pseudo[2] = -1;
-  EXPECT_DOUBLE_EQ(normal_consistency(normal, pseudo, 1, a, b), 1);  // half of the frame at 2
+  EXPECT_DOUBLE_EQ(normal_consistency(normal, alpha, pseudo, 1, a, b, c), 1);  // half of the frame at 2
+}
+
+// Where the hits of a pixel agree with the pseudo-normal, the loss neither covers nor clears the pixel.
+TEST(NormalConsistency, DoesNotRewardCoverage) {
+  Random random(7);
+  const auto share = random_tensor<float>({3, 4}, random, 0, 1);
+  Tensor<float> normal({3, 4, 3}), pseudo({3, 4, 3}), a(normal.shape()), b(share.shape()), c(normal.shape());
+  for (int64_t i = 0; i < share.size(); ++i) {
+    normal[3 * i] = share[i];  // hits with the unit normal (1, 0, 0) and this weight
+    pseudo[3 * i] = 1;
+  }
+  EXPECT_NEAR(normal_consistency(normal, share, pseudo, 1, a, b, c), 0, 1e-12);
+  for (int64_t i = 0; i < share.size(); ++i) {
+    const float by_weight = b[i] + a[3 * i];  // dL/dw of such a hit
+    EXPECT_EQ(by_weight, 0) << "pixel " << i;
+  }
 }
 
 TEST(NormalConsistency, FastAgreesWithReference) {
   const Normals n(40, 50);
   const Shape shape = n.unit.shape();
-  Tensor<float> a(shape), b(shape);
-  Tensor<double> c(shape), d(shape);
-  const double value = normal_consistency(convert<float>(n.blended), convert<float>(n.unit), 0.05, a, b);
-  EXPECT_NEAR(value, normal_consistency_reference(n.blended, n.unit, 0.05, c, d), 1e-6);
-  expect_close(a, c, 1e-6, "normal");
-  expect_close(b, d, 1e-6, "pseudo-normal");
+  Tensor<float> a(shape), b(n.alpha.shape()), c(shape);
+  Tensor<double> d(shape), e(n.alpha.shape()), f(shape);
+  const double value = normal_consistency(convert<float>(n.blended), convert<float>(n.alpha),
+                                          convert<float>(n.unit), 0.05, a, b, c);
+  EXPECT_NEAR(value, normal_consistency_reference(n.blended, n.alpha, n.unit, 0.05, d, e, f), 1e-6);
+  expect_close(a, d, 1e-6, "normal");
+  expect_close(b, e, 1e-6, "alpha");
+  expect_close(c, f, 1e-6, "pseudo-normal");
 }
 
 TEST(NormalConsistency, GradientAgreesWithCentralDifferences) {
   Normals n(5, 6);
   const Shape shape = n.unit.shape();
-  Tensor<double> grad_normal(shape), grad_pseudo(shape), unused(shape);
-  normal_consistency_reference(n.blended, n.unit, 0.05, grad_normal, grad_pseudo);
+  Tensor<double> grad_normal(shape), grad_alpha(n.alpha.shape()), grad_pseudo(shape), unused(shape),
+      unused_alpha(n.alpha.shape());
+  normal_consistency_reference(n.blended, n.alpha, n.unit, 0.05, grad_normal, grad_alpha, grad_pseudo);
   const auto value = [&] {
-    return 0.05 * normal_consistency_reference(n.blended, n.unit, 1, unused, unused);
+    return 0.05 *
+           normal_consistency_reference(n.blended, n.alpha, n.unit, 1, unused, unused_alpha, unused);
   };
   expect_close(grad_normal, central_differences(n.blended, value), 1e-7, "normal");
+  expect_close(grad_alpha, central_differences(n.alpha, value), 1e-7, "alpha");
   // A pixel without a pseudo-normal is left out; giving it one is a discontinuity, not a gradient.
   auto differences = central_differences(n.unit, value);
   for (int64_t i = 0; i < 30; ++i) {
@@ -224,11 +248,12 @@ TEST(Losses, HostilePixelsShowInTheValueAndGiveNoGradient) {
        {nan_f, std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()}) {
     auto blended = convert<float>(n.blended);
     blended[3] = bad;
-    Tensor<float> a(shape), b(shape), c(shape), d(shape);
+    Tensor<float> a(shape), b(shape), c(shape), d(shape), e(n.alpha.shape());
     EXPECT_FALSE(std::isfinite(l1(blended, unit, 1, a)));
-    EXPECT_FALSE(std::isfinite(normal_consistency(blended, unit, 1, b, c)));
+    EXPECT_FALSE(std::isfinite(normal_consistency(blended, convert<float>(n.alpha), unit, 1, b, e, c)));
     EXPECT_FALSE(std::isfinite(normal_prior(blended, unit, 1, d)));
     EXPECT_TRUE(all_finite(a) && all_finite(b) && all_finite(c) && all_finite(d));
+    EXPECT_EQ(e[1], 0);
     for (int k = 3; k < 6; ++k) EXPECT_EQ(d[k], 0);
     EXPECT_NE(d[6], 0);
   }
@@ -237,7 +262,7 @@ TEST(Losses, HostilePixelsShowInTheValueAndGiveNoGradient) {
 TEST(Losses, NothingWeighsNothing) {
   Tensor<float> none({0, 0, 3}), gradient({0, 0, 3}), map({0, 0});
   EXPECT_EQ(l1(none, none, 1, gradient), 0);
-  EXPECT_EQ(normal_consistency(none, none, 1, gradient, gradient), 0);
+  EXPECT_EQ(normal_consistency(none, map, none, 1, gradient, map, gradient), 0);
   EXPECT_EQ(normal_prior(none, none, 1, gradient), 0);
   EXPECT_EQ(distortion(map, 1, map), 0);
   Tensor<float> unset({2, 2, 3});
@@ -248,23 +273,26 @@ TEST(Losses, RefuseShapesThatDoNotFit) {
   Tensor<float> image({2, 2, 3}), other({2, 3, 3});
   EXPECT_THROW(l1(image, other, 1, image), InternalError);
   EXPECT_THROW(l1(image, image, 1, other), InternalError);
-  EXPECT_THROW(normal_consistency(image, image, 1, image, other), InternalError);
+  Tensor<float> map({2, 2});
+  EXPECT_THROW(normal_consistency(image, map, image, 1, image, map, other), InternalError);
+  EXPECT_THROW(normal_consistency(image, image, image, 1, image, map, image), InternalError);
   EXPECT_THROW(normal_prior(image, other, 1, image), InternalError);
   EXPECT_THROW(normal_prior(image, image, 1, image, Tensor<float>({1, 1}), 7), InternalError);
 }
 
 TEST(Losses, SameBytesAtAnyThreadCount) {
   const Normals n(120, 110);
-  const auto blended = convert<float>(n.blended), unit = convert<float>(n.unit);
+  const auto blended = convert<float>(n.blended), alpha = convert<float>(n.alpha),
+             unit = convert<float>(n.unit);
   expect_same_bytes_at_any_thread_count([&] {
-    Tensor<float> a(unit.shape()), b(unit.shape()), c(unit.shape()), d(unit.shape());
+    Tensor<float> a(unit.shape()), b(unit.shape()), c(unit.shape()), d(unit.shape()), e(alpha.shape());
     Tensor<double> values({4});
     values[0] = l1(blended, unit, 1, a);
-    values[1] = normal_consistency(blended, unit, 1, b, c);
+    values[1] = normal_consistency(blended, alpha, unit, 1, b, e, c);
     values[2] = normal_prior(blended, unit, 1, d);
     values[3] = distortion(blended, 1, d);
     return std::vector{convert<double>(a), convert<double>(b), convert<double>(c), convert<double>(d),
-                       values};
+                       convert<double>(e), values};
   });
 }
 

@@ -60,7 +60,11 @@ std::vector<Result> run(const Pictures& p, Device device) {
   };
   with(1, [&](auto& g) { return l1(image, target, 0.8, g[0]); });
   with(1, [&](auto& g) { return ssim_loss(image, target, 70, g[0]); });
-  with(2, [&](auto& g) { return normal_consistency(normal, unit, 0.05, g[0], g[1]); });
+  with(3, [&](auto& g) {
+    const Tensor<float> alpha = p.tint.on(device);
+    g[1] = alpha;
+    return normal_consistency(normal, alpha, unit, 0.05, g[0], g[1], g[2]);
+  });
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0]); });
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0], p.tint.on(device), 7); });
   with(1, [&](auto& g) { return distortion(image, 3, g[0]); });
