@@ -42,7 +42,7 @@ TrainOptions cpu_preset() {
   o.deform.environment_network.skip = 2;
   o.render.precision = field::Precision::bf16;
   o.render.samples = 2;
-  o.render.trace_alpha_min = 0.02F;
+  o.render.trace.alpha_min = 0.02F;
   o.render.select.min_tint = 0.05F;
   o.render.select.probe_share = 0.05F;
   o.loss.normal = 0.1F;

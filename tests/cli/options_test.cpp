@@ -66,7 +66,7 @@ probe_share = 0.5
   EXPECT_EQ(options.loss.normal, 0);
   EXPECT_EQ(options.loss.ssim, 0.25F);
   EXPECT_FALSE(options.render.low_pass);
-  EXPECT_EQ(options.render.background, Vec3<float>(1, 0.5F, 0));
+  EXPECT_EQ(options.render.raster.background, Vec3<float>(1, 0.5F, 0));
   EXPECT_EQ(options.render.select.probe_share, 0.5F);
   EXPECT_EQ(options.seed, TrainOptions{}.seed);
 }

@@ -434,14 +434,14 @@ TEST(Renderer, ARayMayGoOnForAsLongAsNumbersReach) {
   Fixture f;
   const Tensor<float> cut = Renderer(RenderOptions{}).forward(f.scene, f.request).colour;
   RenderOptions options;
-  options.transmittance_min = 0;
+  options.raster.transmittance_min = 0;
   options.validate();
   const Tensor<float> whole = Renderer(options).forward(f.scene, f.request).colour;
   float most = 0;
   for (int64_t i = 0; i < cut.size(); ++i) most = std::max(most, std::abs(cut[i] - whole[i]));
   EXPECT_LT(most, 5e-3F);
   for (const float refused : {-1e-9F, 1.0F, std::nanf("")}) {
-    options.transmittance_min = refused;
+    options.raster.transmittance_min = refused;
     EXPECT_THROW(options.validate(), InputError);
   }
 }
@@ -451,7 +451,7 @@ TEST(Renderer, FaintReflectedHitsAreSkippedByTheirOwnThreshold) {
   Fixture f;
   RenderOptions options;
   const Frame all = Renderer(options).forward(f.scene, f.request);
-  options.trace_alpha_min = 0.1F;
+  options.trace.alpha_min = 0.1F;
   options.validate();
   const Frame fewer = Renderer(options).forward(f.scene, f.request);
   expect_equal(all.raster.colour, fewer.raster.colour, "diffuse");
@@ -459,12 +459,12 @@ TEST(Renderer, FaintReflectedHitsAreSkippedByTheirOwnThreshold) {
   ASSERT_EQ(before.size(), after.size());
   int64_t less = 0;
   for (int64_t i = 0; i < before.size(); ++i) {
-    EXPECT_LE(after[i], before[i] + options.transmittance_min);
+    EXPECT_LE(after[i], before[i] + options.raster.transmittance_min);
     less += after[i] < before[i] - 0.01F ? 1 : 0;
   }
   EXPECT_GT(less, before.size() / 10);
-  for (const float refused : {0.0F, options.alpha_max, std::nanf("")}) {
-    options.trace_alpha_min = refused;
+  for (const float refused : {0.0F, options.raster.alpha_max, std::nanf("")}) {
+    options.trace.alpha_min = refused;
     EXPECT_THROW(options.validate(), InputError);
   }
 }
@@ -474,7 +474,7 @@ TEST(Renderer, AnEmptyViewIsBackground) {
   f.request.camera.position = {0, 0, 50};
   f.request.cull = true;
   RenderOptions options;
-  options.background = {0.2F, 0.4F, 0.6F};
+  options.raster.background = {0.2F, 0.4F, 0.6F};
   Renderer renderer(options);
   const Frame& frame = renderer.forward(f.scene, f.request, true);
   for (int64_t i = 0; i < frame.raster.alpha.size(); ++i) ASSERT_FLOAT_EQ(frame.colour[3 * i + 2], 0.6F);

@@ -137,12 +137,12 @@ Case make_case(Graph graph) {
   c.request.pseudo_normals = true;
   c.options.samples = graph == Graph::several_samples ? 2 : 1;
   c.options.depth_ratio = 0.3F;
-  c.options.sort = raster::SortOrder::centre;
-  c.options.near_plane = 0.1F;
-  c.options.far_plane = 20;
+  c.options.raster.sort = raster::SortOrder::centre;
+  c.options.raster.near_plane = 0.1F;
+  c.options.raster.far_plane = 20;
   c.options.select.min_alpha = 0;
   c.options.select.min_tint = 0;
-  c.options.background = {0.2F, 0.3F, 0.1F};
+  c.options.raster.background = {0.2F, 0.3F, 0.1F};
 
   c.parameters.main = convert<double>(c.scene.main);
   c.parameters.environment = convert<double>(c.scene.environment);

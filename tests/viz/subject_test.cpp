@@ -51,7 +51,7 @@ Subject moving_subject() {
   scene.normalisation = {{10, -20, 5}, 0.125};
   scene.extent = 3;
   scene.focal = 80;  // twice the camera's, so that its pictures have several samples
-  subject.render.background = {0.25F, 0.5F, 0.75F};
+  subject.render.raster.background = {0.25F, 0.5F, 0.75F};
   subject.render.depth_ratio = 0.5F;
   return subject;
 }

@@ -34,19 +34,6 @@ struct Options {
   float transmittance_min = 1e-4F;
   Vec3<float> background{0};
 
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v.field("sort", sort, "", "Blending order: centre (as 2DGS) or hit (exact per pixel) (method §3.3).");
-    v.field("near_plane", near_plane, "scene units", "Minimum camera depth that is drawn (method §3.4).");
-    v.field("far_plane", far_plane, "scene units",
-            "Far end of the depth mapping of the distortion (method §3.5).");
-    v.field("low_pass", low_pass, "pixels",
-            "Width of the screen-space low-pass filter (method §3.2); 0: no filter.");
-    v.field("alpha_min", alpha_min, "", "Hits with a lower opacity are skipped (method §3.3).");
-    v.field("alpha_max", alpha_max, "", "Maximum opacity of a hit; higher values are clamped (method §3.3).");
-    v.field("transmittance_min", transmittance_min, "",
-            "A pixel ends before its transmittance falls below this.");
-  }
   void validate() const;
 };
 

@@ -110,8 +110,7 @@ TEST(NormalConsistency, GradientAgreesWithCentralDifferences) {
       unused_alpha(n.alpha.shape());
   normal_consistency_reference(n.blended, n.alpha, n.unit, 0.05, grad_normal, grad_alpha, grad_pseudo);
   const auto value = [&] {
-    return 0.05 *
-           normal_consistency_reference(n.blended, n.alpha, n.unit, 1, unused, unused_alpha, unused);
+    return 0.05 * normal_consistency_reference(n.blended, n.alpha, n.unit, 1, unused, unused_alpha, unused);
   };
   expect_close(grad_normal, central_differences(n.blended, value), 1e-7, "normal");
   expect_close(grad_alpha, central_differences(n.alpha, value), 1e-7, "alpha");
@@ -291,8 +290,8 @@ TEST(Losses, SameBytesAtAnyThreadCount) {
     values[1] = normal_consistency(blended, alpha, unit, 1, b, e, c);
     values[2] = normal_prior(blended, unit, 1, d);
     values[3] = distortion(blended, 1, d);
-    return std::vector{convert<double>(a), convert<double>(b), convert<double>(c), convert<double>(d),
-                       convert<double>(e), values};
+    return std::vector{convert<double>(a), convert<double>(b), convert<double>(c),
+                       convert<double>(d), convert<double>(e), values};
   });
 }
 

@@ -86,7 +86,7 @@ TEST_F(RendererOnDevice, AViewOfNothingIsTheBackground) {
   f.request.cull = true;
   f.request.camera.position = {0, 0, 50};
   RenderOptions options;
-  options.background = {0.25F, 0.5F, 0.75F};
+  options.raster.background = {0.25F, 0.5F, 0.75F};
   Renderer renderer(options);
   const Frame& frame = renderer.forward(placed, f.request, true);
   EXPECT_EQ(frame.main.count(), 0);
