@@ -17,13 +17,9 @@ void mean_normal_consistency(const Tensor<T>& normal, const Tensor<T>& alpha, co
   require(alpha.size() == pixels && grad_alpha.size() == pixels, "each pixel has an alpha",
           alpha.shape().to_string() + ", gradient " + grad_alpha.shape().to_string());
   const auto count = static_cast<double>(pixels);
-  const NormalConsistency<T> step{normal.data(),
-                                  alpha.data(),
-                                  pseudo.data(),
-                                  static_cast<T>(weight / count),
-                                  grad_normal.data(),
-                                  grad_alpha.data(),
-                                  grad_pseudo.data()};
+  const NormalConsistency<T> step{
+      normal.data(),      alpha.data(),      pseudo.data(),     static_cast<T>(weight / count),
+      grad_normal.data(), grad_alpha.data(), grad_pseudo.data()};
   ordered_sum<double>(normal.device(), "loss: normal consistency", pixels, step, MeanOver{count, mean},
                       block_pixels);
 }

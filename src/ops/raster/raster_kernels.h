@@ -66,21 +66,23 @@ struct TileEntry {
   uint32_t entry;
 };
 
-// dL/d(splat), summed over the tiles of one surfel. The order of members is the order in which the backward
-// kernel reduces its sums.
-struct SplatGradient {
-  float u_x, u_y, u_1;
-  float v_x, v_y, v_1;
-  float w_x, w_y, w_1;
-  float z_plane;
-  float centre_x, centre_y, z_centre;
-  float log_opacity;  // opacity · dL/dopacity
-  float colour[3];
-  float tint;
-  float normal[3];
-  float roughness;
-  float unused[2];
+// dL/d(splat), summed over pixels: a number per member, or a vector of lanes. The CUDA device and the CPU
+// reduce the members in this order.
+template <class Value>
+struct BasicSplatGradient {
+  Value u_x, u_y, u_1;
+  Value v_x, v_y, v_1;
+  Value w_x, w_y, w_1;
+  Value z_plane;
+  Value centre_x, centre_y, z_centre;
+  Value log_opacity;  // opacity · dL/dopacity
+  Value colour[3];
+  Value tint;
+  Value normal[3];
+  Value roughness;
+  Value unused[2];
 };
+using SplatGradient = BasicSplatGradient<float>;
 static_assert(sizeof(SplatGradient) == 24 * sizeof(float));
 
 // The outputs that have a gradient. The loops skip the others.

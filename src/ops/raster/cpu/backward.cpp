@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include "ops/raster/cpu/simd-inl.h"
+#include "ops/raster/hit_gradient-inl.h"
 
 // Differentiates the blending of tiles, back to front: the transmittance in front of a hit is that behind it
 // divided by 1 - α. The sums of a surfel over the blocks of a tile stay in registers. They are reduced once
@@ -71,17 +72,41 @@ HWY_INLINE void load_block(const OutputGradient& g, const Vec3<float>& backgroun
   }
 }
 
-// The sums of a surfel over pixels, one per lane, in the order of SplatGradient.
+// The arithmetic of hit_gradient-inl.h on vectors.
 template <class D>
-struct Sums {
+struct Lanes {
+  [[no_unique_address]] D d;
+  size_t lane;  // of the block: the first pixel of the vector
+
+  HWY_INLINE V<D> at(const float* of_block) const { return hn::LoadU(d, of_block + lane); }
+  HWY_INLINE V<D> set(float x) const { return hn::Set(d, x); }
+  HWY_INLINE V<D> add(V<D> a, V<D> b) const { return hn::Add(a, b); }
+  HWY_INLINE V<D> sub(V<D> a, V<D> b) const { return hn::Sub(a, b); }
+  HWY_INLINE V<D> mul(V<D> a, V<D> b) const { return hn::Mul(a, b); }
+  HWY_INLINE V<D> neg(V<D> a) const { return hn::Neg(a); }
+  HWY_INLINE V<D> mul_add(V<D> a, V<D> b, V<D> c) const { return hn::MulAdd(a, b, c); }
+  HWY_INLINE V<D> neg_mul_add(V<D> a, V<D> b, V<D> c) const { return hn::NegMulAdd(a, b, c); }
+  HWY_INLINE M<D> less(V<D> a, V<D> b) const { return hn::Lt(a, b); }
+  HWY_INLINE M<D> both(M<D> a, M<D> b) const { return hn::And(a, b); }
+  HWY_INLINE V<D> zero_unless(M<D> mask, V<D> a) const { return hn::IfThenElseZero(mask, a); }
+  HWY_INLINE V<D> zero_if(M<D> mask, V<D> a) const { return hn::IfThenZeroElse(mask, a); }
+  // A branch would cost more than it saves.
+  HWY_INLINE bool may_hold(M<D>) const { return true; }
+  HWY_INLINE bool may_fail(M<D>) const { return true; }
+  HWY_INLINE V<D> z(const Footprint<D>& f, const Splat& s) const { return f.z(d, s); }
+  HWY_INLINE V<D> inverse_z(const Footprint<D>& f, const Splat& s) const { return f.inverse_z(d, s); }
+};
+
+// The sums of a surfel over pixels, one per lane.
+template <class D>
+struct Sums : BasicSplatGradient<V<D>> {
   static constexpr int used = 22;
   static constexpr int padded = 24;
-  V<D> u_x, u_y, u_1, v_x, v_y, v_1, w_x, w_y, w_1, z_plane, centre_x, centre_y, z_centre, log_opacity;
-  V<D> red, green, blue, tint, normal_x, normal_y, normal_z, roughness;
+  static_assert(sizeof(SplatGradient) == padded * sizeof(float));
 
   HWY_INLINE explicit Sums(D d) {
-    u_x = u_y = u_1 = v_x = v_y = v_1 = w_x = w_y = w_1 = z_plane = centre_x = centre_y = z_centre =
-        log_opacity = red = green = blue = tint = normal_x = normal_y = normal_z = roughness = hn::Zero(d);
+    V<D>* const first = &this->u_x;
+    for (int i = 0; i < padded; ++i) first[i] = hn::Zero(d);
   }
 
   // Adds one hit per lane and moves the state in front of it.
@@ -89,113 +114,28 @@ struct Sums {
   HWY_INLINE void add(D d, const KernelOptions& o, const Splat& s, const Footprint<D>& f, uint32_t place,
                       const SavedBlock& saved, size_t lane, BlockState& state) {
     const Int<D> di;
-    const auto set = [d](float x) HWY_ATTR { return hn::Set(d, x); };
-    const auto load = [d, lane](const float* p) HWY_ATTR { return hn::LoadU(d, p + lane); };
+    const Lanes<D> l{d, lane};
     const auto here = hn::Set(di, static_cast<int32_t>(place));
     const auto is_blended = hn::Not(hn::Lt(hn::LoadU(di, saved.last + lane), here));
     const auto hit = hn::And(f.inside, hn::RebindMask(d, is_blended));
-    const auto on_plane = hn::And(hit, f.on_plane);
-
-    const auto alpha_max = set(o.alpha_max);
-    const auto alpha = hn::IfThenElseZero(hit, hn::Min(f.opacity, alpha_max));
-    const auto past = reciprocal(d, hn::Sub(set(1.0F), alpha));
-    const auto transmittance_behind = load(state.transmittance);
+    const auto is_median = hn::RebindMask(d, hn::Eq(hn::LoadU(di, saved.median + lane), here));
+    const auto alpha = hn::IfThenElseZero(hit, hn::Min(f.opacity, l.set(o.alpha_max)));
+    const auto past = reciprocal(d, hn::Sub(l.set(1.0F), alpha));
+    const auto transmittance_behind = l.at(state.transmittance);
     const auto transmittance = hn::IfThenElse(hit, hn::Mul(transmittance_behind, past), transmittance_behind);
     const auto weight = hn::Mul(alpha, transmittance);
-    const auto z = f.z(d, s);
-
-    auto own = load(state.constant);
-    auto grad_z = hn::Zero(d);
-    if constexpr (asked != Asked::colour) {
-      own = hn::MulAdd(z, load(state.z), own);
-      grad_z = hn::Mul(weight, load(state.z));
-    }
-    own = hn::MulAdd(set(s.colour[0]), load(state.colour[0]), own);
-    own = hn::MulAdd(set(s.colour[1]), load(state.colour[1]), own);
-    own = hn::MulAdd(set(s.colour[2]), load(state.colour[2]), own);
-    own = hn::MulAdd(set(s.tint), load(state.tint), own);
-    own = hn::MulAdd(set(s.carried()), load(state.silhouette), own);
-    own = hn::MulAdd(set(s.roughness()), load(state.roughness), own);
-    if constexpr (asked != Asked::colour) {
-      own = hn::MulAdd(set(s.normal[0]), load(state.normal[0]), own);
-      own = hn::MulAdd(set(s.normal[1]), load(state.normal[1]), own);
-      own = hn::MulAdd(set(s.normal[2]), load(state.normal[2]), own);
-      normal_x = hn::MulAdd(weight, load(state.normal[0]), normal_x);
-      normal_y = hn::MulAdd(weight, load(state.normal[1]), normal_y);
-      normal_z = hn::MulAdd(weight, load(state.normal[2]), normal_z);
-    }
-    if constexpr (asked == Asked::all) {
-      // dL/dw_i = g (m² A + M2 - 2 m M1), dL/dm_i = 2 g w (m A - M1)
-      const auto inverse_z = f.inverse_z(d, s);
-      const auto scale = set(o.m_scale);
-      const auto m = hn::Mul(scale, hn::Sub(load(saved.inverse_z), inverse_z));
-      const auto g = load(state.distortion);
-      const auto ma = hn::NegMulAdd(m, load(saved.alpha), load(saved.m));  // M1 - m A
-      const auto by_weight = hn::NegMulAdd(m, hn::Add(ma, load(saved.m)), load(saved.m2));
-      own = hn::MulAdd(g, by_weight, own);
-      const auto slope = hn::Mul(scale, hn::Mul(inverse_z, inverse_z));
-      grad_z = hn::NegMulAdd(hn::Mul(hn::Mul(set(2.0F), g), hn::Mul(weight, ma)), slope, grad_z);
-      const auto is_median = hn::RebindMask(d, hn::Eq(hn::LoadU(di, saved.median + lane), here));
-      grad_z = hn::Add(grad_z, hn::IfThenElseZero(hn::And(hit, is_median), load(state.median)));
-    }
-
-    const auto behind = load(state.behind);
+    const auto own = grad_weight<asked>(l, o, s, f, state, saved);
+    const auto behind = l.at(state.behind);
     const auto grad_alpha = hn::NegMulAdd(behind, past, hn::Mul(transmittance, own));
     hn::StoreU(hn::MulAdd(weight, own, behind), d, state.behind + lane);
     hn::StoreU(transmittance, d, state.transmittance + lane);
-
-    red = hn::MulAdd(weight, load(state.colour[0]), red);
-    green = hn::MulAdd(weight, load(state.colour[1]), green);
-    blue = hn::MulAdd(weight, load(state.colour[2]), blue);
-    tint = hn::MulAdd(weight, load(state.tint), tint);
-    roughness = hn::MulAdd(weight, load(state.roughness), roughness);
-
-    // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero if α is clamped.
-    const auto is_free = hn::And(hit, hn::Lt(f.opacity, alpha_max));
-    const auto g = hn::IfThenElseZero(is_free, hn::Mul(alpha, grad_alpha));
-    log_opacity = hn::Add(log_opacity, g);
-    add_plane<asked>(f, hn::IfThenElseZero(on_plane, g), hn::IfThenElseZero(on_plane, grad_z), z, on_plane);
-    // The low-pass: ρ = rho_per_pixel2 (dx² + dy²).
-    const auto by_centre = hn::IfThenZeroElse(on_plane, g);
-    centre_x = hn::MulAdd(by_centre, f.dx, centre_x);
-    centre_y = hn::MulAdd(by_centre, f.dy, centre_y);
-    if constexpr (asked != Asked::colour) {
-      z_centre = hn::Add(z_centre, hn::IfThenZeroElse(on_plane, grad_z));
-    }
-  }
-
-  // The hit in the plane: u = nu/w, v = nv/w, z = z_plane/w, ρ = u² + v².
-  template <Asked asked>
-  HWY_INLINE void add_plane(const Footprint<D>& f, V<D> g, V<D> grad_z, V<D> z, M<D> on_plane) {
-    const auto inverse_w = hn::IfThenElseZero(on_plane, f.inverse_w);
-    const auto u = hn::Mul(hn::IfThenElseZero(on_plane, f.nu), inverse_w);
-    const auto v = hn::Mul(hn::IfThenElseZero(on_plane, f.nv), inverse_w);
-    const auto gw = hn::Mul(g, inverse_w);
-    const auto grad_nu = hn::Neg(hn::Mul(gw, u));
-    const auto grad_nv = hn::Neg(hn::Mul(gw, v));
-    auto grad_w = hn::Mul(gw, hn::MulAdd(u, u, hn::Mul(v, v)));
-    if constexpr (asked != Asked::colour) {
-      const auto zw = hn::Mul(grad_z, inverse_w);
-      grad_w = hn::NegMulAdd(zw, z, grad_w);
-      z_plane = hn::Add(zw, z_plane);
-    }
-    u_x = hn::MulAdd(grad_nu, f.x, u_x);
-    u_y = hn::MulAdd(grad_nu, f.y, u_y);
-    u_1 = hn::Add(grad_nu, u_1);
-    v_x = hn::MulAdd(grad_nv, f.x, v_x);
-    v_y = hn::MulAdd(grad_nv, f.y, v_y);
-    v_1 = hn::Add(grad_nv, v_1);
-    w_x = hn::MulAdd(grad_w, f.x, w_x);
-    w_y = hn::MulAdd(grad_w, f.y, w_y);
-    w_1 = hn::Add(grad_w, w_1);
+    add_hit<asked>(l, o, s, f, state, saved, weight, grad_alpha, hit, hn::And(hit, is_median), *this);
   }
 
   // Sums every member over the lanes.
   HWY_INLINE void reduce(D d, float* to) const {
-    const auto zero = hn::Zero(d);
-    V<D> v[padded] = {u_x,  u_y,     u_1,      v_x,      v_y,      v_1,         w_x,  w_y,
-                      w_1,  z_plane, centre_x, centre_y, z_centre, log_opacity, red,  green,
-                      blue, tint,    normal_x, normal_y, normal_z, roughness,   zero, zero};
+    V<D> v[padded];
+    std::copy(&this->u_x, &this->u_x + padded, v);
     const size_t count = add_crosswise(d, v);
     HWY_ALIGN float sums[padded + pixels_per_block];
     for (size_t i = 0; i < count; ++i) hn::StoreU(v[i], d, sums + i * hn::Lanes(d));

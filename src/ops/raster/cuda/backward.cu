@@ -1,7 +1,6 @@
-#include <cstddef>
-
 #include "ops/raster/cuda/stages.h"
 #include "ops/raster/cuda/tile.h"
+#include "ops/raster/hit_gradient-inl.h"
 
 // Differentiates the blending of tiles, back to front: the transmittance in front of a hit is that behind it
 // divided by 1 - α. A warp sums a splat over its pixels, and a tile sums it over its warps, both in a fixed
@@ -10,31 +9,6 @@ namespace traceflow::raster::cuda_stage {
 namespace {
 
 constexpr int backward_batch = 32;
-// The places of SplatGradient's fields among its numbers.
-namespace sum_of {
-enum Place : int {
-  u_x = offsetof(SplatGradient, u_x) / sizeof(float),
-  u_y = offsetof(SplatGradient, u_y) / sizeof(float),
-  u_1 = offsetof(SplatGradient, u_1) / sizeof(float),
-  v_x = offsetof(SplatGradient, v_x) / sizeof(float),
-  v_y = offsetof(SplatGradient, v_y) / sizeof(float),
-  v_1 = offsetof(SplatGradient, v_1) / sizeof(float),
-  w_x = offsetof(SplatGradient, w_x) / sizeof(float),
-  w_y = offsetof(SplatGradient, w_y) / sizeof(float),
-  w_1 = offsetof(SplatGradient, w_1) / sizeof(float),
-  z_plane = offsetof(SplatGradient, z_plane) / sizeof(float),
-  centre_x = offsetof(SplatGradient, centre_x) / sizeof(float),
-  centre_y = offsetof(SplatGradient, centre_y) / sizeof(float),
-  z_centre = offsetof(SplatGradient, z_centre) / sizeof(float),
-  log_opacity = offsetof(SplatGradient, log_opacity) / sizeof(float),
-  colour = offsetof(SplatGradient, colour) / sizeof(float),
-  tint = offsetof(SplatGradient, tint) / sizeof(float),
-  normal = offsetof(SplatGradient, normal) / sizeof(float),
-  roughness = offsetof(SplatGradient, roughness) / sizeof(float),
-  count = roughness + 1
-};
-}  // namespace sum_of
-
 constexpr int sums_stored = sizeof(SplatGradient) / sizeof(float);
 static_assert(sums_stored <= cuda::warp_lanes && backward_batch == cuda::warp_lanes);
 
@@ -47,7 +21,42 @@ struct KeptPixels {
   const int32_t *last, *median;
 };
 
-// dL/doutput of a pixel and what forward saved for it.
+// The arithmetic of hit_gradient-inl.h on one pixel.
+struct OneLane {
+  __device__ float at(float x) const { return x; }
+  __device__ float set(float x) const { return x; }
+  __device__ float add(float a, float b) const { return a + b; }
+  __device__ float sub(float a, float b) const { return a - b; }
+  __device__ float mul(float a, float b) const { return a * b; }
+  __device__ float neg(float a) const { return -a; }
+  __device__ float mul_add(float a, float b, float c) const { return std::fma(a, b, c); }
+  __device__ float neg_mul_add(float a, float b, float c) const { return std::fma(-a, b, c); }
+  __device__ bool less(float a, float b) const { return a < b; }
+  __device__ bool both(bool a, bool b) const { return a && b; }
+  __device__ float zero_unless(bool mask, float a) const { return mask ? a : 0.0F; }
+  __device__ float zero_if(bool mask, float a) const { return mask ? 0.0F : a; }
+  __device__ bool may_hold(bool mask) const { return mask; }
+  __device__ bool may_fail(bool mask) const { return !mask; }
+  __device__ float z(const PixelFootprint& f, const Splat& s) const { return f.z(s); }
+  __device__ float inverse_z(const PixelFootprint& f, const Splat& s) const { return f.inverse_z(s); }
+};
+
+// What forward saved for a pixel.
+struct KeptPixel {
+  float alpha = 0, m = 0, m2 = 0, inverse_z = 0;
+  int last = -1, median = -1;
+
+  __device__ KeptPixel() {}
+  __device__ KeptPixel(const KeptPixels& kept, int64_t i)
+      : alpha(kept.alpha[i]),
+        m(kept.m[i]),
+        m2(kept.m2[i]),
+        inverse_z(kept.inverse_z[i]),
+        last(kept.last[i]),
+        median(kept.median[i]) {}
+};
+
+// dL/doutput of a pixel.
 template <Asked asked>
 struct PixelGradient {
   Vec3<float> colour{0.0F}, normal{0.0F};
@@ -55,94 +64,26 @@ struct PixelGradient {
   float z = 0;         // dL/d(Σ w z)
   float constant = 0;  // the part of dL/dw that is the same for all hits
   float median = 0, distortion = 0;
-  float alpha = 0, m = 0, m2 = 0, inverse_z = 0;
-  int last = -1, median_place = -1;
 
-  __device__ PixelGradient(const GradientView& g, const KeptPixels& left, const Vec3<float>& background,
+  __device__ PixelGradient() {}
+  __device__ PixelGradient(const GradientView& g, const KeptPixels& kept, const Vec3<float>& background,
                            int64_t i) {
     const auto value = [i](const float* from) { return from != nullptr ? from[i] : 0.0F; };
     if (g.colour != nullptr) colour = load3<float>(g.colour + 3 * i);
     tint = value(g.tint);
     silhouette = value(g.silhouette);
     roughness = value(g.roughness);
-    alpha = left.alpha[i];
-    last = left.last[i];
     constant = value(g.alpha) - dot(colour, background);
     if constexpr (asked != Asked::colour) {
       if (g.normal != nullptr) normal = load3<float>(g.normal + 3 * i);
       // Expected depth is Σ w z / Σ w.
-      z = alpha > 0 ? value(g.depth) / alpha : 0.0F;
-      constant -= z * left.depth[i];
+      z = kept.alpha[i] > 0 ? value(g.depth) / kept.alpha[i] : 0.0F;
+      constant -= z * kept.depth[i];
     }
     if constexpr (asked == Asked::all) {
       median = value(g.median_depth);
       distortion = value(g.distortion);
-      m = left.m[i];
-      m2 = left.m2[i];
-      inverse_z = left.inverse_z[i];
-      median_place = left.median[i];
     }
-  }
-  __device__ PixelGradient() {}
-
-  // dL/dw of a hit.
-  __device__ float by_weight(const KernelOptions& o, const Splat& s, const PixelFootprint& f) const {
-    float own = constant + dot(load3<float>(s.colour), colour) + s.tint * tint + s.carried() * silhouette +
-                s.roughness() * roughness;
-    if constexpr (asked != Asked::colour) own += f.z(s) * z + dot(load3<float>(s.normal), normal);
-    if constexpr (asked == Asked::all) {
-      // dL/dw_i = g (m² A + M2 - 2 m M1)
-      const float m_hit = o.m_scale * (inverse_z - f.inverse_z(s));
-      own += distortion * (m2 - m_hit * ((m - m_hit * alpha) + m));
-    }
-    return own;
-  }
-
-  // Adds a hit to the sums of a splat, in the order of SplatGradient.
-  __device__ void add(const KernelOptions& o, const Splat& s, const PixelFootprint& f, float weight,
-                      float grad_alpha, bool is_median, float* sums) const {
-    const float z_hit = f.z(s);
-    float grad_z = 0;
-    if constexpr (asked != Asked::colour) grad_z = weight * z;
-    if constexpr (asked == Asked::all) {
-      // dL/dm_i = 2 g w (m A - M1)
-      const float inverse = f.inverse_z(s);
-      const float m_hit = o.m_scale * (inverse_z - inverse);
-      grad_z -= 2.0F * distortion * weight * (m - m_hit * alpha) * (o.m_scale * inverse * inverse);
-      if (is_median) grad_z += median;
-    }
-    // G = exp(-ρ/2): dL/dρ = -g/2 with g = o·G · dL/d(o·G), zero if α is clamped.
-    const float g = f.opacity < o.alpha_max ? f.opacity * grad_alpha : 0.0F;
-    if (f.on_plane) {
-      // u = nu/w, v = nv/w, z = z_plane/w, ρ = u² + v².
-      const float u = f.nu * f.inverse_w;
-      const float v = f.nv * f.inverse_w;
-      const float gw = g * f.inverse_w;
-      const float zw = grad_z * f.inverse_w;
-      const float grad_nu = -gw * u;
-      const float grad_nv = -gw * v;
-      const float grad_w = gw * (u * u + v * v) - zw * z_hit;
-      sums[sum_of::u_x] += grad_nu * f.x;
-      sums[sum_of::u_y] += grad_nu * f.y;
-      sums[sum_of::u_1] += grad_nu;
-      sums[sum_of::v_x] += grad_nv * f.x;
-      sums[sum_of::v_y] += grad_nv * f.y;
-      sums[sum_of::v_1] += grad_nv;
-      sums[sum_of::w_x] += grad_w * f.x;
-      sums[sum_of::w_y] += grad_w * f.y;
-      sums[sum_of::w_1] += grad_w;
-      sums[sum_of::z_plane] += zw;
-    } else {
-      // The low-pass: ρ = rho_per_pixel2 (dx² + dy²).
-      sums[sum_of::centre_x] += g * f.dx;
-      sums[sum_of::centre_y] += g * f.dy;
-      sums[sum_of::z_centre] += grad_z;
-    }
-    sums[sum_of::log_opacity] += g;
-    for (int c = 0; c < 3; ++c) sums[sum_of::colour + c] += weight * colour[c];
-    sums[sum_of::tint] += weight * tint;
-    for (int c = 0; c < 3; ++c) sums[sum_of::normal + c] += weight * normal[c];
-    sums[sum_of::roughness] += weight * roughness;
   }
 };
 
@@ -166,7 +107,7 @@ __device__ float transposed_sum(float (&value)[cuda::warp_lanes], int lane) {
 
 template <Asked asked>
 __global__ void __launch_bounds__(pixels_per_tile)
-    blend_backward_by_centre(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
+    blend_backward_by_centre(SavedView saved, KernelOptions o, GradientView grad, KeptPixels kept,
                              SplatGradient* gradients) {
   __shared__ BatchSplat batch[backward_batch];
   __shared__ float partial[warps_per_tile][backward_batch][sums_stored];
@@ -177,14 +118,16 @@ __global__ void __launch_bounds__(pixels_per_tile)
   const uint32_t begin = saved.tile_begin[tile];
 
   PixelGradient<asked> g;
+  KeptPixel own;
   float transmittance = 1, behind = 0;
   if (pixel.in_image) {
-    g = PixelGradient<asked>(grad, left, o.background, pixel.index);
-    transmittance = left.transmittance[pixel.index];
+    g = PixelGradient<asked>(grad, kept, o.background, pixel.index);
+    own = KeptPixel(kept, pixel.index);
+    transmittance = kept.transmittance[pixel.index];
   }
   if (threadIdx.x == 0) last_place = -1;
   __syncthreads();
-  if (g.last >= 0) atomicMax(&last_place, g.last);
+  if (own.last >= 0) atomicMax(&last_place, own.last);
   __syncthreads();
 
   for (int base = last_place / backward_batch * backward_batch; base >= 0 && last_place >= 0;
@@ -198,19 +141,23 @@ __global__ void __launch_bounds__(pixels_per_tile)
       left_over &= ~(1U << k);
       const Splat& s = batch[k];
       const PixelFootprint f = pixel.footprint_of(s);
-      const bool hit = f.inside && base + k <= g.last;
+      const bool hit = f.inside && base + k <= own.last;
       if (__ballot_sync(cuda::full_warp, hit) == 0) continue;
-      float sums[cuda::warp_lanes] = {};
+      SplatGradient sums{};
       if (hit) {
         const float alpha = lower(f.opacity, o.alpha_max);
         const float past = 1.0F / (1.0F - alpha);
         transmittance *= past;
         const float weight = alpha * transmittance;
-        const float own = g.by_weight(o, s, f);
-        g.add(o, s, f, weight, transmittance * own - behind * past, g.median_place == base + k, sums);
-        behind += weight * own;
+        const float by_weight = scalar::grad_weight<asked>(OneLane{}, o, s, f, g, own);
+        scalar::add_hit<asked>(OneLane{}, o, s, f, g, own, weight, transmittance * by_weight - behind * past,
+                               hit, own.median == base + k, sums);
+        behind += weight * by_weight;
       }
-      const float sum = transposed_sum(sums, pixel.lane);
+      float values[cuda::warp_lanes] = {};
+#pragma unroll
+      for (int j = 0; j < sums_stored; ++j) values[j] = (&sums.u_x)[j];
+      const float sum = transposed_sum(values, pixel.lane);
       if (pixel.lane < sums_stored) partial[pixel.warp][k][pixel.lane] = sum;
       mine |= 1U << k;
     }
@@ -235,14 +182,15 @@ __global__ void __launch_bounds__(pixels_per_tile)
 // all hits and once for the sums behind each. in_turn: the threads of a tile run one after another, so that
 // sums have a fixed order.
 template <Asked asked>
-__global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, GradientView grad, KeptPixels left,
+__global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, GradientView grad, KeptPixels kept,
                                       SplatGradient* gradients, bool in_turn) {
   const int tile = static_cast<int>(blockIdx.x);
   const TilePixel pixel(saved, tile);
   const uint32_t begin = saved.tile_begin[tile];
   const uint32_t end = saved.tile_begin[tile + 1];
   const auto run = [&] {
-    const PixelGradient<asked> g(grad, left, o.background, pixel.index);
+    const PixelGradient<asked> g(grad, kept, o.background, pixel.index);
+    const KeptPixel own(kept, pixel.index);
     float all = 0;
     float transmittance = 1;
     int taken = 0;
@@ -250,10 +198,10 @@ __global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, Gradient
       transmittance = 1;
       taken = 0;
       for_each_hit(saved, pixel, begin, end, [&](uint32_t place, const Splat& s, const PixelFootprint& at) {
-        if (taken > g.last) return false;
+        if (taken > own.last) return false;
         const float alpha = lower(at.opacity, o.alpha_max);
         const float weight = alpha * transmittance;
-        f(place, s, at, alpha, weight, weight * g.by_weight(o, s, at));
+        f(place, s, at, alpha, weight, weight * scalar::grad_weight<asked>(OneLane{}, o, s, at, g, own));
         transmittance -= weight;
         ++taken;
         return true;
@@ -265,13 +213,16 @@ __global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, Gradient
     for_each_taken([&](uint32_t place, const Splat& s, const PixelFootprint& at, float alpha, float weight,
                        float share) {
       done += share;
-      const float own = g.by_weight(o, s, at);
-      const float grad_alpha = transmittance * own - (all - done) / (1.0F - alpha);
-      float sums[sum_of::count] = {};
-      g.add(o, s, at, weight, grad_alpha, g.median_place == taken, sums);
+      const float by_weight = scalar::grad_weight<asked>(OneLane{}, o, s, at, g, own);
+      const float grad_alpha = transmittance * by_weight - (all - done) / (1.0F - alpha);
+      SplatGradient sums{};
+      scalar::add_hit<asked>(OneLane{}, o, s, at, g, own, weight, grad_alpha, true, own.median == taken,
+                             sums);
       float* const to = &gradients[saved.entries[begin + place].entry].u_x;
-      for (int j = 0; j < sum_of::count; ++j) {
-        if (sums[j] != 0) atomicAdd(to + j, sums[j]);
+      const float* const from = &sums.u_x;
+#pragma unroll
+      for (int j = 0; j < sums_stored; ++j) {
+        if (from[j] != 0) atomicAdd(to + j, from[j]);
       }
     });
   };
@@ -288,7 +239,7 @@ __global__ void blend_backward_by_hit(SavedView saved, KernelOptions o, Gradient
 template <Asked asked>
 void blend_backward(const Options& options, const Saved& saved, const GradientView& grad) {
   const Saved::Pixels& p = saved.pixels;
-  const KeptPixels left{p.transmittance.data(), p.alpha.data(), p.depth.data(), p.m.data(), p.m2.data(),
+  const KeptPixels kept{p.transmittance.data(), p.alpha.data(), p.depth.data(), p.m.data(), p.m2.data(),
                         p.inverse_z.data(),     p.last.data(),  p.median.data()};
   Tensor<SplatGradient>& gradients = saved.scratch.gradients;
   gradients.place(Device::cuda).resize({saved.entries.size()});
@@ -297,11 +248,11 @@ void blend_backward(const Options& options, const Saved& saved, const GradientVi
   const cuda::Grid grid{saved.tiles(), pixels_per_tile};
   if (options.sort == SortOrder::centre) {
     cuda::launch("raster: blend backward", grid, blend_backward_by_centre<asked>, view, kernel_options, grad,
-                 left, gradients.data());
+                 kept, gradients.data());
   } else {
     gradients.zero();
     cuda::launch("raster: blend backward by hit", grid, blend_backward_by_hit<asked>, view, kernel_options,
-                 grad, left, gradients.data(), cuda::deterministic());
+                 grad, kept, gradients.data(), cuda::deterministic());
   }
 }
 
