@@ -55,6 +55,13 @@ function(traceflow_join_sources list)
   set(${list} ${joined} PARENT_SCOPE)
 endfunction()
 
+# The build of a program that is linked with the CUDA code, or its emulation, fails if code that the libraries call by a
+# weak name is missing.
+function(traceflow_require_cuda_code target)
+  add_custom_command(TARGET ${target} POST_BUILD VERBATIM
+    COMMAND ${CMAKE_COMMAND} -D NM=${CMAKE_NM} -D PROGRAM=$<TARGET_FILE:${target}> -P ${PROJECT_SOURCE_DIR}/cmake/RequireCudaCode.cmake)
+endfunction()
+
 # traceflow_cuda: the .cu files of all libraries as objects, so that each of their names finds the weak ones that call it.
 # Programs link it; where CUDA is left out it is empty.
 function(traceflow_cuda_library)

@@ -13,7 +13,8 @@
 
 // Marks the declaration of a function that is defined only in programs linked with the CUDA code. In others
 // its address is null. A caller that holds tensors on the CUDA device may call it unchecked: without the CUDA
-// code no tensor can be there.
+// code no tensor can be there, and the build of a program with the CUDA code fails if a function is missing
+// (cmake/RequireCudaCode.cmake).
 #define TRACEFLOW_WITH_CUDA [[gnu::weak]]
 
 // For a small function that must be inlined for a loop to be vectorised, whatever the loop's target is.

@@ -25,15 +25,15 @@ struct Similarity {
 // rotation is the identity and the scale 1.
 inline Similarity fit_similarity(std::span<const Vec3<double>> from, std::span<const Vec3<double>> to) {
   const auto count = static_cast<double>(from.size());
-  Vec3<double> middle_from(0), middle_to(0);
+  Vec3<double> centroid_from(0), centroid_to(0);
   for (size_t i = 0; i < from.size(); ++i) {
-    middle_from += from[i] / count;
-    middle_to += to[i] / count;
+    centroid_from += from[i] / count;
+    centroid_to += to[i] / count;
   }
   Mat3<double> moments(0);  // Σ b aᵀ
   double size = 0;          // Σ |a|²
   for (size_t i = 0; i < from.size(); ++i) {
-    const Vec3<double> a = from[i] - middle_from, b = to[i] - middle_to;
+    const Vec3<double> a = from[i] - centroid_from, b = to[i] - centroid_to;
     moments += outerProduct(b, a);
     size += dot(a, a);
   }
@@ -50,7 +50,7 @@ inline Similarity fit_similarity(std::span<const Vec3<double>> from, std::span<c
   Similarity result;
   if (size > 0) result.scale = eigen.values[3] / size;
   if (eigen.values[3] > 0) result.rotation = rotation_from_quaternion(eigen.vectors[3]);
-  result.shift = middle_to - result.scale * (result.rotation * middle_from);
+  result.shift = centroid_to - result.scale * (result.rotation * centroid_from);
   return result;
 }
 

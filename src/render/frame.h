@@ -70,7 +70,6 @@ struct FrameGradient {
   Tensor<float> pseudo_normal;          // H×W×3
   Tensor<float> distortion;             // H×W
   Tensor<float> alpha;                  // H×W
-  Tensor<float> depth;                  // H×W
   Tensor<float> silhouette;             // H×W
   Tensor<float> main_position;          // M×3, for the posed main surfels
   Tensor<float> environment_residuals;  // N×outputs, for the environment's field

@@ -254,7 +254,6 @@ void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGra
   take(grad_frame.silhouette, grad_raster_.silhouette);
   take(grad_frame.distortion, grad_raster_.distortion);
   take(grad_frame.normal, grad_raster_.normal);
-  if (with_geometry && !grad_frame.depth.empty()) grad_raster_.depth = grad_frame.depth;
   if (faces) {
     surface::pseudo_normals_backward(request.camera, frame_.raster.depth, frame_.raster.median_depth,
                                      frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,

@@ -7,7 +7,7 @@ namespace traceflow {
 // How light changes over time. For surfels of no body, such as a table that a body's shadow crosses, it is a
 // grid of the logarithm of the brightness, in space and time. The logarithm is trilinear between points, and
 // 0 on the faces of the box and outside. On a body, which turns in the light and passes lamps, it is a
-// logarithm that is linear in space, b₀ + b · (p − m)/r with the body's middle m and radius r. At a fixed
+// logarithm that is linear in space, b₀ + b · (p − m)/r with the body's centre m and radius r. At a fixed
 // time it approximates Lambertian reflection of distant light. Everything is linear between times, and
 // constant before the first and after the last. Also holds gradients and Adam's moments. T is float in the
 // program, double in references.
@@ -17,7 +17,7 @@ struct BasicLighting {
   Tensor<T> time;  // L, ascending, in [0, 1]. Not trained
   Tensor<T> brightness;  // L×Z×Y×X, logarithms; Z, Y, X of 3 or more, evenly spaced over the box
   // For each of B bodies; all are empty if the light on bodies is constant.
-  Tensor<T> middle;           // B×L×3, where the body is, scene units. Not trained
+  Tensor<T> centre;           // B×L×3, where the body is, scene units. Not trained
   Tensor<T> radius;           // B, scene units, above 0. Not trained
   Tensor<T> body_brightness;  // B×L×4: b₀, and b along the axes of the world
 
@@ -29,7 +29,7 @@ struct BasicLighting {
   // A copy on a device.
   BasicLighting on(Device device) const {
     return {box.on(device),    time.on(device),   brightness.on(device),
-            middle.on(device), radius.on(device), body_brightness.on(device)};
+            centre.on(device), radius.on(device), body_brightness.on(device)};
   }
 
   // Takes the shapes and the device of another, and reuses the memory.
@@ -38,7 +38,7 @@ struct BasicLighting {
     box.place(device).resize(other.box.shape());
     time.place(device).resize(other.time.shape());
     brightness.place(device).resize(other.brightness.shape());
-    middle.place(device).resize(other.middle.shape());
+    centre.place(device).resize(other.centre.shape());
     radius.place(device).resize(other.radius.shape());
     body_brightness.place(device).resize(other.body_brightness.shape());
   }
@@ -63,12 +63,12 @@ BasicLighting<To> zeros_like(const BasicLighting<From>& lighting) {
   const Device device = lighting.device();
   const auto zeros = [&](const Tensor<From>& like) { return Tensor<To>(like.shape(), device); };
   return {zeros(lighting.box),    zeros(lighting.time),   zeros(lighting.brightness),
-          zeros(lighting.middle), zeros(lighting.radius), zeros(lighting.body_brightness)};
+          zeros(lighting.centre), zeros(lighting.radius), zeros(lighting.body_brightness)};
 }
 template <class To, class From>
 BasicLighting<To> convert(const BasicLighting<From>& lighting) {
   return {convert<To>(lighting.box),    convert<To>(lighting.time),   convert<To>(lighting.brightness),
-          convert<To>(lighting.middle), convert<To>(lighting.radius), convert<To>(lighting.body_brightness)};
+          convert<To>(lighting.centre), convert<To>(lighting.radius), convert<To>(lighting.body_brightness)};
 }
 
 }  // namespace traceflow

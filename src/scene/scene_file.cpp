@@ -168,7 +168,7 @@ void put_lighting(const Lighting& lighting, Safetensors& file) {
   file.add("scene/lighting/time", lighting.time);
   file.add("scene/lighting/brightness", lighting.brightness);
   if (lighting.bodies() == 0) return;
-  file.add("scene/lighting/middle", lighting.middle);
+  file.add("scene/lighting/middle", lighting.centre);
   file.add("scene/lighting/radius", lighting.radius);
   file.add("scene/lighting/body_brightness", lighting.body_brightness);
 }
@@ -200,7 +200,7 @@ Lighting get_lighting(const Safetensors& file, int64_t bodies) {
     if (!(radius > 0))
       throw InputError(file.origin(), "scene/lighting/radius", number_text(radius), "above 0");
   }
-  lighting.middle = take(file, "scene/lighting/middle", {bodies, lighting.times(), 3});
+  lighting.centre = take(file, "scene/lighting/middle", {bodies, lighting.times(), 3});
   lighting.body_brightness = take(file, "scene/lighting/body_brightness", {bodies, lighting.times(), 4});
   return lighting;
 }

@@ -190,15 +190,15 @@ Tensor<float> times_of(const std::vector<View>& views) {
 }
 
 Vec3<float> median_of(const Surfels& surfels, const std::vector<int64_t>& rows) {
-  Vec3<float> middle(0);
+  Vec3<float> median(0);
   std::vector<float> values(rows.size());
   for (int axis = 0; axis < 3; ++axis) {
     for (size_t k = 0; k < rows.size(); ++k) values[k] = surfels.position(rows[k], axis);
     const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), half, values.end());
-    middle[axis] = *half;
+    median[axis] = *half;
   }
-  return middle;
+  return median;
 }
 
 // The mask, dilated by a square of `margin` pixels to each side.
@@ -356,8 +356,8 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
     if (points.empty()) continue;
     // Farthest-point sampling, starting at the centre.
     std::vector<double> off(points.size());
-    const Vec3<double> middle = load3<double>(motion.centre.row(b));
-    for (size_t k = 0; k < points.size(); ++k) off[k] = -glm::length(points[k] - middle);
+    const Vec3<double> centre = load3<double>(motion.centre.row(b));
+    for (size_t k = 0; k < points.size(); ++k) off[k] = -glm::length(points[k] - centre);
     for (int64_t n = 0; n < each; ++n) {
       const auto next = static_cast<size_t>(std::max_element(off.begin(), off.end()) - off.begin());
       if (n > 0 && !(off[next] > 0)) break;
@@ -438,7 +438,7 @@ Tensor<float> positions_at(float time, const Motion& motion, const Surfels& surf
 }
 
 struct Sphere {
-  Vec3<float> middle;
+  Vec3<float> centre;
   float radius;  // above 0
 };
 // The sphere of a body's opaque surfels, which are at `position`; the world's origin and 1 if it has none.
@@ -453,9 +453,9 @@ Sphere sphere_around(const Tensor<float>& position, const Surfels& surfels, int3
     ++count;
   }
   if (count == 0) return {Vec3<float>(0), 1};
-  const Vec3<double> middle = sum / count;
-  const double radius = std::sqrt(std::max(0.0, squares / count - dot(middle, middle)));
-  return {Vec3<float>(middle), radius > 0 ? static_cast<float>(radius) : 1.0F};
+  const Vec3<double> centroid = sum / count;
+  const double radius = std::sqrt(std::max(0.0, squares / count - dot(centroid, middle)));
+  return {Vec3<float>(centroid), radius > 0 ? static_cast<float>(radius) : 1.0F};
 }
 
 }  // namespace
@@ -465,7 +465,7 @@ void carry_lighting(const Motion& motion, const Surfels& surfels, Lighting& ligh
     const Tensor<float> position = positions_at(lighting.time[key], motion, surfels);
     for (int64_t b = 0; b < lighting.bodies(); ++b) {
       const Sphere sphere = sphere_around(position, surfels, static_cast<int32_t>(b));
-      store3(&lighting.middle(b, key, 0), sphere.middle);
+      store3(&lighting.centre(b, key, 0), sphere.centre);
       if (key == 0) lighting.radius[b] = sphere.radius;
     }
   }
@@ -507,7 +507,7 @@ Lighting lighting_around(const Motion& motion, const Surfels& surfels, int64_t c
   lighting.brightness.reset(
       {lighting.times(), points(high.z - low.z), points(high.y - low.y), points(high.x - low.x)});
   if (!on_bodies) return lighting;
-  lighting.middle.reset({motion.bodies(), lighting.times(), 3});
+  lighting.centre.reset({motion.bodies(), lighting.times(), 3});
   lighting.radius.reset({motion.bodies()});
   lighting.body_brightness.reset({motion.bodies(), lighting.times(), 4});
   carry_lighting(motion, surfels, lighting);

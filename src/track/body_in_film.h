@@ -78,7 +78,7 @@ struct BodyInFilm {
   std::vector<int64_t> nodes;  // of the body
   std::vector<FilmPoint> points;
   FilmViews film;
-  std::vector<BodyInView> looks;
+  std::vector<BodyInView> in_views;
 
   // Selects at most 1,000 points: opaque surfels, evenly spaced by index.
   BodyInFilm(const Surfels& surfels, int32_t of_body, const raster::Options& drawing, Motion& moves,
@@ -97,22 +97,22 @@ struct BodyInFilm {
   // Samples all views at the current pose of the body.
   void show(bool with_derivatives);
   // The position of the body's pivot at the time of a view.
-  Vec3<double> pivot(const BodyInView& look) const;
+  Vec3<double> pivot(const BodyInView& in_view) const;
 
  private:
   void choose_points();
   void find_nodes(FilmPoint& point) const;
-  void pose(BodyInView& look) const;
-  static Vec3<double> bent(const FilmPoint& point, const BodyInView& look);
-  static Mat3<double> bend_of(const FilmPoint& point, const BodyInView& look);
-  Vec3<double> arm(const FilmPoint& point, const BodyInView& look) const;
-  void find_what_is_in_front(const raster::Output& picture, BodyInView& look) const;
-  void show(BodyInView& look, bool with_derivatives) const;
+  void pose(BodyInView& in_view) const;
+  static Vec3<double> bent(const FilmPoint& point, const BodyInView& in_view);
+  static Mat3<double> bend_of(const FilmPoint& point, const BodyInView& in_view);
+  Vec3<double> arm(const FilmPoint& point, const BodyInView& in_view) const;
+  void find_what_is_in_front(const raster::Output& picture, BodyInView& in_view) const;
+  void show(BodyInView& in_view, bool with_derivatives) const;
   // Three channels at a point, and their derivatives by its position; false if the image does not show it.
-  bool show(const BodyInView& look, const DetailPhoto& photo, size_t first, bool with_derivatives,
+  bool show(const BodyInView& in_view, const DetailPhoto& photo, size_t first, bool with_derivatives,
             ShownPoint& shown) const;
   // Rotates the normal and its derivatives back to the body at rest.
-  static void take_to_rest(const BodyInView& look, bool with_derivatives, ShownPoint& shown);
+  static void take_to_rest(const BodyInView& in_view, bool with_derivatives, ShownPoint& shown);
 };
 
 }  // namespace traceflow

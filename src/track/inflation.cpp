@@ -11,7 +11,7 @@ namespace traceflow {
 
 namespace {
 
-Vec2<float> middle_of(int64_t pixel, int64_t width) {
+Vec2<float> pixel_centre(int64_t pixel, int64_t width) {
   const int64_t row = pixel / width, column = pixel % width;
   return {static_cast<float>(column) + 0.5F, static_cast<float>(row) + 0.5F};
 }
@@ -27,7 +27,7 @@ std::vector<Vec2<float>> outline_of(const std::vector<int64_t>& part, const Came
     const bool is_inside = (row == 0 || mask[pixel - width] != 0) && (column == 0 || mask[pixel - 1] != 0) &&
                            (row + 1 == height || mask[pixel + width] != 0) &&
                            (column + 1 == width || mask[pixel + 1] != 0);
-    if (!is_inside) outline.push_back(middle_of(pixel, width));
+    if (!is_inside) outline.push_back(pixel_centre(pixel, width));
   }
   return outline;
 }
@@ -84,7 +84,7 @@ Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& ca
   std::vector<float> inwards(part.size());
   parallel_for("inflation", count, [&](int64_t k) {
     const auto at = static_cast<size_t>(k);
-    inwards[at] = outline.empty() ? 0 : distance_to(outline, middle_of(part[at], camera.width));
+    inwards[at] = outline.empty() ? 0 : distance_to(outline, pixel_centre(part[at], camera.width));
   });
   const float radius = *std::max_element(inwards.begin(), inwards.end());
   // Every `step`th pixel of every `step`th row.
@@ -93,7 +93,7 @@ Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& ca
   std::vector<Vec3<float>> made;
   for (size_t k = 0; k < part.size(); ++k) {
     if (part[k] / camera.width % step != 0 || part[k] % camera.width % step != 0) continue;
-    const Vec2<float> at = middle_of(part[k], camera.width);
+    const Vec2<float> at = pixel_centre(part[k], camera.width);
     const float height = std::sqrt(inwards[k] * (2 * radius - inwards[k])) / camera.focal_x;
     made.push_back(camera.position + depth * (1 - height) * camera.ray_in_world(at.x, at.y));
   }

@@ -82,7 +82,7 @@ std::optional<SeenSample> see(const DetailSample& sample, const Camera<double>& 
   if (!(in_camera.z > 0) || !faces(rotation * Vec3<double>(sample.rest.normal), point - camera.position))
     return std::nullopt;
   const Vec2<double> at = camera.project(in_camera);
-  const std::optional<Looked> there = look(photo, at.x, at.y);
+  const std::optional<PhotoSample> there = sample_at(photo, at.x, at.y);
   if (!there) return std::nullopt;
   const auto [x_by, y_by] = pixel_by_point(camera, in_camera);
   SeenSample seen;
@@ -127,7 +127,7 @@ double align_body(const Alignment& alignment, std::span<const DetailSample> samp
 
 }  // namespace
 
-std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
+std::optional<PhotoSample> sample_at(const DetailPhoto& photo, double x, double y) {
   const auto column = static_cast<int64_t>(std::floor(x - 0.5)),
              row = static_cast<int64_t>(std::floor(y - 0.5));
   if (column < 0 || row < 0 || column + 1 >= photo.camera.width || row + 1 >= photo.camera.height)
@@ -141,7 +141,7 @@ std::optional<Looked> look(const DetailPhoto& photo, double x, double y) {
   const auto at = [&](int64_t r, int64_t c) { return load3<double>(&photo.detail(row + r, column + c, 0)); };
   const Vec3<double> top = (1 - right) * at(0, 0) + right * at(0, 1);
   const Vec3<double> bottom = (1 - right) * at(1, 0) + right * at(1, 1);
-  return Looked{(1 - down) * top + down * bottom,
+  return PhotoSample{(1 - down) * top + down * bottom,
                 (1 - down) * (at(0, 1) - at(0, 0)) + down * (at(1, 1) - at(1, 0)), bottom - top};
 }
 

@@ -27,11 +27,11 @@ DetailPhoto detail_of(FinePhotograph photograph, double blur = 0);
 DetailPhoto cropped(const DetailPhoto& photo);
 
 // A photograph at a place between pixels, and its derivatives by x and y.
-struct Looked {
+struct PhotoSample {
   Vec3<double> value, by_x, by_y;
 };
 // Bilinear. Returns nothing outside the mask or the image.
-std::optional<Looked> look(const DetailPhoto& photo, double x, double y);
+std::optional<PhotoSample> sample_at(const DetailPhoto& photo, double x, double y);
 
 // A point of a body at rest, with the detail of a photograph there.
 struct DetailSample {

@@ -107,20 +107,20 @@ struct PhotometricAdjustment::State : BodyInFilm {
     constexpr std::array<int64_t, 4> keys_apart = {1, 3, 9, 27};
     pairs.clear();
     half_bandwidth = 1;
-    for (size_t later = 0; later < looks.size(); ++later) {
-      const FilmView& view = *looks[later].view;
+    for (size_t later = 0; later < in_views.size(); ++later) {
+      const FilmView& view = *in_views[later].view;
       for (const int64_t apart : keys_apart) {
         std::optional<size_t> nearest;
         const auto away = [&](size_t other) {
-          return distance(looks[other].view->drawn.position, view.drawn.position);
+          return distance(in_views[other].view->drawn.position, view.drawn.position);
         };
         for (size_t k = 0; k < later; ++k) {
-          if (looks[k].view->key == view.key - apart && (!nearest || away(k) < away(*nearest))) nearest = k;
+          if (in_views[k].view->key == view.key - apart && (!nearest || away(k) < away(*nearest))) nearest = k;
         }
         if (!nearest) continue;
         pairs.push_back({later, *nearest});
         half_bandwidth =
-            std::max(half_bandwidth, block_of(view.key) + 1 - block_of(looks[*nearest].view->key));
+            std::max(half_bandwidth, block_of(view.key) + 1 - block_of(in_views[*nearest].view->key));
       }
     }
     half_bandwidth = std::min<int64_t>(half_bandwidth, static_cast<int64_t>(block_sizes.size()) - 1);
@@ -128,35 +128,35 @@ struct PhotometricAdjustment::State : BodyInFilm {
 
   void find_rays() {
     pose_rays.assign(static_cast<size_t>(motion.keys()), Vec3<double>(0));
-    for (const BodyInView& look : looks) {
-      const int64_t key = look.view->key;
+    for (const BodyInView& in_view : in_views) {
+      const int64_t key = in_view.view->key;
       pose_rays[static_cast<size_t>(key)] =
           normalize(load3<double>(motion.centre.row(body)) + load3<double>(&motion.shift(body, key, 0)) -
-                    Vec3<double>(look.view->drawn.position));
+                    Vec3<double>(in_view.view->drawn.position));
     }
     node_rays.assign(nodes.size() * static_cast<size_t>(times()), Vec3<double>(0));
-    for (int64_t time = 0; time < times() && !looks.empty(); ++time) {
-      const auto away = [&](const BodyInView& look) {
-        return std::abs(motion.time[look.view->key] - all_nodes->time[time]);
+    for (int64_t time = 0; time < times() && !in_views.empty(); ++time) {
+      const auto away = [&](const BodyInView& in_view) {
+        return std::abs(motion.time[in_view.view->key] - all_nodes->time[time]);
       };
-      const BodyInView& look =
-          *std::min_element(looks.begin(), looks.end(),
+      const BodyInView& in_view =
+          *std::min_element(in_views.begin(), in_views.end(),
                             [&](const BodyInView& a, const BodyInView& b) { return away(a) < away(b); });
-      const Mat3<double> rotation = rotations_at(motion, look.view->key)[static_cast<size_t>(body)];
+      const Mat3<double> rotation = rotations_at(motion, in_view.view->key)[static_cast<size_t>(body)];
       const Vec3<double> pivot = load3<double>(motion.centre.row(body));
       for (size_t n = 0; n < nodes.size(); ++n) {
         const Vec3<double> arm =
             load3<double>(all_nodes->centre.row(nodes[n])) + load3<double>(shift(n, time)) - pivot;
         const Vec3<double> at =
-            pivot + rotation * arm + load3<double>(&motion.shift(body, look.view->key, 0));
+            pivot + rotation * arm + load3<double>(&motion.shift(body, in_view.view->key, 0));
         node_rays[static_cast<size_t>(time) * nodes.size() + n] =
-            transpose(rotation) * normalize(at - Vec3<double>(look.view->drawn.position));
+            transpose(rotation) * normalize(at - Vec3<double>(in_view.view->drawn.position));
       }
     }
   }
 
   double pair_cost(const ViewPair& pair) const {
-    const BodyInView &later = looks[pair.later], &earlier = looks[pair.earlier];
+    const BodyInView &later = in_views[pair.later], &earlier = in_views[pair.earlier];
     double cost = 0;
     for (size_t i = 0; i < points.size(); ++i) {
       if (later.in_front[i] == 0 || earlier.in_front[i] == 0) continue;
@@ -182,7 +182,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
     int64_t count = 0;
     for (const ViewPair& pair : pairs) {
       for (size_t i = 0; i < points.size(); ++i)
-        count += looks[pair.later].in_front[i] != 0 && looks[pair.earlier].in_front[i] != 0 ? 1 : 0;
+        count += in_views[pair.later].in_front[i] != 0 && in_views[pair.earlier].in_front[i] != 0 ? 1 : 0;
     }
     return static_cast<double>(count);
   }
@@ -190,19 +190,19 @@ struct PhotometricAdjustment::State : BodyInFilm {
   // The derivatives of one channel in one view: by the nodes that move the point, and by the pose. by_point:
   // in the rest frame; by_turn: of the deformed frame.
   template <class F>
-  void for_numbers(const FilmPoint& point, const BodyInView& look, const ShownPoint& shown,
+  void for_numbers(const FilmPoint& point, const BodyInView& in_view, const ShownPoint& shown,
                    const Vec3<double>& by_point, const Vec3<double>& by_turn, F&& f) const {
     const Vec3<double> in_body = shown.bend * by_point;
     for (const NodeWeight& of : point.nodes) {
       const auto n = static_cast<size_t>(of.node);
-      const NodeInView& node = look.nodes[n];
+      const NodeInView& node = in_view.nodes[n];
       const Vec3<double> force = of.weight * in_body;
       const Vec3<double> torque =
           cross(node.rotation * (point.rest - node.rest), force) + of.weight * by_turn;
       f(pose_numbers * of.node, torque, node_radius(n) * force);
     }
-    const Vec3<double> in_world = look.rotation * in_body;
-    f(node_numbers(), cross(shown.arm, in_world) + look.rotation * by_turn, radius * in_world);
+    const Vec3<double> in_world = in_view.rotation * in_body;
+    f(node_numbers(), cross(shown.arm, in_world) + in_view.rotation * by_turn, radius * in_world);
   }
 
   // A pair has the numbers of nodes and pose in the later view, followed by those in the earlier one.
@@ -211,7 +211,7 @@ struct PhotometricAdjustment::State : BodyInFilm {
   void add_pair(const ViewPair& pair, Derivatives derivatives, Eigen::MatrixXd& a, Eigen::VectorXd& b) const {
     a.setZero(2 * view_numbers(), 2 * view_numbers());
     b.setZero(2 * view_numbers());
-    const BodyInView &later = looks[pair.later], &earlier = looks[pair.earlier];
+    const BodyInView &later = in_views[pair.later], &earlier = in_views[pair.earlier];
     std::array<int64_t, 2 * pose_numbers*(most_nodes + 1)> at{};
     std::array<double, 2 * pose_numbers*(most_nodes + 1)> row{};
     for (size_t i = 0; i < points.size(); ++i) {
@@ -251,17 +251,17 @@ struct PhotometricAdjustment::State : BodyInFilm {
     }
   }
 
-  std::array<Segment, 3> parts_of(const BodyInView& look, int64_t from) const {
-    const int64_t count = node_numbers(), key = look.view->key;
-    return {Segment{look.span.from, 0, from, count, 1 - look.span.share},
-            Segment{look.span.to, 0, from, count, look.span.share},
+  std::array<Segment, 3> parts_of(const BodyInView& in_view, int64_t from) const {
+    const int64_t count = node_numbers(), key = in_view.view->key;
+    return {Segment{in_view.span.from, 0, from, count, 1 - in_view.span.share},
+            Segment{in_view.span.to, 0, from, count, in_view.span.share},
             Segment{block_of(key), pose_offset(key), from + count, pose_numbers, 1}};
   }
 
   void scatter(const ViewPair& pair, const Eigen::MatrixXd& a, const Eigen::VectorXd& b,
                Equations& to) const {
-    const std::array<Segment, 3> later = parts_of(looks[pair.later], 0),
-                                 earlier = parts_of(looks[pair.earlier], view_numbers());
+    const std::array<Segment, 3> later = parts_of(in_views[pair.later], 0),
+                                 earlier = parts_of(in_views[pair.earlier], view_numbers());
     std::array<Segment, 6> parts{};
     std::copy(later.begin(), later.end(), parts.begin());
     std::copy(earlier.begin(), earlier.end(), parts.begin() + 3);

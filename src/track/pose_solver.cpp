@@ -203,7 +203,7 @@ void PoseSolver::weigh(const TrackWeights& weights) {
   weigh_colour(weights);
 }
 
-const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& weights, double sigma,
+const PoseSolver::Residuals& PoseSolver::residuals_of(size_t at, const TrackWeights& weights, double sigma,
                                               bool with_jacobian) {
   const TrackTarget& target = targets_[at];
   raster::forward(posed_, target.camera, options_, whole_, blended_.get());
@@ -243,7 +243,7 @@ const PoseSolver::Residuals& PoseSolver::look(size_t at, const TrackWeights& wei
 double PoseSolver::add_targets(const TrackWeights& weights, double sigma, NormalEquations& equations) {
   double cost = 0;
   for (size_t k = 0; k < targets_.size(); ++k) {
-    const Residuals& r = look(k, weights, sigma, true);
+    const Residuals& r = residuals_of(k, weights, sigma, true);
     cost += robust_cost(r.value);
     add_normal_equations(r.value, r.jacobian, equations);
   }
@@ -428,7 +428,7 @@ void PoseSolver::solve(const TrackWeights& weights, const PoseSteps& steps) {
       take(found);
       double after = cost_of_texture(weights, nullptr);
       for (size_t at = 0; at < targets_.size(); ++at)
-        after += robust_cost(look(at, weights, sigma, false).value);
+        after += robust_cost(residuals_of(at, weights, sigma, false).value);
       better = after < before;
       if (better) break;
       motion_.rotation = rotation;
@@ -443,7 +443,7 @@ double PoseSolver::cost(const TrackWeights& weights) {
   constexpr double sigma = 1;  // pixels
   weigh(weights);
   double sum = 0;
-  for (size_t at = 0; at < targets_.size(); ++at) sum += robust_cost(look(at, weights, sigma, false).value);
+  for (size_t at = 0; at < targets_.size(); ++at) sum += robust_cost(residuals_of(at, weights, sigma, false).value);
   return sum;
 }
 

@@ -104,7 +104,7 @@ class PoseSolver {
   void weigh_normals(const TrackWeights& weights, Over over);
   void weigh_colour(const TrackWeights& weights);
   // at: index of a target. sigma: blur in pixels. Valid until the next call.
-  const Residuals& look(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
+  const Residuals& residuals_of(size_t at, const TrackWeights& weights, double sigma, bool with_jacobian);
   // Adds the equations of the targets and returns their cost.
   double add_targets(const TrackWeights& weights, double sigma, NormalEquations& equations);
   // Removes the loose rotations from the equations.

@@ -26,7 +26,7 @@ constexpr double wide_blur = 4;  // pixels
 // The largest part of the mask without other bodies than the lost one.
 struct FreePart {
   double area = 0;         // pixels
-  Vec2<double> middle{0};  // pixels
+  Vec2<double> centroid{0};  // pixels
   bool at_border = false;
 };
 
@@ -44,7 +44,7 @@ FreePart free_part(const TrackTarget& target, const BodySurface& surface, int64_
   FreePart part{static_cast<double>(largest.size())};
   for (const int64_t pixel : largest) {
     const int64_t row = pixel / width, column = pixel % width;
-    part.middle +=
+    part.centroid +=
         Vec2<double>(static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5) / part.area;
     part.at_border = part.at_border || row == 0 || column == 0 || row + 1 == height || column + 1 == width;
   }
@@ -88,7 +88,7 @@ std::optional<Vec3<double>> place_in(const FreePart& part, const PoseSolver& sol
   if (!(depth > 0)) return std::nullopt;
   if (!part.at_border && area > 0) depth *= std::sqrt(area / part.area);
   const Vec3<double> ray(
-      camera.ray_in_world(static_cast<float>(part.middle.x), static_cast<float>(part.middle.y)));
+      camera.ray_in_world(static_cast<float>(part.centroid.x), static_cast<float>(part.centroid.y)));
   return Vec3<double>(camera.position) + depth * ray - centre;
 }
 

@@ -104,14 +104,14 @@ void CameraRefinement::step(int64_t view, const CameraGradient<float>& gradient,
 // and lengths in units of their root mean square. Σ r_i = 0 decouples the unknowns.
 void CameraRefinement::leave_out_similarity() {
   const auto count = static_cast<double>(given_.size());
-  Vec3<double> middle(0);
-  for (const Camera<float>& camera : given_) middle += Vec3<double>(camera.position) / count;
+  Vec3<double> centroid(0);
+  for (const Camera<float>& camera : given_) centroid += Vec3<double>(camera.position) / count;
   double spread = 0, along = 0;
   Vec3<double> mean_shift(0), moment(0), turns(0);
   Mat3<double> inertia(0);
   for (size_t i = 0; i < given_.size(); ++i) {
     const auto row = static_cast<int64_t>(i);
-    const Vec3<double> r = Vec3<double>(given_[i].position) - middle;
+    const Vec3<double> r = Vec3<double>(given_[i].position) - centroid;
     const Vec3<double> shift = load3<double>(corrections_.shift.row(row));
     spread += dot(r, r);
     along += dot(r, shift);
@@ -127,7 +127,7 @@ void CameraRefinement::leave_out_similarity() {
       inverse(inertia * per_length2 + Mat3<double>(count)) * (moment * per_length2 + turns);
   for (size_t i = 0; i < given_.size(); ++i) {
     const auto row = static_cast<int64_t>(i);
-    const Vec3<double> r = Vec3<double>(given_[i].position) - middle;
+    const Vec3<double> r = Vec3<double>(given_[i].position) - centroid;
     const Vec3<double> shared = mean_shift + cross(turn, r) + growth * r;
     store3(corrections_.shift.row(row), load3<double>(corrections_.shift.row(row)) - shared);
     store3(corrections_.turn.row(row), composed(-turn, load3<double>(corrections_.turn.row(row))));

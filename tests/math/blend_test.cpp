@@ -5,7 +5,6 @@
 #include <array>
 
 #include "base/random.h"
-#include "math/distortion_depth.h"
 #include "math/finite_differences.h"
 
 namespace traceflow {

@@ -185,7 +185,7 @@ TEST(SceneFile, LightingWithoutASizeOrWithoutItsTimesIsRefused) {
   EXPECT_EQ(says([](Lighting& lighting) { lighting.radius[1] = 0; }),
             "safetensors: scene/lighting/radius: found 0, expected above 0");
   EXPECT_NE(says([](Lighting& lighting) {
-              lighting.middle.resize({2, 1, 3});
+              lighting.centre.resize({2, 1, 3});
             }).find("scene/lighting/middle"),
             std::string::npos);
   EXPECT_NE(says([](Lighting& lighting) {

@@ -467,7 +467,7 @@ TEST(Bodies, TakeTheMiddleOfTheirLightAlong) {
       const Vec4<double> turn = unit_quaternion(load4<double>(&motion.rotation(b, 3 * k, 0)));
       const Vec3<double> now = rotation_from_quaternion(turn) * (rest - centre) + centre +
                                load3<double>(&motion.shift(b, 3 * k, 0));
-      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(lighting.middle(b, k, axis), now[axis], 1e-4);
+      for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(lighting.centre(b, k, axis), now[axis], 1e-4);
     }
   }
   for (const float v : lighting.body_brightness.values()) EXPECT_EQ(v, 0);
@@ -475,8 +475,8 @@ TEST(Bodies, TakeTheMiddleOfTheirLightAlong) {
   for (int64_t i = 0; i < motion.shift.size(); i += 3) motion.shift[i] += 0.25F;
   Lighting after = lighting;
   carry_lighting(motion, main, after);
-  for (int64_t i = 0; i < after.middle.size(); ++i)
-    EXPECT_NEAR(after.middle[i], lighting.middle[i] + (i % 3 == 0 ? 0.25F : 0), 1e-5);
+  for (int64_t i = 0; i < after.centre.size(); ++i)
+    EXPECT_NEAR(after.centre[i], lighting.centre[i] + (i % 3 == 0 ? 0.25F : 0), 1e-5);
   EXPECT_EQ(lighting_around(motion, main, 8, 3, false).bodies(), 0);
 }
 

@@ -13,7 +13,7 @@ namespace traceflow::lighting {
 struct Saved {
   Tensor<Place> places;
   // Working memory of backward.
-  Tensor<float> pulls;
+  Tensor<float> log_gradients;
   Tensor<int32_t> cells;
   cuda::KeyGroups lists;
 };
@@ -30,7 +30,7 @@ Grid grid_of(const Lighting& lighting, float time) {
 }
 
 Bodies bodies_of(const Lighting& lighting) {
-  return {lighting.middle.data(), lighting.radius.data(), lighting.body_brightness.data(), lighting.bodies()};
+  return {lighting.centre.data(), lighting.radius.data(), lighting.body_brightness.data(), lighting.bodies()};
 }
 
 // Lists 0 to n − 1 by their keys, like cuda::group_by_key.
@@ -73,12 +73,12 @@ void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Sav
   require(saved.places.size() == count, "backward follows forward of the same surfels",
           std::to_string(count));
   const Grid grid = grid_of(lighting, time);
-  saved.pulls.place(device).resize({count});
+  saved.log_gradients.place(device).resize({count});
   saved.cells.place(device).resize({count});
-  parallel_for(
-      device, "lighting: gradients back", count,
-      LightBack{grid, bodies_of(lighting), saved.places.data(), lit.sh.data(), lit.sh.row_size(),
-                grad_posed.sh.data(), grad_posed.position.data(), saved.pulls.data(), saved.cells.data()});
+  parallel_for(device, "lighting: gradients back", count,
+               LightBack{grid, bodies_of(lighting), saved.places.data(), lit.sh.data(), lit.sh.row_size(),
+                         grad_posed.sh.data(), grad_posed.position.data(), saved.log_gradients.data(),
+                         saved.cells.data()});
   if (grad_lighting == nullptr) return;
   if (device == Device::cpu)
     group_by_key_on_host(saved.cells, grid.size.points(), saved.lists);
@@ -86,11 +86,12 @@ void backward(const Lighting& lighting, float time, const PosedSurfels& lit, Sav
     cuda::group_by_key(saved.cells.data(), count, grid.size.points(), saved.lists);
   parallel_for(device, "lighting: collect", grid.size.points(),
                CollectAtPoint{grid, saved.lists.begin.data(), saved.lists.entry.data(), saved.places.data(),
-                              saved.pulls.data(), grad_lighting->brightness.data()});
+                              saved.log_gradients.data(), grad_lighting->brightness.data()});
   for (int64_t b = 0; b < lighting.bodies(); ++b) {
-    ordered_sum<BodyPull>(device, "lighting: collect on a body", count,
-                          BodyPullOfSurfel{static_cast<int32_t>(b), saved.places.data(), saved.pulls.data()},
-                          AddBodyPull{grid, grad_lighting->body_brightness.row(b)}, 1024);
+    ordered_sum<BodyGradient>(
+        device, "lighting: collect on a body", count,
+        BodyGradientOfSurfel{static_cast<int32_t>(b), saved.places.data(), saved.log_gradients.data()},
+        AddBodyGradient{grid, grad_lighting->body_brightness.row(b)}, 1024);
   }
 }
 

@@ -9,8 +9,8 @@ template void cuda::for_each_index(const char*, int64_t, const lighting::LightBa
 template void cuda::for_each_index(const char*, int64_t, const lighting::CollectAtPoint&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::ResistAlongRow&);
 template void cuda::for_each_index(const char*, int64_t, const lighting::ResistOnBody&);
-template void cuda::sum_each_index<lighting::BodyPull>(const char*, int64_t,
-                                                       const lighting::BodyPullOfSurfel&,
-                                                       const lighting::AddBodyPull&);
+template void cuda::sum_each_index<lighting::BodyGradient>(const char*, int64_t,
+                                                           const lighting::BodyGradientOfSurfel&,
+                                                           const lighting::AddBodyGradient&);
 
 }  // namespace traceflow

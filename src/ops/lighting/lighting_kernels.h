@@ -27,7 +27,7 @@ struct GridSize {
 // Where a surfel is in the grid or on a body.
 struct Place {
   int32_t cell = -1;  // the cell's corner with the lowest coordinates; −2 − b on body b; −1 if neither
-  Vec3<float> share{0};  // position in the cell, 0 to 1; on a body: offset from its middle, in radii
+  Vec3<float> share{0};  // position in the cell, 0 to 1; on a body: offset from its centre, in radii
   float gain = 1;
 
   TRACEFLOW_HD static int32_t cell_of_body(int32_t body) { return -2 - body; }
@@ -87,7 +87,7 @@ struct Grid {
 
 // The bodies at one time.
 struct Bodies {
-  const float *middle, *radius, *brightness;
+  const float *centre, *radius, *brightness;
   int64_t count;  // 0: the light on bodies is constant
 
   // Index of body b at key k.
@@ -104,7 +104,7 @@ struct Bodies {
     const auto share = static_cast<float>(span.share);
     const int64_t from = at(b, grid.keys, span.from), to = at(b, grid.keys, span.to);
     const Vec3<float> now =
-        (1 - share) * load3<float>(middle + 3 * from) + share * load3<float>(middle + 3 * to);
+        (1 - share) * load3<float>(centre + 3 * from) + share * load3<float>(centre + 3 * to);
     place.cell = Place::cell_of_body(b);
     place.share = (point - now) / radius[b];
     place.gain = std::exp((1 - share) * brightness[4 * from] + share * brightness[4 * to] +
@@ -137,7 +137,7 @@ struct LightSurfel {
 };
 
 // Turns surfel i's gradient into that before lighting, and writes the gradient of the logarithm there to
-// pulls.
+// log_gradients.
 struct LightBack {
   Grid grid;
   Bodies bodies;
@@ -145,31 +145,32 @@ struct LightBack {
   const float* lit;  // harmonics
   int64_t numbers;
   float *grad_sh, *grad_position;
-  float* pulls;
+  float* log_gradients;
   int32_t* cells;
 
   TRACEFLOW_HD void operator()(int64_t i) const {
     const Place place = places[i];
-    pulls[i] = 0;
+    log_gradients[i] = 0;
     cells[i] = -1;
     if (place.cell == -1) return;
-    double pull = 0;
+    double log_gradient = 0;
     for (int64_t k = i * numbers; k < (i + 1) * numbers; ++k) {
       const float half = k < i * numbers + 3 ? half_in_harmonics : 0;
-      pull += static_cast<double>(grad_sh[k]) * (lit[k] + half);
+      log_gradient += static_cast<double>(grad_sh[k]) * (lit[k] + half);
       grad_sh[k] *= place.gain;
     }
-    if (!(pull * 0 == 0) || pull == 0) return;
-    pulls[i] = static_cast<float>(pull);
+    if (!(log_gradient * 0 == 0) || log_gradient == 0) return;
+    log_gradients[i] = static_cast<float>(log_gradient);
     const motion::KeySpan<float> span = grid.span();
     if (const int32_t b = place.body(); b >= 0) {
-      add3(grad_position + 3 * i, Vec3<double>(pulls[i] / bodies.radius[b] * bodies.slope(grid, span, b)));
+      add3(grad_position + 3 * i,
+           Vec3<double>(log_gradients[i] / bodies.radius[b] * bodies.slope(grid, span, b)));
       return;
     }
     cells[i] = place.cell;
     Vec3<float> slope(0);
     for (int k = 0; k < 8; ++k) slope += grid.at(span, place.cell + grid.size.corner(k)) * place.slope(k);
-    add3(grad_position + 3 * i, Vec3<double>(pulls[i] * (slope * grid.density())));
+    add3(grad_position + 3 * i, Vec3<double>(log_gradients[i] * (slope * grid.density())));
   }
 };
 
@@ -178,7 +179,7 @@ struct CollectAtPoint {
   Grid grid;
   const int32_t *begin, *entry;  // the surfels of each cell
   const Place* places;
-  const float* pulls;
+  const float* log_gradients;
   float* grad_brightness;
 
   TRACEFLOW_HD void operator()(int64_t point) const {
@@ -189,7 +190,7 @@ struct CollectAtPoint {
       if (column < (k & 1) || row < ((k >> 1) & 1) || layer < (k >> 2)) continue;
       const int64_t cell = point - grid.size.corner(k);
       for (int32_t e = begin[cell]; e < begin[cell + 1]; ++e)
-        sum += static_cast<double>(places[entry[e]].weight(k)) * pulls[entry[e]];
+        sum += static_cast<double>(places[entry[e]].weight(k)) * log_gradients[entry[e]];
     }
     if (sum == 0) return;
     const motion::KeySpan<float> span = grid.span();
@@ -199,38 +200,38 @@ struct CollectAtPoint {
 };
 
 // The gradient of a body's four numbers.
-struct BodyPull {
-  double at_middle = 0;
+struct BodyGradient {
+  double at_centre = 0;
   Vec3<double> slope{0};
 
-  TRACEFLOW_HD BodyPull& operator+=(const BodyPull& other) {
-    at_middle += other.at_middle;
+  TRACEFLOW_HD BodyGradient& operator+=(const BodyGradient& other) {
+    at_centre += other.at_centre;
     slope += other.slope;
     return *this;
   }
 };
-struct BodyPullOfSurfel {
+struct BodyGradientOfSurfel {
   int32_t which;
   const Place* places;
-  const float* pulls;
+  const float* log_gradients;
 
-  TRACEFLOW_HD BodyPull operator()(int64_t i) const {
-    const double pull = pulls[i];
-    if (places[i].body() != which || pull == 0) return {};
-    return {pull, pull * Vec3<double>(places[i].share)};
+  TRACEFLOW_HD BodyGradient operator()(int64_t i) const {
+    const double log_gradient = log_gradients[i];
+    if (places[i].body() != which || log_gradient == 0) return {};
+    return {log_gradient, log_gradient * Vec3<double>(places[i].share)};
   }
 };
-struct AddBodyPull {
+struct AddBodyGradient {
   Grid grid;
   float* gradient;  // of the body's keys
 
-  TRACEFLOW_HD void operator()(const BodyPull& sum) const {
+  TRACEFLOW_HD void operator()(const BodyGradient& sum) const {
     const motion::KeySpan<float> span = grid.span();
     add(span.from, 1 - span.share, sum);
     add(span.to, span.share, sum);
   }
-  TRACEFLOW_HD void add(int64_t key, double share, const BodyPull& sum) const {
-    gradient[4 * key] += static_cast<float>(share * sum.at_middle);
+  TRACEFLOW_HD void add(int64_t key, double share, const BodyGradient& sum) const {
+    gradient[4 * key] += static_cast<float>(share * sum.at_centre);
     add3(gradient + 4 * key + 1, share * sum.slope);
   }
 };

@@ -35,7 +35,7 @@ void forward_reference(const BasicLighting<double>& lighting, const Tensor<int32
       if (lighting.bodies() == 0) continue;
       double logarithm = now(lighting.body_brightness, body[i], 0);
       for (int64_t axis = 0; axis < 3; ++axis) {
-        const double offset = posed.position(i, axis) - now(lighting.middle, body[i], axis);
+        const double offset = posed.position(i, axis) - now(lighting.centre, body[i], axis);
         logarithm += now(lighting.body_brightness, body[i], axis + 1) * offset / lighting.radius[body[i]];
       }
       light_surfel(posed, i, logarithm);

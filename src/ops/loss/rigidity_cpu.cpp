@@ -18,7 +18,7 @@ Mean rigidity_on_host(const Tensor<float>& rest, const Tensor<float>& posed, con
   std::vector<int32_t> posed_at(static_cast<size_t>(rest.dim(0)), -1);
   for (int64_t i = 0; i < count; ++i) posed_at[static_cast<size_t>(stored(i))] = static_cast<int32_t>(i);
 
-  std::vector<Edge> pulls(static_cast<size_t>(count * k));
+  std::vector<Edge> measured(static_cast<size_t>(count * k));
   parallel_for("loss: rigidity edges", count, [&](int64_t i) {
     const int64_t near = stored(i);
     const Vec3<float> p = load3<float>(rest.row(near)), x = load3<float>(posed.row(i));
@@ -28,13 +28,13 @@ Mean rigidity_on_host(const Tensor<float>& rest, const Tensor<float>& posed, con
       const int32_t j = far < 0 ? -1 : posed_at[static_cast<size_t>(far)];
       if (j < 0) continue;
       const Ends ends{load3<float>(rest.row(far)) - p, load3<float>(posed.row(j)) - x};
-      pulls[static_cast<size_t>(i * k + n)] = measure(ends, radius, strain2);
+      measured[static_cast<size_t>(i * k + n)] = measure(ends, radius, strain2);
     }
   });
 
   double sum = 0;
   int64_t counted = 0;
-  for (const Edge& edge : pulls) {
+  for (const Edge& edge : measured) {
     sum += edge.value;
     counted += edge.counts ? 1 : 0;
   }
@@ -43,7 +43,7 @@ Mean rigidity_on_host(const Tensor<float>& rest, const Tensor<float>& posed, con
   for (int64_t i = 0; i < count; ++i) {
     const int64_t near = stored(i);
     for (int64_t n = 0; n < k; ++n) {
-      const Edge& edge = pulls[static_cast<size_t>(i * k + n)];
+      const Edge& edge = measured[static_cast<size_t>(i * k + n)];
       if (!edge.counts) continue;
       const int32_t far = edges.index(near, n);
       add3(grad_rest.row(near), scale * edge.at_rest);

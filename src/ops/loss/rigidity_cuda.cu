@@ -60,7 +60,7 @@ struct MeasureEdge {
   }
 };
 
-struct CollectPulls {
+struct CollectGradients {
   Cloud cloud;
   const int32_t *begin, *entry;  // the edges by their far end
   double weight;
@@ -115,8 +115,8 @@ void rigidity(const Tensor<float>& rest, const Tensor<float>& posed, const Tenso
   sum_each_index<CountedSum>("loss: rigidity edges", all, MeasureEdge{cloud}, MeanOverCounted{mean});
   traceflow::cuda::group_by_key(far.data(), all, count, arriving);
   for_each_index("loss: rigidity gradient", count,
-                 CollectPulls{cloud, arriving.begin.data(), arriving.entry.data(), weight, mean,
-                              grad_rest.data(), grad_posed.data()});
+                 CollectGradients{cloud, arriving.begin.data(), arriving.entry.data(), weight, mean,
+                                  grad_rest.data(), grad_posed.data()});
 }
 
 }  // namespace traceflow::loss::cuda

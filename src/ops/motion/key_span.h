@@ -47,10 +47,10 @@ TRACEFLOW_HD BodyPose body_pose(const T* rotation, const T* shift, const KeySpan
 }
 
 // dL/d(a body's pose): by its translation, and by a rotation δ of the body about its centre.
-struct Pull {
+struct PoseGradient {
   Vec3<double> force{0}, torque{0};
 
-  TRACEFLOW_HD Pull& operator+=(const Pull& other) {
+  TRACEFLOW_HD PoseGradient& operator+=(const PoseGradient& other) {
     force += other.force;
     torque += other.torque;
     return *this;
@@ -60,18 +60,18 @@ struct Pull {
 // Adds to the gradients of one body's keys. With W = log(q₁ q₀⁻¹) and u the share of q₁, q = exp(u W) q₀
 // rotates by u J(uW) (J⁻¹(W) δ₁ − J⁻¹(−W) δ₀) + exp(u W) δ₀.
 template <class T>
-TRACEFLOW_HD void body_pose_backward(const T* rotation, const KeySpan<T>& span, const Pull& pull,
+TRACEFLOW_HD void body_pose_backward(const T* rotation, const KeySpan<T>& span, const PoseGradient& gradient,
                                      T* grad_rotation, T* grad_shift) {
   const double u = span.share;
-  add3(grad_shift + 3 * span.from, (1 - u) * pull.force);
-  add3(grad_shift + 3 * span.to, u * pull.force);
+  add3(grad_shift + 3 * span.from, (1 - u) * gradient.force);
+  add3(grad_shift + 3 * span.to, u * gradient.force);
   const Vec4<double> q0 = load4<double>(rotation + 4 * span.from), q1 = load4<double>(rotation + 4 * span.to);
   const Vec3<double> turn =
       quaternion_log(quaternion_product(unit_quaternion(q1), quaternion_conjugate(unit_quaternion(q0))));
-  const Vec3<double> through = u * left_jacobian(-u * turn, pull.torque);
+  const Vec3<double> through = u * left_jacobian(-u * turn, gradient.torque);
   const Vec3<double> by_to = left_jacobian_inverse(-turn, through);
-  const Vec3<double> by_from =
-      pull.torque * rotation_from_quaternion(quaternion_exp(u * turn)) - left_jacobian_inverse(turn, through);
+  const Vec3<double> by_from = gradient.torque * rotation_from_quaternion(quaternion_exp(u * turn)) -
+                               left_jacobian_inverse(turn, through);
   const auto add = [&](int64_t key, const Vec4<double>& q, const Vec3<double>& by_turn) {
     const Vec4<double> grad = quaternion_gradient(q, by_turn);
     for (int k = 0; k < 4; ++k) grad_rotation[4 * key + k] += static_cast<T>(grad[k]);

@@ -58,19 +58,20 @@ void backward(const Motion& motion, const Tensor<int32_t>& body, float time, con
   const CarrierOf carrier = carrier_of(body, subset);
   const PosedBody* const bodies = saved.bodies.data();
   if (grad_motion != nullptr) {
-    static thread_local Tensor<Pull> pulls;
+    static thread_local Tensor<PoseGradient> gradients;
     static thread_local Tensor<ShRotation<float>> generators;
     keep_generators(device, generators);
-    pulls.place(device).resize({motion.bodies()});
+    gradients.place(device).resize({motion.bodies()});
     for (int64_t b = 0; b < motion.bodies(); ++b) {
-      ordered_sum<Pull>(device, "motion: pull", moved.count(),
-                        PullOfSurfel{carrier, static_cast<int32_t>(b), bodies, generators.data(),
-                                     view_of(moved), view_of(static_cast<const PosedSurfels&>(grad_posed))},
-                        KeepPull{pulls.data() + b}, 1024);
+      ordered_sum<PoseGradient>(
+          device, "motion: pose gradient", moved.count(),
+          PoseGradientOfSurfel{carrier, static_cast<int32_t>(b), bodies, generators.data(), view_of(moved),
+                               view_of(static_cast<const PosedSurfels&>(grad_posed))},
+          StorePoseGradient{gradients.data() + b}, 1024);
     }
-    parallel_for(device, "motion: pull keys", motion.bodies(),
-                 PullKeys{pulls.data(), motion.time.data(), motion.rotation.data(), motion.keys(),
-                          double{time}, grad_motion->rotation.data(), grad_motion->shift.data()});
+    parallel_for(device, "motion: add to keys", motion.bodies(),
+                 AddToKeys{gradients.data(), motion.time.data(), motion.rotation.data(), motion.keys(),
+                           double{time}, grad_motion->rotation.data(), grad_motion->shift.data()});
   }
   const MutablePosedSurfelsView to = view_of(grad_posed);
   parallel_for(device, "motion: turn gradients back", moved.count(),

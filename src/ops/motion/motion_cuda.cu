@@ -6,12 +6,13 @@ namespace traceflow {
 
 template void cuda::for_each_index(const char*, int64_t, const motion::PoseBody&);
 template void cuda::for_each_index(const char*, int64_t, const motion::MoveSurfel&);
-template void cuda::for_each_index(const char*, int64_t, const motion::PullKeys&);
+template void cuda::for_each_index(const char*, int64_t, const motion::AddToKeys&);
 template void cuda::for_each_index(const char*, int64_t, const motion::TurnGradientBack&);
 template void cuda::for_each_index(const char*, int64_t, const motion::HoldFirstKey&);
 template void cuda::for_each_index(const char*, int64_t, const motion::HoldOpacity&);
 template void cuda::for_each_index(const char*, int64_t, const motion::SpreadOverKeys&);
-template void cuda::sum_each_index<motion::Pull>(const char*, int64_t, const motion::PullOfSurfel&,
-                                                 const motion::KeepPull&);
+template void cuda::sum_each_index<motion::PoseGradient>(const char*, int64_t,
+                                                         const motion::PoseGradientOfSurfel&,
+                                                         const motion::StorePoseGradient&);
 
 }  // namespace traceflow

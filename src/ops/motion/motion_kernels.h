@@ -73,41 +73,41 @@ struct MoveSurfel {
 };
 
 // The contribution of surfel i to the gradient by the pose of one body.
-struct PullOfSurfel {
+struct PoseGradientOfSurfel {
   CarrierOf carrier;
   int32_t which;
   const PosedBody* bodies;
   const ShRotation<float>* generators;  // about x, y, z
   PosedSurfelsView moved, grad;
 
-  TRACEFLOW_HD Pull operator()(int64_t i) const {
-    Pull pull;
-    if (carrier(i) != which || moved.opacity[i] == 0) return pull;
+  TRACEFLOW_HD PoseGradient operator()(int64_t i) const {
+    PoseGradient gradient;
+    if (carrier(i) != which || moved.opacity[i] == 0) return gradient;
     const PosedBody& body = bodies[which];
     const Vec3<double> force = load3<double>(grad.position + 3 * i);
     const Vec3<double> arm = load3<double>(moved.position + 3 * i) - Vec3<double>(body.now);
-    pull.force = force;
-    pull.torque = cross(arm, force) + quaternion_torque(load4<double>(moved.rotation + 4 * i),
-                                                        load4<double>(grad.rotation + 4 * i));
+    gradient.force = force;
+    gradient.torque = cross(arm, force) + quaternion_torque(load4<double>(moved.rotation + 4 * i),
+                                                            load4<double>(grad.rotation + 4 * i));
     const float *sh = moved.sh + moved.sh_row * i, *grad_sh = grad.sh + grad.sh_row * i;
     for (int axis = 0; axis < 3; ++axis) {
       float rate[48];
       turn_harmonics(generators[axis], moved.sh_degree, sh, rate);
-      for (int64_t k = 3; k < grad.sh_row; ++k) pull.torque[axis] += double{rate[k]} * grad_sh[k];
+      for (int64_t k = 3; k < grad.sh_row; ++k) gradient.torque[axis] += double{rate[k]} * grad_sh[k];
     }
-    const double sum = dot(pull.force, pull.force) + dot(pull.torque, pull.torque);
-    return sum * 0 == 0 ? pull : Pull();
+    const double sum = dot(gradient.force, gradient.force) + dot(gradient.torque, gradient.torque);
+    return sum * 0 == 0 ? gradient : PoseGradient();
   }
 };
 
-struct KeepPull {
-  Pull* to;
-  TRACEFLOW_HD void operator()(const Pull& sum) const { *to = sum; }
+struct StorePoseGradient {
+  PoseGradient* to;
+  TRACEFLOW_HD void operator()(const PoseGradient& sum) const { *to = sum; }
 };
 
 // i: a body.
-struct PullKeys {
-  const Pull* pulls;
+struct AddToKeys {
+  const PoseGradient* gradients;
   const float *times, *rotation;
   int64_t keys;
   double time;
@@ -115,7 +115,7 @@ struct PullKeys {
 
   TRACEFLOW_HD void operator()(int64_t i) const {
     const KeySpan<float> span(times, keys, time);
-    body_pose_backward(rotation + 4 * keys * i, span, pulls[i], grad_rotation + 4 * keys * i,
+    body_pose_backward(rotation + 4 * keys * i, span, gradients[i], grad_rotation + 4 * keys * i,
                        grad_shift + 3 * keys * i);
   }
 };

@@ -45,13 +45,13 @@ void backward_reference(const BasicMotion<double>& motion, const Tensor<int32_t>
                         BasicMotion<double>& grad_motion) {
   BasicPosedSurfels<double> moved = posed;
   forward_reference(motion, body, time, moved);
-  std::vector<Pull> pulls(static_cast<size_t>(motion.bodies()));
+  std::vector<PoseGradient> gradients(static_cast<size_t>(motion.bodies()));
   for (int64_t i = 0; i < posed.count(); ++i) {
     if (body[i] < 0) continue;
     const Body at = body_at(motion, body[i], time);
-    Pull pull;
-    pull.force = load3<double>(grad_posed.position.row(i));
-    pull.torque = cross(load3<double>(moved.position.row(i)) - at.now, pull.force);
+    PoseGradient gradient;
+    gradient.force = load3<double>(grad_posed.position.row(i));
+    gradient.torque = cross(load3<double>(moved.position.row(i)) - at.now, gradient.force);
     const Vec4<double> grad_q = load4<double>(grad_posed.rotation.row(i));
     double was[48];
     for (int axis = 0; axis < 3; ++axis) {
@@ -60,12 +60,13 @@ void backward_reference(const BasicMotion<double>& motion, const Tensor<int32_t>
       // d(exp(δ) q)/dδ = (0, axis)/2 · q
       const Vec4<double> rate = quaternion_product(Vec4<double>(0, about.x, about.y, about.z) * 0.5,
                                                    load4<double>(moved.rotation.row(i)));
-      pull.torque[axis] += dot(grad_q, rate);
+      gradient.torque[axis] += dot(grad_q, rate);
       turn_harmonics(sh_generator<double>(about), degree_of(posed), moved.sh.row(i), was);
-      for (int64_t k = 3; k < posed.sh.row_size(); ++k) pull.torque[axis] += was[k] * grad_posed.sh.row(i)[k];
+      for (int64_t k = 3; k < posed.sh.row_size(); ++k)
+        gradient.torque[axis] += was[k] * grad_posed.sh.row(i)[k];
     }
-    pulls[static_cast<size_t>(body[i])] += pull;
-    store3(grad_posed.position.row(i), transpose(at.matrix) * pull.force);
+    gradients[static_cast<size_t>(body[i])] += gradient;
+    store3(grad_posed.position.row(i), transpose(at.matrix) * gradient.force);
     const Vec4<double> q = quaternion_product(quaternion_conjugate(at.rotation), grad_q);
     for (int k = 0; k < 4; ++k) grad_posed.rotation(i, k) = q[k];
     std::copy_n(grad_posed.sh.row(i), posed.sh.row_size(), was);
@@ -73,7 +74,7 @@ void backward_reference(const BasicMotion<double>& motion, const Tensor<int32_t>
   }
   const KeySpan<double> span(motion.time.data(), motion.keys(), time);
   for (int64_t b = 0; b < motion.bodies(); ++b) {
-    body_pose_backward(motion.rotation.row(b), span, pulls[static_cast<size_t>(b)],
+    body_pose_backward(motion.rotation.row(b), span, gradients[static_cast<size_t>(b)],
                        grad_motion.rotation.row(b), grad_motion.shift.row(b));
   }
 }

@@ -12,7 +12,7 @@ struct Saved {
   Tensor<RestSurfel> rest;
   // Working memory of backward.
   Tensor<Vec3<float>> turns;
-  Tensor<PullOnNode> pulls;
+  Tensor<NodeGradient> gradients;
 };
 void SavedDeleter::operator()(Saved* saved) const { delete saved; }
 SavedPtr make_saved() { return SavedPtr(new Saved); }
@@ -56,19 +56,20 @@ void backward(const Nodes& nodes, const Tensor<int32_t>& body, float time, const
           std::to_string(subset.size()));
   const Device device = nodes.device();
   saved.turns.place(device).resize({count});
-  parallel_for(device, "nodes: pull on turns", count,
-               PullOnTurn{saved.rest.data(), grad_posed.rotation.data(), saved.turns.data()});
+  parallel_for(device, "nodes: turn gradient", count,
+               TurnGradient{saved.rest.data(), grad_posed.rotation.data(), saved.turns.data()});
   if (grad_nodes != nullptr) {
-    saved.pulls.place(device).resize({nodes.count()});
+    saved.gradients.place(device).resize({nodes.count()});
     for (int64_t n = 0; n < nodes.count(); ++n) {
-      ordered_sum<PullOnNode>(device, "nodes: pull", count,
-                              PullOfSurfel{saved.nodes.data() + n, saved.weights.data() + n * count,
-                                           saved.rest.data(), saved.turns.data(), grad_posed.position.data()},
-                              KeepPull{saved.pulls.data() + n}, 4096);
+      ordered_sum<NodeGradient>(
+          device, "nodes: node gradient", count,
+          NodeGradientOfSurfel{saved.nodes.data() + n, saved.weights.data() + n * count, saved.rest.data(),
+                               saved.turns.data(), grad_posed.position.data()},
+          StoreNodeGradient{saved.gradients.data() + n}, 4096);
     }
-    parallel_for(device, "nodes: pull keys", nodes.count(),
-                 PullKeys{saved.pulls.data(), saved.nodes.data(), nodes.time.data(), nodes.times(),
-                          double{time}, grad_nodes->turn.data(), grad_nodes->shift.data()});
+    parallel_for(device, "nodes: add to keys", nodes.count(),
+                 AddToKeys{saved.gradients.data(), saved.nodes.data(), nodes.time.data(), nodes.times(),
+                           double{time}, grad_nodes->turn.data(), grad_nodes->shift.data()});
   }
   parallel_for(
       device, "nodes: bend gradients back", count,

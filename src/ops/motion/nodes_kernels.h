@@ -95,7 +95,7 @@ struct BendSurfel {
 };
 
 // Writes the gradient by Σ w_n ω_n of surfel i to turns.
-struct PullOnTurn {
+struct TurnGradient {
   const RestSurfel* rest;
   const float* grad_rotation;
   Vec3<float>* turns;
@@ -110,10 +110,10 @@ struct PullOnTurn {
 
 // The sum of the surfels' gradients at a node: by its shift, by a rotation from the left of the offsets of
 // its surfels, and by Σ w_n ω_n.
-struct PullOnNode {
+struct NodeGradient {
   Vec3<double> force{0}, torque{0}, turn{0};
 
-  TRACEFLOW_HD PullOnNode& operator+=(const PullOnNode& other) {
+  TRACEFLOW_HD NodeGradient& operator+=(const NodeGradient& other) {
     force += other.force;
     torque += other.torque;
     turn += other.turn;
@@ -121,34 +121,34 @@ struct PullOnNode {
   }
 };
 
-struct PullOfSurfel {
+struct NodeGradientOfSurfel {
   const PosedNode* node;
   const float* weights;  // of this node
   const RestSurfel* rest;
   const Vec3<float>* turns;
   const float* grad_position;
 
-  TRACEFLOW_HD PullOnNode operator()(int64_t i) const {
-    PullOnNode pull;
+  TRACEFLOW_HD NodeGradient operator()(int64_t i) const {
+    NodeGradient gradient;
     const double weight = weights[i];
-    if (weight == 0) return pull;
+    if (weight == 0) return gradient;
     const Vec3<double> arm(node->rotation * (rest[i].position - node->rest));
-    pull.force = weight * load3<double>(grad_position + 3 * i);
-    pull.torque = cross(arm, pull.force);
-    pull.turn = weight * Vec3<double>(turns[i]);
+    gradient.force = weight * load3<double>(grad_position + 3 * i);
+    gradient.torque = cross(arm, pull.force);
+    gradient.turn = weight * Vec3<double>(turns[i]);
     const double sum =
-        dot(pull.force, pull.force) + dot(pull.torque, pull.torque) + dot(pull.turn, pull.turn);
-    return sum * 0 == 0 ? pull : PullOnNode();
+        dot(gradient.force, pull.force) + dot(pull.torque, pull.torque) + dot(pull.turn, pull.turn);
+    return sum * 0 == 0 ? gradient : NodeGradient();
   }
 };
 
-struct KeepPull {
-  PullOnNode* to;
-  TRACEFLOW_HD void operator()(const PullOnNode& sum) const { *to = sum; }
+struct StoreNodeGradient {
+  NodeGradient* to;
+  TRACEFLOW_HD void operator()(const NodeGradient& sum) const { *to = sum; }
 };
 
-struct PullKeys {
-  const PullOnNode* pulls;
+struct AddToKeys {
+  const NodeGradient* gradients;
   const PosedNode* nodes;
   const float* times;
   int64_t keys;
@@ -157,13 +157,14 @@ struct PullKeys {
 
   TRACEFLOW_HD void operator()(int64_t n) const {
     const motion::KeySpan<float> span(times, keys, time);
-    const Vec3<double> by_turn = left_jacobian(-Vec3<double>(nodes[n].turn), pulls[n].torque) + pulls[n].turn;
+    const Vec3<double> by_turn =
+        left_jacobian(-Vec3<double>(nodes[n].turn), gradients[n].torque) + gradients[n].turn;
     const auto add = [&](float* to, const Vec3<double>& by) {
       add3(to + 3 * (keys * n + span.from), (1 - span.share) * by);
       add3(to + 3 * (keys * n + span.to), span.share * by);
     };
     add(grad_turn, by_turn);
-    add(grad_shift, pulls[n].force);
+    add(grad_shift, gradients[n].force);
   }
 };
 
@@ -262,13 +263,13 @@ struct Resistance {
            at(shift, m, k);
   }
   // The gradient of n's travel by its shift.
-  TRACEFLOW_HD Vec3<double> travel_pull(int64_t n, int64_t k) const {
+  TRACEFLOW_HD Vec3<double> travel_gradient(int64_t n, int64_t k) const {
     const Vec3<double> rest = load3<double>(centre + 3 * n);
     const BodyPoses::Pose pose = poses.at(body[n], times[k]);
     const Vec3<double> off =
         (pose(rest + at(shift, n, k)) - at(anchor, n, k)) / static_cast<double>(radius[n]);
-    const double pull = weights.travel / std::pow(1 + dot(off, off), 2);
-    return (pull / static_cast<double>(radius[n]) * off) * pose.rotation;
+    const double force = weights.travel / std::pow(1 + dot(off, off), 2);
+    return (force / static_cast<double>(radius[n]) * off) * pose.rotation;
   }
 };
 
@@ -284,9 +285,9 @@ struct ResistanceGradient {
     for (int64_t m = 0; m < of.count; ++m) {
       const double mine = of.touch(n, m);
       if (mine == 0) continue;
-      const Vec3<double> pull = 2 * of.weights.strain * mine / all * of.per_radius2(n) * of.apart(n, m, k);
-      torque += cross(of.arm(n, m, k), pull);
-      by_shift += pull;
+      const Vec3<double> force = 2 * of.weights.strain * mine / all * of.per_radius2(n) * of.apart(n, m, k);
+      torque += cross(of.arm(n, m, k), force);
+      by_shift += force;
       const double theirs = of.touch(m, n) / of.touches(m);
       by_shift -= 2 * of.weights.strain * theirs * of.per_radius2(m) * of.apart(m, n, k);
     }
@@ -299,7 +300,7 @@ struct ResistanceGradient {
     };
     if (k + 1 < of.keys) hurry(k);
     if (k > 0) hurry(k - 1);
-    by_shift += of.travel_pull(n, k);
+    by_shift += of.travel_gradient(n, k);
     add3(grad_turn + 3 * i, of.share() * by_turn);
     add3(grad_shift + 3 * i, of.share() * by_shift);
   }

@@ -5,7 +5,6 @@
 #include <span>
 
 #include "math/blend.h"
-#include "math/distortion_depth.h"
 #include "math/rotation.h"
 #include "math/spherical_harmonics.h"
 #include "math/surfel_hit.h"

@@ -32,7 +32,7 @@ TRACEFLOW_HD inline AxisGradient axis_backward(float grad_exponent, float along,
 // Sets the contributions of one hit and adds the effect of its position to the ray. The CPU processes several
 // hits at once (cpu/geometry-inl.h).
 TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& ray, const HitGradient& hit,
-                                        float* parts, RayPull& pull) {
+                                        float* parts, RayGradient& grad_ray) {
   const Vec3<float> x = ray.origin - f.position + hit.distance * ray.direction;
   const float along_u = dot(f.t_u, x), along_v = dot(f.t_v, x);
   const float spread = ray.width * hit.distance;
@@ -43,7 +43,7 @@ TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& r
     by_u = axis_backward(hit.grad_exponent, along_u, f.inverse_scale.x, spread * spread, by_spread2);
     by_v = axis_backward(hit.grad_exponent, along_v, f.inverse_scale.y, spread * spread, by_spread2);
     grad_distance -= by_spread2 * spread * ray.width;
-    pull.width -= by_spread2 * spread * hit.distance;
+    grad_ray.width -= by_spread2 * spread * hit.distance;
   } else {
     const float u = along_u * f.inverse_scale.x, v = along_v * f.inverse_scale.y;
     by_u.along = hit.grad_exponent * u * f.inverse_scale.x;
@@ -51,22 +51,22 @@ TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& r
     by_u.scale = by_u.along * u;
     by_v.scale = by_v.along * v;
   }
-  const float pull_u = by_u.along, pull_v = by_v.along;
-  const Vec3<float> grad_x = -pull_u * f.t_u - pull_v * f.t_v;
+  const float grad_u = by_u.along, grad_v = by_v.along;
+  const Vec3<float> grad_x = -grad_u * f.t_u - grad_v * f.t_v;
   const float a = (grad_distance + dot(grad_x, ray.direction)) / dot(f.normal, ray.direction);
-  parts[part::position] = pull_u;
-  parts[part::position + 1] = pull_v;
+  parts[part::position] = grad_u;
+  parts[part::position + 1] = grad_v;
   parts[part::position + 2] = a;
   parts[part::turn] = a * along_v;
   parts[part::turn + 1] = -a * along_u;
-  parts[part::turn + 2] = pull_v * along_u - pull_u * along_v;
+  parts[part::turn + 2] = grad_v * along_u - grad_u * along_v;
   parts[part::scale] = by_u.scale;
   parts[part::scale + 1] = by_v.scale;
   parts[part::opacity] = hit.grad_exponent * f.inverse_opacity;
   for (size_t k = 0; k < 3; ++k) parts[part::signal + k] = 0.5F * hit.distance * parts[part::position + k];
   const Vec3<float> moved = grad_x - a * f.normal;
-  pull.origin += moved;
-  pull.direction += hit.distance * moved;
+  grad_ray.origin += moved;
+  grad_ray.direction += hit.distance * moved;
 }
 
 }  // namespace traceflow::trace

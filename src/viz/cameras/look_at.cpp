@@ -35,12 +35,12 @@ Aim aim_of(const std::vector<Camera<float>>& cameras) {
   Aim aim;
   V down(0), forward(0);
   for (const Camera<float>& c : cameras) {
-    aim.middle += V(c.position) / static_cast<double>(cameras.size());
+    aim.centroid += V(c.position) / static_cast<double>(cameras.size());
     down += axis_of(c, 1);
     forward += axis_of(c, 2);
   }
   for (const Camera<float>& c : cameras)
-    aim.spread = std::max(aim.spread, length(V(c.position) - aim.middle));
+    aim.spread = std::max(aim.spread, length(V(c.position) - aim.centroid));
   aim.up = unit(-down, V{0, -1, 0});
   aim.forward = unit(forward, V{0, 0, 1});
 
@@ -51,9 +51,9 @@ Aim aim_of(const std::vector<Camera<float>>& cameras) {
     const V d = axis_of(c, 2);
     const Mat3<double> project = Mat3<double>(1.0) - outerProduct(d, d);
     a += project;
-    b += project * (V(c.position) - aim.middle);
+    b += project * (V(c.position) - aim.centroid);
   }
-  aim.target = aim.middle + inverse(a) * b;
+  aim.target = aim.centroid + inverse(a) * b;
   // For cameras at one place, or with parallel axes, the solution is at the cameras. Rounding moves it
   // slightly forward or backward, by less than this fraction of their distance from the origin. That distance
   // bounds both the size of the coordinates and the distances between cameras.
@@ -64,7 +64,7 @@ Aim aim_of(const std::vector<Camera<float>>& cameras) {
     farthest = std::max(farthest, length(V(c.position)));
   }
   const double least = rounding * farthest * static_cast<double>(cameras.size());
-  if (!(ahead > least) || !std::isfinite(ahead)) aim.target = aim.middle + aim.spread * aim.forward;
+  if (!(ahead > least) || !std::isfinite(ahead)) aim.target = aim.centroid + aim.spread * aim.forward;
   return aim;
 }
 

@@ -38,7 +38,7 @@ Circle circle_from(const std::vector<Camera<float>>& cameras) {
   }
   circle.radius = std::max(radius, 1e-6);
   circle.height = height;
-  const V mean_offset = aim.middle - circle.target;
+  const V mean_offset = aim.centroid - circle.target;
   circle.start = unit(mean_offset - dot(mean_offset, circle.up) * circle.up, perpendicular(circle.up));
 
   const V side = cross(circle.up, circle.start);

@@ -20,10 +20,10 @@ constexpr double depth_turns = 1;
 constexpr double least_share = 1.0 / 50;
 
 // The 90th percentile of the cameras' distances from the mean along an axis.
-double reach_along(const std::vector<Camera<float>>& cameras, const V& middle, const V& axis) {
+double extent_along(const std::vector<Camera<float>>& cameras, const V& centroid, const V& axis) {
   std::vector<double> distances;
   distances.reserve(cameras.size());
-  for (const Camera<float>& c : cameras) distances.push_back(std::abs(dot(V(c.position) - middle, axis)));
+  for (const Camera<float>& c : cameras) distances.push_back(std::abs(dot(V(c.position) - centroid, axis)));
   const auto most = distances.begin() + static_cast<std::ptrdiff_t>((distances.size() - 1) * 9 / 10);
   std::nth_element(distances.begin(), most, distances.end());
   return *most;
@@ -34,18 +34,18 @@ double reach_along(const std::vector<Camera<float>>& cameras, const V& middle, c
 std::vector<Shot> spiral_around_cameras(const std::vector<Camera<float>>& cameras, int frames) {
   require(!cameras.empty(), "a spiral has cameras to go by");
   const Aim aim = aim_of(cameras);
-  const V middle = aim.middle, z = aim.forward, up = aim.up;
+  const V centroid = aim.centroid, z = aim.forward, up = aim.up;
   const V x = unit(cross(z, up), perpendicular(z)), y = cross(z, x);
-  const double distance = length(aim.target - middle);
-  const double wide = std::max(reach_along(cameras, middle, x), least_share * distance);
-  const double high = std::max(reach_along(cameras, middle, y), least_share * distance);
+  const double distance = length(aim.target - centroid);
+  const double wide = std::max(extent_along(cameras, centroid, x), least_share * distance);
+  const double high = std::max(extent_along(cameras, centroid, y), least_share * distance);
   // Never moves through the target.
-  const double deep = std::min(reach_along(cameras, middle, z), distance / 2);
+  const double deep = std::min(extent_along(cameras, centroid, z), distance / 2);
 
   std::vector<Shot> shots;
   for (int i = 0; i < frames; ++i) {
     const double angle = 2 * std::numbers::pi * i / frames;
-    const V from = middle + wide * std::cos(turns * angle) * x - high * std::sin(turns * angle) * y -
+    const V from = centroid + wide * std::cos(turns * angle) * x - high * std::sin(turns * angle) * y -
                    deep * std::sin(depth_turns * angle) * z;
     shots.push_back({fmt::format("{:05}", i), std::nullopt,
                      looking(cameras.front(), from, unit(aim.target - from, z), up)});

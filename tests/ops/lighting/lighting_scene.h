@@ -21,7 +21,7 @@ inline Lighting random_lighting(int64_t keys, int64_t bodies, uint64_t seed = 7)
     if (x == 0 || y == 0 || z == 0 || x == 5 || y == 4 || z == 3) lighting.brightness[i] = 0;
   }
   if (bodies > 0) {
-    lighting.middle = random_tensor<float>({bodies, keys, 3}, random, -0.5, 0.5);
+    lighting.centre = random_tensor<float>({bodies, keys, 3}, random, -0.5, 0.5);
     lighting.radius = random_tensor<float>({bodies}, random, 0.5, 2.0);
     lighting.body_brightness = random_tensor<float>({bodies, keys, 4}, random, -0.5, 0.5);
   }

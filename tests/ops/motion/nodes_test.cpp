@@ -87,7 +87,7 @@ TEST(Nodes, ThatMoveAsOneKeepShapes) {
 }
 
 // Nodes that stay where they are, whatever their body's pose, have not travelled.
-TEST(Nodes, ThatStandStillAreNotPulled) {
+TEST(Nodes, ThatStandStillHaveNoGradient) {
   Nodes nodes = random_nodes(6, 2, 4);
   const Motion motion = random_motion(2, 3);
   for (int64_t i = 0; i < 6 * 4; ++i) std::copy_n(nodes.centre.row(i / 4), 3, &nodes.anchor[3 * i]);
@@ -107,7 +107,7 @@ TEST(Nodes, ThatStandStillAreNotPulled) {
   for (const float by : gradient.shift.values()) EXPECT_NEAR(by, 0, 1e-4);
 }
 
-TEST(Nodes, AreNotPulledFromTheirAnchors) {
+TEST(Nodes, HaveNoGradientAtTheirAnchors) {
   Nodes nodes = random_nodes(6, 2, 4);
   const Motion motion = random_motion(2, 3);
   for (int64_t n = 0; n < 6; ++n) {

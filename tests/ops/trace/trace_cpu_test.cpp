@@ -134,7 +134,7 @@ Traced traced_alike(TestScene scene, int64_t first, int64_t count) {
   return result;
 }
 
-// Rays through both sides of a disk: their pulls are added before their length is taken.
+// Rays through both sides of a disk: their gradients are added before their length is taken.
 TEST(Trace, PositionGradientOfManyHitsIsTheNormOfTheirSum) {
   constexpr int64_t rays = 8;
   TestScene scene = blank_scene(1, 0, rays);
@@ -155,7 +155,7 @@ TEST(Trace, PositionGradientOfManyHitsIsTheNormOfTheirSum) {
   }
   const float found = traced_alike(scene, 0, rays).gradient.position_gradient[0];
   EXPECT_NEAR(found, glm::length(sum), 1e-4F * norms);
-  EXPECT_GT(norms, 1.5F * found) << "some of them pull against each other";
+  EXPECT_GT(norms, 1.5F * found) << "some of them cancel";
 }
 
 TEST(Trace, HitsPerPassChangesNothing) {

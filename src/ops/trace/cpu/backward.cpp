@@ -79,21 +79,21 @@ HWY_INLINE Vec3<float> colours_backward(const PosedSurfels& surfels, const RayHi
   const ShBasis<degree> spread(basis);
   float padded[16] = {grad.colour.x, grad.colour.y, grad.colour.z};
   const Rgb grad_colour = rgb_load(padded);
-  ShPull<degree> pull;
+  ShBasisGradient<degree> basis_gradient;
   const float* sh = surfels.sh.data();
   constexpr size_t row = 3 * ShShape<degree>::coefficients;
   for (size_t i = 0; i < hits.count; ++i) {
     const float* coefficients = sh + row * hits.surfel[i];
     const Rgb raw = spread.colour(coefficients);
     const Rgb passed = rgb_gradient(raw, hits.alpha[i] * scratch.transmittance[i], grad_colour);
-    pull.add(coefficients, passed);
+    basis_gradient.add(coefficients, passed);
     rgb_store(rgb_clamp(raw), padded);
     scratch.own[i] = glm::dot(load3<float>(padded), grad.colour) + grad.alpha +
                      grad.distance * (hits.distance[i] - sums.distance) / sums.alpha;
-    spread.pull(passed, scratch.row[i] + part::padded);
+    spread.add_gradient(passed, scratch.row[i] + part::padded);
   }
   float grad_basis[16] = {};
-  pull.finish(grad_basis);
+  basis_gradient.finish(grad_basis);
   return sh_basis_backward(degree, direction, grad_basis);
 }
 
@@ -124,7 +124,7 @@ void backward_ray(const BackwardInput& input, int64_t r, const RayHits& hits, Ra
   const Vec3<float> by_colour =
       colours_backward<degree>(input.surfels, hits, sums, grad, ray.direction, basis, scratch);
   blend_backward(hits, sums, grad, input.options, scratch);
-  const RayPull by_place =
+  const RayGradient by_place =
       places_backward(input.frames.data(), ray,
                       {hits.surfel, scratch.row.data(), scratch.distance.data(), scratch.grad_exponent.data(),
                        scratch.grad_distance.data(), hits.count});

@@ -79,18 +79,18 @@ struct HitGradients {
 
 // The derivatives of a hit by one axis (t_u or t_v). along: -dL/d(position along the axis). scale:
 // dL/d(scale).
-struct AxisPull {
+struct AxisGradient {
   HitVec along, scale;
 };
-HWY_INLINE AxisPull pull_along(HitVec grad_exponent, HitVec along, HitVec inverse_scale) {
+HWY_INLINE AxisGradient axis_gradient(HitVec grad_exponent, HitVec along, HitVec inverse_scale) {
   const HitVec u = hn::Mul(along, inverse_scale);
-  const HitVec pull = hn::Mul(hn::Mul(grad_exponent, u), inverse_scale);
-  return {pull, hn::Mul(pull, u)};
+  const HitVec grad_along = hn::Mul(hn::Mul(grad_exponent, u), inverse_scale);
+  return {grad_along, hn::Mul(pull, u)};
 }
 // The same for a disk that a cone widens by a Gaussian of variance `spread2`. Adds to by_spread2, which is -2
 // dL/d(spread2).
-HWY_INLINE AxisPull pull_along_widened(HitVec grad_exponent, HitVec along, HitVec inverse_scale,
-                                       HitVec spread2, HitVec& by_spread2) {
+HWY_INLINE AxisGradient axis_gradient_widened(HitVec grad_exponent, HitVec along, HitVec inverse_scale,
+                                              HitVec spread2, HitVec& by_spread2) {
   const HitTag d;
   const HitVec one = hn::Set(d, 1.0F), scale = hn::Div(one, inverse_scale);
   const HitVec precision = hn::Div(one, hn::MulAdd(scale, scale, spread2));
@@ -122,8 +122,8 @@ HWY_INLINE void add_parts(const HitVec (&parts)[12], float* const* rows, size_t 
 }
 
 // Adds the contributions of each hit's geometry to the row of its surfel.
-HWY_INLINE RayPull places_backward(const BackwardFrame* frames, const UnitRay& ray,
-                                   const HitGradients& hits) {
+HWY_INLINE RayGradient places_backward(const BackwardFrame* frames, const UnitRay& ray,
+                                       const HitGradients& hits) {
   const HitTag d;
   const HitVec3 direction = spread(ray.direction), zero = spread(Vec3<float>(0));
   HitVec3 origin_sum = zero, direction_sum = zero;
@@ -140,29 +140,29 @@ HWY_INLINE RayPull places_backward(const BackwardFrame* frames, const UnitRay& r
                               hn::Sub(hn::Set(d, ray.origin.z), f.position.z)};
     const HitVec3 x = add_scaled(from_centre, distance, direction);
     const HitVec along_u = dot(f.t_u, x), along_v = dot(f.t_v, x);
-    AxisPull by_u, by_v;
+    AxisGradient by_u, by_v;
     if (ray.width > 0) {
       const HitVec spread = hn::Mul(distance, hn::Set(d, ray.width));
       HitVec by_spread2 = hn::Zero(d);
-      by_u =
-          pull_along_widened(grad_exponent, along_u, f.inverse_scale_u, hn::Mul(spread, spread), by_spread2);
-      by_v =
-          pull_along_widened(grad_exponent, along_v, f.inverse_scale_v, hn::Mul(spread, spread), by_spread2);
+      by_u = axis_gradient_widened(grad_exponent, along_u, f.inverse_scale_u, hn::Mul(spread, spread),
+                                   by_spread2);
+      by_v = axis_gradient_widened(grad_exponent, along_v, f.inverse_scale_v, hn::Mul(spread, spread),
+                                   by_spread2);
       const HitVec by_spread = hn::IfThenElseZero(used, hn::Neg(hn::Mul(by_spread2, spread)));
       grad_distance = hn::MulAdd(by_spread, hn::Set(d, ray.width), grad_distance);
       width_sum = hn::MulAdd(by_spread, distance, width_sum);
     } else {
-      by_u = pull_along(grad_exponent, along_u, f.inverse_scale_u);
-      by_v = pull_along(grad_exponent, along_v, f.inverse_scale_v);
+      by_u = axis_gradient(grad_exponent, along_u, f.inverse_scale_u);
+      by_v = axis_gradient(grad_exponent, along_v, f.inverse_scale_v);
     }
-    const HitVec pull_u = by_u.along, pull_v = by_v.along;
-    const HitVec3 grad_x = add_scaled(add_scaled(zero, hn::Neg(pull_u), f.t_u), hn::Neg(pull_v), f.t_v);
+    const HitVec grad_u = by_u.along, grad_v = by_v.along;
+    const HitVec3 grad_x = add_scaled(add_scaled(zero, hn::Neg(grad_u), f.t_u), hn::Neg(grad_v), f.t_v);
     const HitVec a = hn::Div(hn::Add(grad_distance, dot(grad_x, direction)), dot(f.normal, direction));
     const HitVec half_distance = hn::Mul(hn::Set(d, 0.5F), distance);
-    add_parts({pull_u, pull_v, a, hn::Mul(a, along_v), hn::Neg(hn::Mul(a, along_u)),
-               hn::NegMulAdd(pull_u, along_v, hn::Mul(pull_v, along_u)), by_u.scale, by_v.scale,
-               hn::Mul(grad_exponent, f.inverse_opacity), hn::Mul(half_distance, pull_u),
-               hn::Mul(half_distance, pull_v), hn::Mul(half_distance, a)},
+    add_parts({grad_u, grad_v, a, hn::Mul(a, along_v), hn::Neg(hn::Mul(a, along_u)),
+               hn::NegMulAdd(grad_u, along_v, hn::Mul(grad_v, along_u)), by_u.scale, by_v.scale,
+               hn::Mul(grad_exponent, f.inverse_opacity), hn::Mul(half_distance, grad_u),
+               hn::Mul(half_distance, grad_v), hn::Mul(half_distance, a)},
               hits.row + i, count);
     const HitVec3 moved = keep_lanes(used, add_scaled(grad_x, hn::Neg(a), f.normal));
     origin_sum = add_scaled(origin_sum, hn::Set(d, 1.0F), moved);

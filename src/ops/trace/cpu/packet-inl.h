@@ -29,7 +29,7 @@ struct PacketHits {
 
 // Tests the bounding sphere of each disk against the beam: bit k is set if a ray or a cone may pass within
 // the radius of disk k.
-HWY_INLINE uint32_t meet_spheres(const BvhLeaf& leaf, const Beam& beam) {
+HWY_INLINE uint32_t intersect_spheres(const BvhLeaf& leaf, const Beam& beam) {
   const Tag d;
   const Vec dx = hn::Set(d, beam.direction.x), dy = hn::Set(d, beam.direction.y),
             dz = hn::Set(d, beam.direction.z);
@@ -94,31 +94,31 @@ class PacketTraversal {
   HWY_INLINE void run() {
     farthest_ = farthest_distance;
     const BoxBeam boxes(beam_);
-    traverse_tree(bvh_, boxes, farthest_, [this](const BvhLeaf& leaf) HWY_ATTR { meet_leaf(leaf); });
+    traverse_tree(bvh_, boxes, farthest_, [this](const BvhLeaf& leaf) HWY_ATTR { intersect_leaf(leaf); });
     for (size_t lane = 0; lane < count_; ++lane) sort(hits_.rays[lane]);
   }
 
  private:
   // Tests a vector of rays against each disk or a vector of disks against each ray, whichever needs fewer
   // tests.
-  HWY_INLINE void meet_leaf(const BvhLeaf& leaf) {
-    const uint32_t rays = meet_rays(leaf);
+  HWY_INLINE void intersect_leaf(const BvhLeaf& leaf) {
+    const uint32_t rays = intersect_rays(leaf);
     if (rays == 0) return;
-    const uint32_t disks = meet_spheres(leaf, beam_);
+    const uint32_t disks = intersect_spheres(leaf, beam_);
     if (static_cast<size_t>(std::popcount(disks)) * packet_rays <=
         static_cast<size_t>(std::popcount(rays)) * bvh_width) {
-      meet_each_disk(leaf, disks);
+      intersect_each_disk(leaf, disks);
     } else {
-      meet_each_ray(leaf, rays);
+      intersect_each_ray(leaf, rays);
     }
     if (hits_.candidates.size() - looked_ >= rules_.hits_per_look) look();
   }
 
   // Bit l is set if ray l, or possibly its cone, meets the leaf's box before the ray ends.
-  HWY_INLINE uint32_t meet_rays(const BvhLeaf& leaf) const {
-    return rules_.has_cones ? meet_cones(leaf) : meet_lines(leaf);
+  HWY_INLINE uint32_t intersect_rays(const BvhLeaf& leaf) const {
+    return rules_.has_cones ? intersect_cones(leaf) : intersect_lines(leaf);
   }
-  HWY_INLINE uint32_t meet_lines(const BvhLeaf& leaf) const {
+  HWY_INLINE uint32_t intersect_lines(const BvhLeaf& leaf) const {
     const Tag d;
     Vec enter = hn::Zero(d), leave = hn::Load(d, far_);
     for (int axis = 0; axis < 3; ++axis) {
@@ -133,7 +133,7 @@ class PacketTraversal {
 
   // On each axis a cone enters the box when its faster side does. It leaves the box when its slower side
   // does, or never if that side moves the other way.
-  HWY_INLINE uint32_t meet_cones(const BvhLeaf& leaf) const {
+  HWY_INLINE uint32_t intersect_cones(const BvhLeaf& leaf) const {
     const Tag d;
     const Vec slope = hn::Load(d, slope_);
     Vec enter = hn::Zero(d), leave = hn::Load(d, far_);
@@ -152,7 +152,7 @@ class PacketTraversal {
     return mask_bits(hn::Le(enter, hn::Mul(leave, hn::Set(d, 1.000001F))));
   }
 
-  HWY_INLINE void meet_each_disk(const BvhLeaf& leaf, uint32_t disks) {
+  HWY_INLINE void intersect_each_disk(const BvhLeaf& leaf, uint32_t disks) {
     const Tag d;
     const RayVec rays{hn::Load(d, origin_[0]),    hn::Load(d, origin_[1]),    hn::Load(d, origin_[2]),
                       hn::Load(d, direction_[0]), hn::Load(d, direction_[1]), hn::Load(d, direction_[2]),
@@ -168,7 +168,7 @@ class PacketTraversal {
 
   // Until all hits are found, they refer to slots of the leaf. So the order of candidates does not depend on
   // where rays end.
-  HWY_INLINE void meet_each_ray(const BvhLeaf& leaf, uint32_t rays) {
+  HWY_INLINE void intersect_each_ray(const BvhLeaf& leaf, uint32_t rays) {
     const Tag d;
     size_t first[packet_rays];
     uint32_t found = 0;

@@ -17,8 +17,8 @@ namespace traceflow::trace::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // Appends the hits with a leaf's disks that are not nearer than `rules.near` nor farther than `far`.
-HWY_INLINE void meet_leaf(const BvhLeaf& leaf, const UnitRay& ray, const DiskRules& rules, float far,
-                          Hits& hits) {
+HWY_INLINE void intersect_leaf(const BvhLeaf& leaf, const UnitRay& ray, const DiskRules& rules, float far,
+                               Hits& hits) {
   const Tag d;
   const hn::RebindToUnsigned<Tag> du;
   const RayVec r{hn::Set(d, ray.origin.x),    hn::Set(d, ray.origin.y),    hn::Set(d, ray.origin.z),
@@ -49,7 +49,7 @@ HWY_INLINE void find_hits(const Bvh& bvh, const UnitRay& ray, const DiskRules& r
   Beam beam(&ray, 1);
   beam.slope = rules.deviations * ray.width;
   traverse_tree(bvh, BoxBeam(beam), far, [&](const BvhLeaf& leaf) HWY_ATTR {
-    meet_leaf(leaf, ray, rules, far, hits);
+    intersect_leaf(leaf, ray, rules, far, hits);
     if (hits.count - looked < rules.hits_per_look) return;
     for (; looked < hits.count; ++looked) transmittance *= 1 - hits.alpha[looked];
     if (transmittance >= rules.blend.transmittance_min) return;

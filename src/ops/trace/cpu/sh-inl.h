@@ -36,7 +36,7 @@ struct ShBasis {
     return sum;
   }
   // Adds gradient ⊗ basis, which is dL/dsh.
-  void pull(const Rgb& gradient, float* sums) const {
+  void add_gradient(const Rgb& gradient, float* sums) const {
     for (size_t k = 0; k < ShShape<degree>::coefficients; ++k) {
       for (int c = 0; c < 3; ++c) sums[3 * k + static_cast<size_t>(c)] += gradient[c] * value[k];
     }
@@ -63,7 +63,7 @@ inline Rgb rgb_gradient(const Rgb& raw, float weight, const Rgb& gradient) {
 
 // Σ over hits of dL/dcolour · sh, per coefficient: dL/dbasis of one ray.
 template <int degree>
-class ShPull {
+class ShBasisGradient {
  public:
   void add(const float* row, const Rgb& gradient) {
     for (size_t k = 0; k < ShShape<degree>::coefficients; ++k) {
@@ -155,7 +155,7 @@ struct ShBasis {
     return hn::Add(sh_fold(sum), hn::Set(ShTag(), 0.5F));
   }
   // Adds gradient ⊗ basis, which is dL/dsh, as vectors in the layout of `value`.
-  HWY_INLINE void pull(Rgb gradient, float* HWY_RESTRICT sums) const {
+  HWY_INLINE void add_gradient(Rgb gradient, float* HWY_RESTRICT sums) const {
     const ShTag d;
     const ShVec repeated = sh_repeat(gradient);
     for (size_t j = 0; j < ShShape<degree>::vectors; ++j) {
@@ -189,9 +189,9 @@ HWY_INLINE Rgb rgb_gradient(Rgb raw, float weight, Rgb gradient) {
 
 // Σ over hits of dL/dcolour · sh, per coefficient: dL/dbasis of one ray.
 template <int degree>
-class ShPull {
+class ShBasisGradient {
  public:
-  HWY_INLINE ShPull() {
+  HWY_INLINE ShBasisGradient() {
     for (ShVec& v : sum_) v = hn::Zero(ShTag());
   }
   HWY_INLINE void add(const float* HWY_RESTRICT row, Rgb gradient) {

@@ -89,8 +89,8 @@ struct BoxBeam {
 
 // Bit k is set if some ray of the beam may meet the box of child k at a distance of at most `far`. No ray
 // meets it before near[k].
-HWY_INLINE uint32_t meet_boxes(const BvhNode& node, const BoxBeam& beam, float far,
-                               float* HWY_RESTRICT near) {
+HWY_INLINE uint32_t intersect_boxes(const BvhNode& node, const BoxBeam& beam, float far,
+                                    float* HWY_RESTRICT near) {
   const Tag d;
   uint32_t bits = 0;
   for (size_t i = 0; i < bvh_width; i += hn::Lanes(d)) {
@@ -136,7 +136,7 @@ HWY_INLINE void traverse_tree(const Bvh& bvh, const BoxBeam& beam, const float& 
     HWY_ALIGN float near[bvh_width];
     const BvhNode& node = bvh.nodes[entry.child];
     const size_t bottom = depth;
-    for (uint32_t bits = meet_boxes(node, beam, far, near); bits; bits &= bits - 1) {
+    for (uint32_t bits = intersect_boxes(node, beam, far, near); bits; bits &= bits - 1) {
       const auto k = static_cast<size_t>(__builtin_ctz(bits));
       const Entry child{near[k], node.child[k]};
       size_t place = depth++;

@@ -53,8 +53,8 @@ struct RayBackward {
   Vec3<float> grad_colour{0};
   float grad_alpha = 0, grad_distance = 0;  // distance in scene units
   float behind = 0;                         // Σ weight · dL/dweight over the hits behind
-  RayPull pull;                             // dL/d(ray) through the geometry of the hits
-  float basis_pull[sh_coefficients(degree)] = {};
+  RayGradient grad_ray;                     // dL/d(ray) through the geometry of the hits
+  float grad_basis[sh_coefficients(degree)] = {};
 
   __device__ void load(const BackwardTask& task, int64_t i, int64_t r) {
     sums = task.sums[i];
@@ -77,20 +77,20 @@ struct RayBackward {
       passed[c] = raw[c] > 0 ? weight * grad_colour[c] : 0;
     }
     for_each_coefficient<degree>(
-        sh, [&](int k, int c, float number) { basis_pull[k] = std::fma(number, passed[c], basis_pull[k]); });
+        sh, [&](int k, int c, float number) { grad_basis[k] = std::fma(number, passed[c], grad_basis[k]); });
     const float grad = blend_alpha_gradient(hit.transmittance, hit.alpha, own, behind);
     behind += weight * own;
     const float grad_exponent = hit.alpha >= task.rays.rules.blend.alpha_max ? 0 : grad * hit.alpha;
     place_backward(load_quads(task.frames[hit.name]), ray,
-                   {hit.distance, grad_exponent, weight * grad_distance / sums.alpha}, parts, pull);
+                   {hit.distance, grad_exponent, weight * grad_distance / sums.alpha}, parts, grad_ray);
   }
 
   __device__ void finish(const BackwardTask& task, int64_t r) const {
-    const Vec3<float> by_colour = sh_basis_backward(degree, ray.direction, basis_pull);
-    store3(task.grad_origins + 3 * r, pull.origin);
+    const Vec3<float> by_colour = sh_basis_backward(degree, ray.direction, grad_basis);
+    store3(task.grad_origins + 3 * r, grad_ray.origin);
     store3(task.grad_directions + 3 * r,
-           direction_backward(ray, by_colour + pull.direction, grad_distance, sums.distance));
-    if (task.grad_widths) task.grad_widths[r] = pull.width;
+           direction_backward(ray, by_colour + grad_ray.direction, grad_distance, sums.distance));
+    if (task.grad_widths) task.grad_widths[r] = grad_ray.width;
   }
 };
 

@@ -81,7 +81,7 @@ TEST_F(RigidityOnDevice, WhatIsNotANumberIsLeftOut) {
   expect_agreement(c);
 }
 
-TEST_F(RigidityOnDevice, WithoutEdgesNothingPulls) {
+TEST_F(RigidityOnDevice, WithoutEdgesIsZero) {
   Cloud c = make_cloud(8, false);
   c.edges.index.fill(-1);
   const RigidityResult lone = run(c, Device::cuda);
