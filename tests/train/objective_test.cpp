@@ -27,6 +27,7 @@ struct Fixture {
     frame.pseudo_normal = random_tensor<float>(shape, random, -1, 1);
     frame.raster.tint = random_tensor<float>({20, 24}, random, 0, 1);
     frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1);
+    frame.raster.alpha = random_tensor<float>({20, 24}, random, 0, 1);
     target.colour = random_tensor<float>(shape, random, 0, 1);
     target.normal_prior = random_tensor<float>(shape, random, -1, 1);
     options.distortion = 3;

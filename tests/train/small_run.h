@@ -35,12 +35,14 @@ inline const fs::path& capture_folder() {
 
 // A run without reflections on a capture that is made for it, up to where its bodies have been followed.
 inline std::unique_ptr<Trainer> followed(SynthOptions capture, int iterations, const fs::path& folder,
+                                         const BendOptions& bend = {},
                                          const events::Listener& listener = nullptr) {
   capture.samples = 1;
   write_synthetic_capture(capture, folder);
   TrainOptions options = preset("cpu");
   options.iterations = iterations;
   options.specular = Specular::none;
+  options.deform.bend = bend;
   options.initial.max_points = options.density.max_surfels = capture.points;
   auto trainer = std::make_unique<Trainer>(options, load_capture(folder, {}), folder / "run");
   if (listener) trainer->stream().listen(listener);

@@ -27,6 +27,7 @@ Outcome evaluate(Device device, NormalLosses normals) {
   frame.raster.normal = noise(-1);
   frame.pseudo_normal = noise(-1);
   frame.raster.tint = random_tensor<float>({20, 24}, random, 0, 1).on(device);
+  frame.raster.alpha = random_tensor<float>({20, 24}, random, 0, 1).on(device);
   frame.raster.distortion = random_tensor<float>({20, 24}, random, 0, 1).on(device);
   target.colour = noise(0);
   target.normal_prior = noise(-1);
@@ -56,6 +57,7 @@ TEST_F(TrainOnDevice, TheObjectiveAgreesWithTheCpu) {
     EXPECT_EQ(found.gradient.normal.empty(), normals == NormalLosses::none);
     if (normals == NormalLosses::none) continue;
     expect_close_on_host(found.gradient.normal, expected.gradient.normal, 1e-5, "normal");
+    expect_close_on_host(found.gradient.alpha, expected.gradient.alpha, 1e-6, "alpha");
     expect_close_on_host(found.gradient.pseudo_normal, expected.gradient.pseudo_normal, 1e-5, "pseudo");
   }
 }
