@@ -90,11 +90,13 @@ Camera<float> CameraRefinement::camera(int64_t view) const {
 
 void CameraRefinement::step(int64_t view, const CameraGradient<float>& gradient, double rate, double length,
                             const optimize::AdamOptions& adam) {
-  begun_ = true;
   Vec3<double> turn = load3<double>(corrections_.turn.row(view));
   Vec3<double> shift = load3<double>(corrections_.shift.row(view));
-  steps_[static_cast<size_t>(view)].step(pose_gradient(camera(view), gradient), rate, length, adam, turn,
-                                         shift);
+  CameraSteps steps = steps_[static_cast<size_t>(view)];
+  steps.step(pose_gradient(camera(view), gradient), rate, length, adam, turn, shift);
+  // Nothing has changed so far, and nothing below allocates memory.
+  begun_ = true;
+  steps_[static_cast<size_t>(view)] = std::move(steps);
   store3(corrections_.turn.row(view), turn);
   store3(corrections_.shift.row(view), shift);
   leave_out_similarity();

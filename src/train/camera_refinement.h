@@ -52,7 +52,7 @@ class CameraRefinement {
 
   // One step for the camera of one view; `gradient` is dL/d(its pose). `length` is the scene's length that
   // corresponds to a rotation of one radian. Changes all cameras a little, because the common similarity is
-  // removed.
+  // removed. If memory runs out, nothing has changed.
   void step(int64_t view, const CameraGradient<float>& gradient, double rate, double length,
             const optimize::AdamOptions& adam);
   Camera<float> camera(int64_t view) const;

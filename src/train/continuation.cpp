@@ -126,6 +126,19 @@ void check_views(const Safetensors& checkpoint, const SceneNormalisation& normal
                    "begin a new run for another capture");
 }
 
+void put_found_masks(const Capture& capture, Safetensors& checkpoint) {
+  checkpoint.metadata["found_masks"] = std::to_string(capture.found_masks);
+}
+
+void check_found_masks(const Safetensors& checkpoint, const Capture& capture,
+                       const std::filesystem::path& folder) {
+  const std::string found = entry(checkpoint, "found_masks").value_or("0");
+  const std::string now = std::to_string(capture.found_masks);
+  if (found == now) return;
+  throw InputError(folder.string(), "", now + " masks", "the " + found + " that the run found",
+                   "put them back, or begin again");
+}
+
 void put_caps(const SurfelCaps& caps, Safetensors& checkpoint) {
   checkpoint.metadata["cap_main"] = std::to_string(caps.main);
   checkpoint.metadata["cap_environment"] = std::to_string(caps.environment);

@@ -34,6 +34,11 @@ bool are_views_of(const std::string& views, const SceneNormalisation& normalisat
 void check_views(const Safetensors& checkpoint, const SceneNormalisation& normalisation,
                  const Capture& capture);
 
+void put_found_masks(const Capture& capture, Safetensors& checkpoint);
+// Throws InputError when the capture does not have as many found masks, of this folder, as the run had.
+void check_found_masks(const Safetensors& checkpoint, const Capture& capture,
+                       const std::filesystem::path& folder);
+
 void put_caps(const SurfelCaps& caps, Safetensors& checkpoint);
 // The caps that the run had at its start, unless the caps or the memory budget in the options have changed.
 std::optional<SurfelCaps> caps_to_keep(const Safetensors& checkpoint, const TrainOptions& now);

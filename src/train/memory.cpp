@@ -157,6 +157,36 @@ MemoryPlan with_caps(MemoryPlan plan, const MemorySetting& run, const SurfelCaps
   return plan;
 }
 
+TrainOptions limited_to(const SurfelCaps& caps, TrainOptions options) {
+  const auto limit = [](int& count, int64_t cap) {
+    count = static_cast<int>(std::clamp<int64_t>(cap, 1, count));
+  };
+  limit(options.density.max_surfels, caps.main);
+  limit(options.environment_density.max_surfels, caps.environment);
+  return options;
+}
+
+std::string lowered_caps_warning(const SurfelCaps& caps) {
+  if (!caps.lowered) return "";
+  return "the memory budget holds " + std::to_string(caps.main) + " main and " +
+         std::to_string(caps.environment) + " environment surfels at most";
+}
+
+std::string resumed_plan_warning(const MemoryPlan& plan, int64_t available) {
+  if (plan.forecast_bytes <= available) return "";
+  const auto mebibytes = [](int64_t bytes) { return std::to_string(bytes / mebibyte) + " MiB"; };
+  return "the run may take " + mebibytes(plan.forecast_bytes) + ", as when it began, and " +
+         mebibytes(available) + " are free now; --memory-budget makes it smaller, and its end another";
+}
+
+std::string out_of_memory_advice(bool half_updated, bool has_checkpoint) {
+  if (!half_updated) return "; --resume goes on when there is room, or with a lower --memory-budget";
+  const std::string lost = ", in the middle of a change that is not saved; ";
+  return lost + (has_checkpoint ? "--resume goes on from the checkpoint before when there is room, or with a "
+                                  "lower --memory-budget"
+                                : "begin again when there is room, or with a lower --memory-budget");
+}
+
 int64_t unlimited_forecast(const MemorySetting& run) {
   TrainOptions options = run.options;
   options.memory_budget = mebibyte * 1024;  // a pebibyte

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "capture/capture.h"
 #include "render/renderer.h"
 #include "train/options.h"
@@ -48,6 +50,15 @@ struct MemoryPlan {
 MemoryPlan plan_memory(const MemorySetting& run);
 // The same plan with given caps, which may exceed the budget.
 MemoryPlan with_caps(MemoryPlan plan, const MemorySetting& run, const SurfelCaps& caps);
+
+// Limits the initial sizes of the two sets to the caps.
+TrainOptions limited_to(const SurfelCaps& caps, TrainOptions options);
+
+// The warning if the caps are lowered, or if a resumed run may use more than is available now; else empty.
+std::string lowered_caps_warning(const SurfelCaps& caps);
+std::string resumed_plan_warning(const MemoryPlan& plan, int64_t available);
+// The advice after running out of memory. half_updated: the scene is, and so cannot be saved.
+std::string out_of_memory_advice(bool half_updated, bool has_checkpoint);
 
 // An upper bound on the bytes of a run without a budget: both sets at the options' caps, and everything
 // cached that is worth caching.

@@ -26,66 +26,52 @@ std::vector<optimize::AdamState> zero_states(const Parameters& parameters) {
   return states;
 }
 
-// Collects the tensors of a step, so that all are updated in one call.
-class Stepper {
- public:
-  explicit Stepper(StepNotes& notes) : notes_(notes) { notes_.tensors.clear(); }
-
-  void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
-                  optimize::AdamState& state, double rate) {
-    (*this)(name, parameter, gradient, state, std::vector<float>{static_cast<float>(rate)});
-  }
-  // With one rate per column.
-  void operator()(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
-                  optimize::AdamState& state, const std::vector<float>& rates) {
-    tasks_.push_back({&parameter, &gradient, &state, rates});
-    notes_.tensors.push_back({name, parameter.row_size()});
-  }
-  void finish(const optimize::AdamOptions& options) {
-    optimize::adam_step(tasks_, options, notes_.left_alone);
-  }
-
- private:
-  std::vector<optimize::AdamTask> tasks_;
-  StepNotes& notes_;
-};
-
-void step_surfels(Stepper& step, const std::string& set, Surfels& surfels, const Surfels& gradient,
+void step_surfels(PreparedStep& step, const std::string& set, Surfels& surfels, const Surfels& gradient,
                   SurfelMoments& moments, double position_rate, const RateOptions& rates) {
-  step(set + ".position", surfels.position, gradient.position, moments.position, position_rate);
-  step(set + ".log_scale", surfels.log_scale, gradient.log_scale, moments.log_scale, rates.log_scale);
-  step(set + ".rotation", surfels.rotation, gradient.rotation, moments.rotation, rates.rotation);
-  step(set + ".opacity_logit", surfels.opacity_logit, gradient.opacity_logit, moments.opacity_logit,
-       rates.opacity);
+  step.add(set + ".position", surfels.position, gradient.position, moments.position, position_rate);
+  step.add(set + ".log_scale", surfels.log_scale, gradient.log_scale, moments.log_scale, rates.log_scale);
+  step.add(set + ".rotation", surfels.rotation, gradient.rotation, moments.rotation, rates.rotation);
+  step.add(set + ".opacity_logit", surfels.opacity_logit, gradient.opacity_logit, moments.opacity_logit,
+           rates.opacity);
   std::vector<float> sh_rates(static_cast<size_t>(surfels.sh.row_size()), rates.sh / rates.sh_rest_divisor);
   std::fill_n(sh_rates.begin(), std::min<size_t>(3, sh_rates.size()), rates.sh);
-  step(set + ".sh", surfels.sh, gradient.sh, moments.sh, sh_rates);
+  step.add(set + ".sh", surfels.sh, gradient.sh, moments.sh, sh_rates);
 }
 
-void step_field(Stepper& step, const std::string& name, Field& field, const Field& gradient,
-                std::vector<optimize::AdamState>& states, double rate) {
+// For a field, motion, nodes or lighting. rates: one for all tensors, or one for each.
+template <class Parameters>
+void step_each(PreparedStep& step, const std::string& name, Parameters& parameters,
+               const Parameters& gradient, std::vector<optimize::AdamState>& states,
+               const std::vector<double>& rates) {
   std::vector<const Tensor<float>*> gradients;
   gradient.for_each([&](const std::string&, const Tensor<float>& tensor) { gradients.push_back(&tensor); });
   size_t k = 0;
-  field.for_each([&](const std::string& tensor_name, Tensor<float>& tensor) {
-    step(name + "." + tensor_name, tensor, *gradients[k], states[k], rate);
+  parameters.for_each([&](const std::string& tensor_name, Tensor<float>& tensor) {
+    const double rate = rates[std::min(k, rates.size() - 1)];
+    if (!tensor.empty()) step.add(name + "." + tensor_name, tensor, *gradients[k], states[k], rate);
     ++k;
   });
 }
 
 }  // namespace
 
-NonFiniteGradients StepNotes::report() const {
+void PreparedStep::add(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
+                       optimize::AdamState& state, std::vector<float> rates) {
+  parts.push_back({name, parameter.row_size()});
+  tasks.push_back({&parameter, &gradient, &state, std::move(rates)});
+}
+
+NonFiniteGradients PreparedStep::report() const {
   NonFiniteGradients report;
   Tensor<optimize::LeftAlone> fetched;
-  const Tensor<optimize::LeftAlone>& notes = on_host(left_alone, fetched);
-  for (size_t k = 0; k < tensors.size(); ++k) {
-    const optimize::LeftAlone& note = notes[static_cast<int64_t>(k)];
-    if (note.count > 0 && report.count == 0) {
-      const int64_t row = tensors[k].row_size > 0 ? note.first() / tensors[k].row_size : 0;
-      report.first = tensors[k].name + ", row " + std::to_string(row);
+  const Tensor<optimize::LeftAlone>& skipped = on_host(left_alone, fetched);
+  for (size_t k = 0; k < parts.size(); ++k) {
+    const optimize::LeftAlone& entries = skipped[static_cast<int64_t>(k)];
+    if (entries.count > 0 && report.count == 0) {
+      const int64_t row = parts[k].row_size > 0 ? entries.first() / parts[k].row_size : 0;
+      report.first = parts[k].name + ", row " + std::to_string(row);
     }
-    report.count += note.count;
+    report.count += entries.count;
   }
   return report;
 }
@@ -126,63 +112,62 @@ void Optimiser::begin(const Motion& motion) { main_motion_ = zero_states(motion)
 void Optimiser::begin(const Nodes& nodes) { main_nodes_ = zero_states(nodes); }
 void Optimiser::begin(const Lighting& lighting) { lighting_ = zero_states(lighting); }
 
-void Optimiser::step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
-                     const Schedule& schedule, const RateOptions& rates, int iteration,
-                     double share_of_positions) {
-  Stepper step(notes_);
+void Optimiser::prepare(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
+                        const Schedule& schedule, const RateOptions& rates, int iteration,
+                        double share_of_positions) {
+  PreparedStep& step = step_;
+  step.parts.clear();
+  step.tasks.clear();
   const double position_rate = share_of_positions * schedule.position_rate(iteration) * scene.extent;
   const double field_rate = schedule.field_rate(iteration);
 
   if (trainable.main) step_surfels(step, "main", scene.main, gradient.main, main_, position_rate, rates);
   if (trainable.tint && scene.main.has_tint()) {
-    step("main.tint_logit", scene.main.tint_logit, gradient.main.tint_logit, main_.tint_logit, rates.tint);
+    step.add("main.tint_logit", scene.main.tint_logit, gradient.main.tint_logit, main_.tint_logit,
+             rates.tint);
   }
   if (trainable.tint && scene.main.has_roughness()) {
-    step("main.roughness_logit", scene.main.roughness_logit, gradient.main.roughness_logit,
-         main_.roughness_logit, rates.roughness);
+    step.add("main.roughness_logit", scene.main.roughness_logit, gradient.main.roughness_logit,
+             main_.roughness_logit, rates.roughness);
   }
-  if (trainable.main_field && scene.main_field) {
-    step_field(step, "main_field", *scene.main_field, gradient.main_field, main_field_, field_rate);
-  }
+  if (trainable.main_field && scene.main_field)
+    step_each(step, "main_field", *scene.main_field, gradient.main_field, main_field_, {field_rate});
+  const double motion_rate = schedule.motion_rate(iteration);
   if (trainable.main_motion && scene.main_motion) {
-    Motion& motion = *scene.main_motion;
-    const double rate = schedule.motion_rate(iteration);
-    step("main_motion.rotation", motion.rotation, gradient.main_motion.rotation, main_motion_[0], rate / 2);
-    step("main_motion.shift", motion.shift, gradient.main_motion.shift, main_motion_[1], rate * scene.extent);
+    step_each(step, "main_motion", *scene.main_motion, gradient.main_motion, main_motion_,
+              {motion_rate / 2, motion_rate * scene.extent});
   }
   if (trainable.main_nodes && scene.main_nodes) {
-    Nodes& nodes = *scene.main_nodes;
-    const double rate = node_rates * schedule.motion_rate(iteration);
-    step("main_nodes.turn", nodes.turn, gradient.main_nodes.turn, main_nodes_[0], rate);
-    step("main_nodes.shift", nodes.shift, gradient.main_nodes.shift, main_nodes_[1], rate * scene.extent);
+    const double rate = node_rates * motion_rate;
+    step_each(step, "main_nodes", *scene.main_nodes, gradient.main_nodes, main_nodes_,
+              {rate, rate * scene.extent});
   }
   if (trainable.lighting && scene.lighting) {
-    step("lighting.brightness", scene.lighting->brightness, gradient.lighting.brightness, lighting_[0],
-         rates.lighting);
-    if (scene.lighting->bodies() > 0) {
-      step("lighting.body_brightness", scene.lighting->body_brightness, gradient.lighting.body_brightness,
-           lighting_[1], body_brightness_rates * rates.lighting);
-    }
+    step_each(step, "lighting", *scene.lighting, gradient.lighting, lighting_,
+              {rates.lighting, body_brightness_rates * rates.lighting});
   }
   if (trainable.environment && scene.environment.count() > 0) {
     step_surfels(step, "environment", scene.environment, gradient.environment, environment_, position_rate,
                  rates);
   }
   if (trainable.environment_field && scene.environment_field) {
-    step_field(step, "environment_field", *scene.environment_field, gradient.environment_field,
-               environment_field_, field_rate);
+    step_each(step, "environment_field", *scene.environment_field, gradient.environment_field,
+              environment_field_, {field_rate});
   }
   if (trainable.environment && scene.environment_map) {
     EnvironmentMap& map = *scene.environment_map;
-    step("environment_map.logit", map.logit, gradient.environment_map.logit, map_,
-         schedule.map_rate(iteration));
+    step.add("environment_map.logit", map.logit, gradient.environment_map.logit, map_,
+             schedule.map_rate(iteration));
     if (trainable.environment_field && map.field) {
-      step_field(step, "environment_map.field", *map.field, *gradient.environment_map.field, map_field_,
-                 field_rate);
+      step_each(step, "environment_map.field", *map.field, *gradient.environment_map.field, map_field_,
+                {field_rate});
     }
   }
-  step.finish(rates.adam());
+  step.left_alone.place(scene.device()).reset({static_cast<int64_t>(step.tasks.size())});
+  step.options = rates.adam();
 }
+
+void Optimiser::step() { optimize::adam_step(step_.tasks, step_.options, step_.left_alone); }
 
 template <class Self, class F>
 void Optimiser::for_each(Self& self, F&& f) {

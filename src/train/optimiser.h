@@ -31,15 +31,24 @@ struct NonFiniteGradients {
   std::string first;
 };
 
-// What was not finite in a step, by tensor, on the tensors' device.
-struct StepNotes {
-  struct Stepped {
+// A step of several tensors in one call that allocates no memory.
+struct PreparedStep {
+  struct Part {
     std::string name;
     int64_t row_size;
   };
-  std::vector<Stepped> tensors;
-  Tensor<optimize::LeftAlone> left_alone;  // one per tensor
+  std::vector<Part> parts;  // the tensors
+  std::vector<optimize::AdamTask> tasks;
+  optimize::AdamOptions options;
+  Tensor<optimize::LeftAlone> left_alone;  // one per tensor, on their device
 
+  // rates: one for all, or one per column.
+  void add(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
+           optimize::AdamState& state, std::vector<float> rates);
+  void add(const std::string& name, Tensor<float>& parameter, const Tensor<float>& gradient,
+           optimize::AdamState& state, double rate) {
+    add(name, parameter, gradient, state, std::vector<float>{static_cast<float>(rate)});
+  }
   NonFiniteGradients report() const;
 };
 
@@ -49,12 +58,16 @@ class Optimiser {
   // Zero moments with the shapes of the scene's tensors.
   explicit Optimiser(const Scene& scene);
 
-  // One step for everything trainable. Positions use share_of_positions of their rate. Entries that are not
-  // finite change nothing. If memory runs out, nothing has changed.
-  void step(Scene& scene, const SceneGradient& gradient, const Trainable& trainable, const Schedule& schedule,
-            const RateOptions& rates, int iteration, double share_of_positions = 1);
+  // Prepares a step for everything trainable: all that needs memory. Positions use share_of_positions of
+  // their rate. The scene and its gradient must stay in place until step().
+  void prepare(Scene& scene, const SceneGradient& gradient, const Trainable& trainable,
+               const Schedule& schedule, const RateOptions& rates, int iteration,
+               double share_of_positions = 1);
+  // Makes the prepared step. Entries that are not finite change nothing. Allocates no memory, but the driver
+  // may when it starts a kernel.
+  void step();
   // What was not finite in the last step. Waits for the device.
-  NonFiniteGradients left_alone() const { return notes_.report(); }
+  NonFiniteGradients non_finite() const { return step_.report(); }
 
   // For parameters that were added to the scene later.
   void begin(const Motion& motion);
@@ -77,7 +90,7 @@ class Optimiser {
   std::vector<optimize::AdamState> main_motion_, main_nodes_, lighting_;
   std::vector<optimize::AdamState> main_field_, environment_field_, map_field_;
   optimize::AdamState map_;
-  StepNotes notes_;
+  PreparedStep step_;
 };
 
 }  // namespace traceflow

@@ -103,58 +103,32 @@ bool Schedule::solves_poses_again(int iteration, int64_t followed) const {
   return iteration % part == 0 && 2 * (iteration - followed) >= part;
 }
 
-bool Schedule::densifies(int iteration, const DensityOptions& density) const {
-  return iteration >= mark(density.from) && iteration < mark(density.until) && iteration > 0 &&
-         iteration % interval(density.every) == 0;
-}
-
-bool Schedule::resets(int iteration, const DensityOptions& density) const {
+DensityStep Schedule::density(int iteration, const DensityOptions& density, Phase frozen) const {
   const int every = interval(density.opacity_reset_every);
-  return density.opacity_reset_every > 0 && every / 2 >= density.every && iteration > mark(density.from) &&
-         iteration < mark(density.until) && iteration % every == 0;
+  const auto is_within = [&](int at) {
+    return at > 0 && at >= mark(density.from) && at < mark(density.until);
+  };
+  const auto resets = [&](int at) {
+    return density.opacity_reset_every > 0 && every / 2 >= density.every && is_within(at) &&
+           at > mark(density.from) && at % every == 0 && phase(at) != frozen;
+  };
+  const int last_reset = (iteration - 1) / every * every;
+  return {.densifies = is_within(iteration) && iteration % interval(density.every) == 0,
+          .prunes_large = iteration > mark(density.prune_above_from),
+          .prunes_faint = !resets(last_reset) || iteration - last_reset >= density.every,
+          .resets_opacity = resets(iteration)};
 }
 
-bool Schedule::densifies_main(int iteration) const {
-  return phase(iteration) != Phase::specular && densifies(iteration, options_.density);
+DensityStep Schedule::main_density(int iteration) const {
+  DensityStep step = density(iteration, options_.density, Phase::specular);
+  step.densifies = step.densifies && phase(iteration) != Phase::specular;
+  return step;
 }
 
-bool Schedule::densifies_environment(int iteration) const {
-  return densifies(iteration, options_.environment_density) && phase(iteration - 1) != Phase::diffuse;
-}
-
-bool Schedule::prunes_large_main(int iteration) const {
-  return iteration > mark(options_.density.prune_above_from);
-}
-
-bool Schedule::prunes_large_environment(int iteration) const {
-  return iteration > mark(options_.environment_density.prune_above_from);
-}
-
-int Schedule::last_reset(int iteration, const DensityOptions& density) const {
-  const int every = interval(density.opacity_reset_every);
-  return (iteration - 1) / every * every;
-}
-
-bool Schedule::has_recovered(int iteration, int reset, const DensityOptions& density) const {
-  return iteration - reset >= density.every;
-}
-
-bool Schedule::prunes_faint_main(int iteration) const {
-  const int reset = last_reset(iteration, options_.density);
-  return !resets_main_opacity(reset) || has_recovered(iteration, reset, options_.density);
-}
-
-bool Schedule::prunes_faint_environment(int iteration) const {
-  const int reset = last_reset(iteration, options_.environment_density);
-  return !resets_environment_opacity(reset) || has_recovered(iteration, reset, options_.environment_density);
-}
-
-bool Schedule::resets_main_opacity(int iteration) const {
-  return phase(iteration) != Phase::specular && resets(iteration, options_.density);
-}
-
-bool Schedule::resets_environment_opacity(int iteration) const {
-  return phase(iteration) != Phase::diffuse && resets(iteration, options_.environment_density);
+DensityStep Schedule::environment_density(int iteration) const {
+  DensityStep step = density(iteration, options_.environment_density, Phase::diffuse);
+  step.densifies = step.densifies && phase(iteration - 1) != Phase::diffuse;
+  return step;
 }
 
 double Schedule::position_rate(int iteration) const {

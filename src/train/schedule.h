@@ -9,6 +9,17 @@ namespace traceflow {
 enum class Phase { diffuse, specular, joint };
 const char* to_string(Phase phase);
 
+// What density control does to a set after so many iterations.
+struct DensityStep {
+  bool densifies;  // clones, splits and prunes
+  bool prunes_large;
+  // After a reset, opacities recover for as many iterations as lie between two density controls of a
+  // full-length run: a shorter run has more frequent controls, but its optimiser is not faster. There are no
+  // resets if they would follow each other within twice that.
+  bool prunes_faint;
+  bool resets_opacity;
+};
+
 // What an iteration of a run does (method §7): the options' iteration numbers scaled to the run's length.
 // Iterations count from 0.
 class Schedule {
@@ -37,19 +48,9 @@ class Schedule {
   // reached the end of the video. Poses that train drift away, the farther the longer they are not solved.
   bool solves_poses_again(int iteration, int64_t followed) const;
 
-  // What density control does to a set after so many iterations. It leaves the environment alone until that
-  // has trained.
-  bool densifies_main(int iteration) const;
-  bool densifies_environment(int iteration) const;
-  bool prunes_large_main(int iteration) const;
-  bool prunes_large_environment(int iteration) const;
-  // After a reset, opacities recover for as many iterations as lie between two density controls of a
-  // full-length run: a shorter run has more frequent controls, but its optimiser is not faster. There are no
-  // resets if they would follow each other within twice that.
-  bool prunes_faint_main(int iteration) const;
-  bool prunes_faint_environment(int iteration) const;
-  bool resets_main_opacity(int iteration) const;
-  bool resets_environment_opacity(int iteration) const;
+  // Density control leaves the environment alone until that has trained.
+  DensityStep main_density(int iteration) const;
+  DensityStep environment_density(int iteration) const;
 
   // Learning rates that fall over the run.
   double position_rate(int iteration) const;
@@ -65,11 +66,8 @@ class Schedule {
   int mark(int in_schedule) const;
   // A scaled interval, at least one iteration.
   int interval(int in_schedule) const;
-  bool densifies(int iteration, const DensityOptions& density) const;
-  bool resets(int iteration, const DensityOptions& density) const;
-  // The last multiple of the reset interval before an iteration.
-  int last_reset(int iteration, const DensityOptions& density) const;
-  bool has_recovered(int iteration, int reset, const DensityOptions& density) const;
+  // frozen: the phase in which opacities are not reset.
+  DensityStep density(int iteration, const DensityOptions& density, Phase frozen) const;
   int sh_degree(int iteration, int start, int limit) const;
   bool specular() const { return options_.specular != Specular::none; }
 

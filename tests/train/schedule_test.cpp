@@ -135,18 +135,18 @@ TEST(Schedule, SwitchedOffFieldsNeverTrain) {
 
 TEST(Schedule, DensityControlRunsAsTheMethodSays) {
   const Schedule s(paper());
-  EXPECT_FALSE(s.densifies_main(400));
-  EXPECT_TRUE(s.densifies_main(500));
-  EXPECT_FALSE(s.densifies_main(550));
-  EXPECT_TRUE(s.densifies_main(600));
-  EXPECT_FALSE(s.densifies_main(10000)) << "frozen in phase 2";
-  EXPECT_FALSE(s.densifies_environment(8500));
-  EXPECT_FALSE(s.densifies_environment(9000)) << "it has not trained yet";
-  EXPECT_TRUE(s.densifies_environment(9500));
-  EXPECT_FALSE(s.prunes_large_main(3000)) << "as 2DGS: after the first reset of opacities";
-  EXPECT_TRUE(s.prunes_large_main(3100));
-  EXPECT_TRUE(s.resets_main_opacity(3000));
-  EXPECT_FALSE(s.resets_main_opacity(3100));
+  EXPECT_FALSE(s.main_density(400).densifies);
+  EXPECT_TRUE(s.main_density(500).densifies);
+  EXPECT_FALSE(s.main_density(550).densifies);
+  EXPECT_TRUE(s.main_density(600).densifies);
+  EXPECT_FALSE(s.main_density(10000).densifies) << "frozen in phase 2";
+  EXPECT_FALSE(s.environment_density(8500).densifies);
+  EXPECT_FALSE(s.environment_density(9000).densifies) << "it has not trained yet";
+  EXPECT_TRUE(s.environment_density(9500).densifies);
+  EXPECT_FALSE(s.main_density(3000).prunes_large) << "as 2DGS: after the first reset of opacities";
+  EXPECT_TRUE(s.main_density(3100).prunes_large);
+  EXPECT_TRUE(s.main_density(3000).resets_opacity);
+  EXPECT_FALSE(s.main_density(3100).resets_opacity);
 }
 
 // Whatever the run's length: the optimiser needs its iterations to bring an opacity back from a reset.
@@ -199,20 +199,21 @@ TEST(Schedule, OpacitiesHaveTimeToRecoverBeforeTheFaintGo) {
     const Schedule s(options);
     int reset_main = 0, reset_environment = 0, prunings = 0;
     for (int i = 1; i < iterations; ++i) {
-      if (s.densifies_main(i) && s.prunes_faint_main(i)) {
+      const DensityStep main = s.main_density(i), environment = s.environment_density(i);
+      if (main.densifies && main.prunes_faint) {
         ++prunings;
         EXPECT_TRUE(reset_main == 0 || i - reset_main >= 100) << iterations << " " << i;
       }
-      if (s.densifies_environment(i) && s.prunes_faint_environment(i)) {
+      if (environment.densifies && environment.prunes_faint) {
         ++prunings;
         EXPECT_TRUE(reset_environment == 0 || i - reset_environment >= 500) << iterations << " " << i;
       }
       if (iterations == 60000) {
-        EXPECT_TRUE(!s.densifies_main(i) || s.prunes_faint_main(i)) << i;
-        EXPECT_TRUE(!s.densifies_environment(i) || s.prunes_faint_environment(i)) << i;
+        EXPECT_TRUE(!main.densifies || main.prunes_faint) << i;
+        EXPECT_TRUE(!environment.densifies || environment.prunes_faint) << i;
       }
-      if (s.resets_main_opacity(i)) reset_main = i;
-      if (s.resets_environment_opacity(i)) reset_environment = i;
+      if (main.resets_opacity) reset_main = i;
+      if (environment.resets_opacity) reset_environment = i;
     }
     EXPECT_GT(prunings, 50) << iterations;
     EXPECT_EQ(reset_main > 0, iterations >= 4000) << iterations;

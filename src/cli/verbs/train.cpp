@@ -22,6 +22,7 @@
 #include "serve/live_view.h"
 #include "train/continuation.h"
 #include "train/found_masks.h"
+#include "train/initialise.h"
 #include "train/odd_masks.h"
 #include "train/trainer.h"
 

@@ -5,6 +5,7 @@
 
 #include "base/parallel.h"
 #include "cli/faults/small_training.h"
+#include "train/initialise.h"
 #include "train/small_run.h"
 
 // An iteration that is refused a request for memory, any of them, in this process: what was trained is as if
@@ -21,6 +22,7 @@ class RefusedStep : public testing::Test {
   static TrainOptions options() {
     TrainOptions options = small_run(40);
     options.density.max_surfels = 1000;
+    options.rates.camera = 1e-4F;
     return options;
   }
   // Goes on with the run from where it stands to after this iteration, whose last one is refused its n-th
@@ -39,6 +41,8 @@ class RefusedStep : public testing::Test {
     });
     events::Finished end = trainer.run(stop);
     EXPECT_EQ(end.iteration, trainer.iteration());
+    // Only a driver that has no memory for a kernel can stop a change to the scene half-way.
+    EXPECT_EQ(end.reason.find("in the middle of a change"), std::string::npos) << end.reason;
     return end;
   }
   bool is_refused(int iteration, int64_t n) {
@@ -98,6 +102,31 @@ TEST_F(RefusedStep, OfDensityControlLeavesARunThatGoesOn) {
   for_requests(iteration, 160, 1, [&](const fs::path& run) {
     EXPECT_NO_THROW(Trainer(options(), load_capture(capture_folder(), options().capture), run).resume());
   });
+}
+
+// There is no memory for the copies of bodies that an iteration begins with.
+TEST_F(RefusedStep, ThatCannotCopyItsStateLeavesItAlone) {
+  TrainOptions nodes = options();
+  nodes.deform.kind = "nodes";
+  const Capture capture = load_capture(capture_folder(), nodes.capture);
+  Random random;
+  TrainingState state(nodes, capture, initial_scene(capture, nodes, random).scene);
+  ASSERT_TRUE(state.scene.main_motion);
+  const std::string before = scene_bytes(state.scene);
+  int refused = 0;
+  for (int64_t n = 1;; ++n) {
+    state.begin_iteration(false);
+    try {
+      const RefusedOnce once(n);
+      state.begin_iteration(true);
+      break;
+    } catch (const std::bad_alloc&) {
+      ++refused;
+    }
+    state.roll_back();
+    ASSERT_EQ(scene_bytes(state.scene), before) << n;
+  }
+  EXPECT_GT(refused, 10);
 }
 
 }  // namespace
