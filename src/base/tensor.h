@@ -109,13 +109,13 @@ class Tensor {
     const int64_t wanted = shape.elements();
     if (wanted > capacity_) {
       const Device device = this->device();
-      const int64_t room = roomier(wanted);
+      const int64_t capacity = grown_capacity(wanted);
       memory_.reset();  // first, so that both are never allocated at once
       shape_ = Shape();
       size_ = capacity_ = 0;
-      const size_t bytes = static_cast<size_t>(room) * sizeof(T);
+      const size_t bytes = static_cast<size_t>(capacity) * sizeof(T);
       memory_ = Memory(static_cast<T*>(memory::allocate(device, bytes)), Free{device, bytes});
-      capacity_ = room;
+      capacity_ = capacity;
     }
     shape_ = shape;
     size_ = wanted;
@@ -150,7 +150,7 @@ class Tensor {
 
   size_t bytes() const { return static_cast<size_t>(size_) * sizeof(T); }
   // On the CUDA device allocations are slow, and a list that grew once will grow again: adds a quarter.
-  int64_t roomier(int64_t wanted) const {
+  int64_t grown_capacity(int64_t wanted) const {
     return device() == Device::cuda && capacity_ > 0 ? wanted + wanted / 4 : wanted;
   }
   void copy_from(const Tensor& other, Device device) {

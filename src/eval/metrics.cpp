@@ -51,12 +51,12 @@ std::optional<double> psnr_of(const CountedSum& squared_error) {
   return -10 * std::log10(*error);
 }
 
-// The tensor on a device: itself if it is there, else a copy in `room`.
+// The tensor on a device: itself if it is there, else a copy in `storage`.
 template <class T>
-const Tensor<T>& brought(const Tensor<T>& tensor, Device device, Tensor<T>& room) {
+const Tensor<T>& brought(const Tensor<T>& tensor, Device device, Tensor<T>& storage) {
   if (tensor.empty() || tensor.device() == device) return tensor;
-  room = tensor.on(device);
-  return room;
+  storage = tensor.on(device);
+  return storage;
 }
 
 Tensor<float> rounded(const Tensor<float>& image) {
@@ -69,13 +69,13 @@ Tensor<float> rounded(const Tensor<float>& image) {
 
 // The intersection of both masks; if one is empty, the other.
 const Tensor<uint8_t>& both(const Tensor<uint8_t>& mask, const Tensor<uint8_t>& known,
-                            Tensor<uint8_t>& room) {
+                            Tensor<uint8_t>& storage) {
   if (mask.empty() || known.empty()) return mask;
   require(mask.shape() == known.shape(), "masks of one picture have one shape");
-  room.place(mask.device()).resize(mask.shape());
+  storage.place(mask.device()).resize(mask.shape());
   parallel_for(mask.device(), "metrics: masked and known", mask.size(),
-               BothMasks{mask.data(), known.data(), room.data()});
-  return room;
+               BothMasks{mask.data(), known.data(), storage.data()});
+  return storage;
 }
 
 // The core of a mask and what is outside the mask, on its device.

@@ -14,15 +14,15 @@ namespace {
 
 // Memory kept between calls; all work is on one stream. Never freed, because the allocator may be destroyed
 // first at exit.
-struct Room {
+struct Scratch {
   Tensor<float> grad_interpolated;
   Tensor<uint32_t> texels, sorted_texels, rays, sorted_rays, first;
   Tensor<uint8_t> sort_scratch;
 };
 
-Room& room() {
-  static Room* const the_room = new Room;
-  return *the_room;
+Scratch& scratch() {
+  static Scratch* const the_scratch = new Scratch;
+  return *the_scratch;
 }
 
 }  // namespace
@@ -31,7 +31,7 @@ void backward(const Tensor<float>& logit, const Tensor<float>& directions, const
               Tensor<float>& grad_logit, Tensor<float>& grad_directions) {
   constexpr Device device = Device::cuda;
   const int64_t count = directions.dim(0), size = logit.dim(1), texels = 6 * size * size;
-  Room& r = room();
+  Scratch& r = scratch();
   r.grad_interpolated.place(device).resize({count, 3});
   for (auto* tensor : {&r.texels, &r.sorted_texels, &r.rays, &r.sorted_rays}) {
     tensor->place(device).resize({count});

@@ -237,20 +237,20 @@ HWY_INLINE uint32_t* append_reached(const uint32_t* reached, uint32_t count, uin
 }
 
 HWY_INLINE TileLists tile_lists(const Saved& saved, int64_t tile, TileMemory& memory) {
-  constexpr int64_t room = HWY_MAX_BYTES / sizeof(uint32_t);
+  constexpr int64_t padding = HWY_MAX_BYTES / sizeof(uint32_t);
   TileLists lists = tile_entries(saved, tile);
-  memory.reached.resize({lists.count + room});
-  memory.places.resize({blocks_per_tile * (lists.count + room)});
+  memory.reached.resize({lists.count + padding});
+  memory.places.resize({blocks_per_tile * (lists.count + padding)});
   uint32_t* const reached = memory.reached.data();
   for (uint32_t place = 0; place < lists.count; ++place) {
     prefetch_splat(saved, lists, place + prefetch_distance);
     reached[place] =
         reached_blocks(saved.splats[lists.entries[place].surfel], saved.rho_per_pixel2, lists.x, lists.y);
   }
-  std::fill_n(reached + lists.count, room, 0U);
+  std::fill_n(reached + lists.count, padding, 0U);
   for (int b = 0; b < blocks_per_tile; ++b) {
     if ((lists.blocks >> b & 1U) == 0) continue;
-    uint32_t* const begin = memory.places.data() + b * (lists.count + room);
+    uint32_t* const begin = memory.places.data() + b * (lists.count + padding);
     lists.of_block[b] = begin;
     lists.counts[b] = static_cast<uint32_t>(append_reached(reached, lists.count, 1U << b, begin) - begin);
   }

@@ -109,9 +109,9 @@ __device__ inline void add_touched(uint16_t* touched, uint32_t entry, unsigned b
 template <class F>
 __device__ void for_each_hit(const SavedView& saved, const TilePixel& pixel, uint32_t begin, uint32_t end,
                              F&& f) {
-  constexpr int room = 8;
-  float depth[room];
-  uint32_t place[room];
+  constexpr int per_pass = 8;
+  float depth[per_pass];
+  uint32_t place[per_pass];
   const auto footprint_at = [&](uint32_t k, const Splat*& splat) {
     splat = saved.splats + saved.entries[begin + k].surfel;
     return pixel.footprint_of(*splat);
@@ -127,8 +127,8 @@ __device__ void for_each_hit(const SavedView& saved, const TilePixel& pixel, uin
       if (!at.inside) continue;
       const float z = at.z(*splat);
       const bool is_next = is_first || z > last_depth || (z == last_depth && k > last_place);
-      if (!is_next || (found == room && !(z < depth[room - 1]))) continue;
-      int i = found < room ? found++ : room - 1;
+      if (!is_next || (found == per_pass && !(z < depth[per_pass - 1]))) continue;
+      int i = found < per_pass ? found++ : per_pass - 1;
       for (; i > 0 && z < depth[i - 1]; --i) {
         depth[i] = depth[i - 1];
         place[i] = place[i - 1];
@@ -141,10 +141,10 @@ __device__ void for_each_hit(const SavedView& saved, const TilePixel& pixel, uin
       const PixelFootprint at = footprint_at(place[i], splat);
       if (!f(place[i], *splat, at)) return;
     }
-    if (found < room) return;
+    if (found < per_pass) return;
     is_first = false;
-    last_depth = depth[room - 1];
-    last_place = place[room - 1];
+    last_depth = depth[per_pass - 1];
+    last_place = place[per_pass - 1];
   }
 }
 

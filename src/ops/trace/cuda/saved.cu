@@ -21,7 +21,7 @@ constexpr int64_t most_records = no_record - 1;
 
 // Resizes a tensor on the device and returns its memory.
 template <class T>
-T* room(Tensor<T>& tensor, const Shape& shape) {
+T* allocate(Tensor<T>& tensor, const Shape& shape) {
   tensor.place(Device::cuda).resize(shape);
   return tensor.data();
 }
@@ -29,9 +29,9 @@ T* room(Tensor<T>& tensor, const Shape& shape) {
 // The same for a tensor of at most `most` numbers. A growing tensor gets a quarter more memory. If that
 // exceeds `most`, the tensor is freed and allocated again.
 template <class T>
-T* room_within(int64_t most, Tensor<T>& tensor, int64_t count) {
+T* allocate_within(int64_t most, Tensor<T>& tensor, int64_t count) {
   if (tensor.size() < count && count + count / 4 > most) tensor = {};
-  return room(tensor, {count});
+  return allocate(tensor, {count});
 }
 
 const float* data_or_null(const Tensor<float>& tensor) { return tensor.empty() ? nullptr : tensor.data(); }
@@ -55,11 +55,11 @@ SavedHits& hits_of(const Saved& saved) {
 void allocate(const Saved& saved, int64_t rays, SavedHits& hits) {
   const int64_t allowed = allowed_records(saved);
   const int64_t wanted = std::min(allowed, std::max(expected_records * rays, hits.most_wanted / 4 * 5));
-  if (hits.records.size() < wanted) room_within(allowed, hits.records, wanted);
-  room(hits.used, {1});
-  room(hits.last_head, {rays});
-  room(hits.hits, {rays});
-  room(hits.sums, {rays});
+  if (hits.records.size() < wanted) allocate_within(allowed, hits.records, wanted);
+  allocate(hits.used, {1});
+  allocate(hits.last_head, {rays});
+  allocate(hits.hits, {rays});
+  allocate(hits.sums, {rays});
   hits.used.zero();
   hits.rays = rays;
   hits.records_wanted = SavedHits::unknown;
@@ -70,18 +70,18 @@ void allocate(const Saved& saved, int64_t rays, SavedHits& hits) {
 // use.
 void allocate(const PosedSurfels& surfels, const Rays& rays, InputGradient& gradient) {
   PosedSurfels& g = gradient.surfels;
-  room(g.position, surfels.position.shape());
-  room(g.scale, surfels.scale.shape());
-  room(g.rotation, surfels.rotation.shape());
-  room(g.opacity, surfels.opacity.shape());
-  room(g.sh, surfels.sh.shape());
-  room(g.tint, surfels.tint.shape());
+  allocate(g.position, surfels.position.shape());
+  allocate(g.scale, surfels.scale.shape());
+  allocate(g.rotation, surfels.rotation.shape());
+  allocate(g.opacity, surfels.opacity.shape());
+  allocate(g.sh, surfels.sh.shape());
+  allocate(g.tint, surfels.tint.shape());
   g.sh.zero();
   g.tint.zero();
-  room(gradient.rays.origins, {rays.count(), 3});
-  room(gradient.rays.directions, {rays.count(), 3});
-  room(gradient.rays.widths, rays.widths.shape());
-  room(gradient.position_gradient, {surfels.count()});
+  allocate(gradient.rays.origins, {rays.count(), 3});
+  allocate(gradient.rays.directions, {rays.count(), 3});
+  allocate(gradient.rays.widths, rays.widths.shape());
+  allocate(gradient.position_gradient, {surfels.count()});
 }
 
 // Reads how many records the forward pass wanted. The host waits for the device, because the next launch
@@ -161,7 +161,7 @@ class Backward {
     const Tensor<uint32_t> counts = hits_.hits.on(Device::cpu);  // waits for the device
     const uint32_t most = *std::max_element(counts.values().begin(), counts.values().end());
     const int64_t space = std::max(std::min(allowed, hits_.records_wanted), records_of(most));
-    if (hits_.records.size() < space) room_within(space, hits_.records, space);
+    if (hits_.records.size() < space) allocate_within(space, hits_.records, space);
     hits_.overwritten = true;
     for (int64_t first = 0; first < hits_.rays;) {
       int64_t last = first, records = 0;
@@ -175,10 +175,10 @@ class Backward {
 
  private:
   void allocate_in_order(int64_t records) {
-    task_.parts = room(hits_.parts, {std::max<int64_t>(1, records)});
-    task_.keys = room(hits_.keys, {records});
-    task_.places = room(hits_.places, {records});
-    task_.basis = room(hits_.basis, {hits_.rays, 16});
+    task_.parts = allocate(hits_.parts, {std::max<int64_t>(1, records)});
+    task_.keys = allocate(hits_.keys, {records});
+    task_.places = allocate(hits_.places, {records});
+    task_.basis = allocate(hits_.basis, {hits_.rays, 16});
   }
   void keep_again(int64_t first, int64_t last) {
     RayInput rays = task_.rays;
@@ -207,8 +207,8 @@ int64_t blended_hits(const Saved& saved) {
 void forward(const PosedSurfels& surfels, const Bvh& bvh, const Rays& rays, const Options& options,
              Output& output, Saved* saved) {
   const int64_t count = rays.count();
-  const RayOutput to{room(output.colour, {count, 3}), room(output.alpha, {count}),
-                     room(output.distance, {count})};
+  const RayOutput to{allocate(output.colour, {count, 3}), allocate(output.alpha, {count}),
+                     allocate(output.distance, {count})};
   RayInput input = input_of(surfels, bvh.on_device.get(), rays, options);
   const bool sorts = sorts_rays && count > 0 && input.nodes != nullptr;
   RecordStore store{};
@@ -233,9 +233,9 @@ void backward(const PosedSurfels& surfels, const Rays& rays, const Options& opti
   const int64_t count = surfels.count();
   require(hits.rays == rays.count(), "the hits were saved for these rays");
   allocate(surfels, rays, gradient);
-  room(hits.surfel_sums, {count});
+  allocate(hits.surfel_sums, {count});
   hits.surfel_sums.zero();
-  parallel_for(Device::cuda, "trace: frames", count, MakeFrame{surfels, room(hits.frames, {count})});
+  parallel_for(Device::cuda, "trace: frames", count, MakeFrame{surfels, allocate(hits.frames, {count})});
   const int64_t allowed = allowed_records(saved), wanted = look_at_records(hits);
   RayInput input = input_of(surfels, hits.tree.get(), rays, options);
   if (hits.is_sorted) input.order = hits.sorted.order.data();
