@@ -155,12 +155,13 @@ struct NormalConsistency {
   TRACEFLOW_HD double operator()(int64_t i) const {
     const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(pseudo + 3 * i);
     if (is_zero(p)) return 0;
+    const T clear = 1 - alpha[i];
     if (is_finite(n) && is_finite(p)) {
-      grad_alpha[i] += scale;
+      grad_alpha[i] += scale * 2 * clear;
       add3(grad_normal + 3 * i, -scale * p);
       add3(grad_pseudo + 3 * i, -scale * n);
     }
-    return static_cast<double>(alpha[i]) - static_cast<double>(dot(n, p));
+    return 1 - static_cast<double>(clear * clear) - static_cast<double>(dot(n, p));
   }
 };
 

@@ -134,10 +134,10 @@ struct NodeGradientOfSurfel {
     if (weight == 0) return gradient;
     const Vec3<double> arm(node->rotation * (rest[i].position - node->rest));
     gradient.force = weight * load3<double>(grad_position + 3 * i);
-    gradient.torque = cross(arm, pull.force);
+    gradient.torque = cross(arm, gradient.force);
     gradient.turn = weight * Vec3<double>(turns[i]);
     const double sum =
-        dot(gradient.force, pull.force) + dot(pull.torque, pull.torque) + dot(pull.turn, pull.turn);
+        dot(gradient.force, gradient.force) + dot(gradient.torque, gradient.torque) + dot(gradient.turn, gradient.turn);
     return sum * 0 == 0 ? gradient : NodeGradient();
   }
 };

@@ -74,19 +74,20 @@ TEST(NormalConsistency, IsZeroWhereTheyAgreeAndTwoWhereTheyOppose) {
   EXPECT_DOUBLE_EQ(normal_consistency(normal, alpha, pseudo, 1, a, b, c), 1);  // half of the frame at 2
 }
 
-// Where the hits of a pixel agree with the pseudo-normal, the loss neither covers nor clears the pixel.
-TEST(NormalConsistency, DoesNotRewardCoverage) {
-  Random random(7);
-  const auto share = random_tensor<float>({3, 4}, random, 0, 1);
-  Tensor<float> normal({3, 4, 3}), pseudo({3, 4, 3}), a(normal.shape()), b(share.shape()), c(normal.shape());
-  for (int64_t i = 0; i < share.size(); ++i) {
-    normal[3 * i] = share[i];  // hits with the unit normal (1, 0, 0) and this weight
+// Faint pixels do not gain by becoming opaque: over a background of their colour they would grow.
+TEST(NormalConsistency, PrefersPixelsToBeEmptyOrOpaque) {
+  const float shares[] = {0, 0.1F, 0.5F, 0.75F, 1};
+  Tensor<float> normal({1, 5, 3}), alpha({1, 5}), pseudo({1, 5, 3}), a(normal.shape()), b(alpha.shape()),
+      c(normal.shape());
+  for (int64_t i = 0; i < 5; ++i) {
+    alpha[i] = normal[3 * i] = shares[i];  // hits with the unit normal (1, 0, 0) and these weights
     pseudo[3 * i] = 1;
   }
-  EXPECT_NEAR(normal_consistency(normal, share, pseudo, 1, a, b, c), 0, 1e-12);
-  for (int64_t i = 0; i < share.size(); ++i) {
+  // At each pixel α (1 − α).
+  EXPECT_NEAR(normal_consistency(normal, alpha, pseudo, 5, a, b, c), (0.09 + 0.25 + 0.1875) / 5, 1e-7);
+  for (int64_t i = 0; i < 5; ++i) {
     const float by_weight = b[i] + a[3 * i];  // dL/dw of such a hit
-    EXPECT_EQ(by_weight, 0) << "pixel " << i;
+    EXPECT_NEAR(by_weight, 1 - 2 * shares[i], 1e-6) << "pixel " << i;
   }
 }
 
