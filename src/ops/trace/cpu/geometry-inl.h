@@ -85,7 +85,7 @@ struct AxisGradient {
 HWY_INLINE AxisGradient axis_gradient(HitVec grad_exponent, HitVec along, HitVec inverse_scale) {
   const HitVec u = hn::Mul(along, inverse_scale);
   const HitVec grad_along = hn::Mul(hn::Mul(grad_exponent, u), inverse_scale);
-  return {grad_along, hn::Mul(pull, u)};
+  return {grad_along, hn::Mul(grad_along, u)};
 }
 // The same for a disk that a cone widens by a Gaussian of variance `spread2`. Adds to by_spread2, which is -2
 // dL/d(spread2).
