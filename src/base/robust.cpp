@@ -1,16 +1,10 @@
 #include "base/robust.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace traceflow {
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+double median(std::vector<double> values) { return values.empty() ? 0 : ranked(values, values.size() / 2); }
 
 double robust_deviation(const std::vector<double>& values) {
   const double middle = median(values);

@@ -22,7 +22,8 @@ namespace traceflow {
 class Shape {
  public:
   Shape() = default;
-  Shape(std::initializer_list<int64_t> dims) : rank_(static_cast<int>(dims.size())) {
+  Shape(std::initializer_list<int64_t> dims) : Shape(std::span(dims.begin(), dims.size())) {}
+  explicit Shape(std::span<const int64_t> dims) : rank_(static_cast<int>(dims.size())) {
     require(dims.size() <= 4, "a shape has at most 4 dimensions");
     std::copy(dims.begin(), dims.end(), dims_.begin());
   }

@@ -40,7 +40,7 @@ Json machine_json(const Machine& machine) {
           {"gpu", machine.gpu}};
 }
 
-Json phase_json(const PhaseReport& phase) {
+Json phase_json(const LoggedPhase& phase) {
   Json steps = Json::array();
   for (const profile::Entry& step : phase.steps)
     steps.push_back({{"name", step.name}, {"calls", step.calls}, {"seconds", step.seconds}});
@@ -88,7 +88,7 @@ Json page_json(const ReportPage& page) {
         {{"path", s.path}, {"value", s.value}, {"default", s.usual}, {"unit", s.unit}, {"help", s.help}});
   }
   Json& phases = json["phases"] = Json::array();
-  for (const PhaseReport& phase : page.phases) phases.push_back(phase_json(phase));
+  for (const LoggedPhase& phase : page.phases) phases.push_back(phase_json(phase));
   Json& events = json["events"] = Json::array();
   for (const std::string& line : page.events) {
     Json event = Json::parse(line, nullptr, false);

@@ -5,22 +5,15 @@
 #include <vector>
 
 #include "base/machine.h"
-#include "base/profile.h"
 #include "eval/report.h"
 #include "eval/report_pictures.h"
+#include "record/log_history.h"
 
 namespace traceflow::eval {
 
 // A changed setting of the run, with its default.
 struct Setting {
   std::string path, value, usual, unit, help;
-};
-
-struct PhaseReport {
-  std::string name;
-  int64_t first = 0, last = 0;        // iterations, starting at 1
-  double seconds = 0;                 // of training
-  std::vector<profile::Entry> steps;  // where the time went
 };
 
 // The content of a run's page.
@@ -31,7 +24,7 @@ struct ReportPage {
   Machine machine;      // that measured; the event "started" names the one that trained
   Report report;
   std::vector<Setting> settings;
-  std::vector<PhaseReport> phases;
+  std::vector<LoggedPhase> phases;
   std::vector<std::string> events;  // of the log, each a JSON object
   std::vector<ReportPicture> pictures;
 };

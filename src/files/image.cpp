@@ -45,7 +45,7 @@ Kind kind_of(const InputFile& file) {
   const std::string_view bytes(start.data(), count);
   if (bytes.starts_with("\x89PNG")) return Kind::png;
   if (bytes.starts_with("\xff\xd8\xff")) return Kind::jpeg;
-  const auto other = std::find_if(others.begin(), others.end(), [&](const Signature& s) {
+  const auto other = std::ranges::find_if(others, [&](const Signature& s) {
     return bytes.size() > s.offset && bytes.substr(s.offset).starts_with(s.bytes);
   });
   throw InputError(file.path().string(), "", other == others.end() ? printable(bytes) : other->name,
@@ -54,10 +54,15 @@ Kind kind_of(const InputFile& file) {
 
 }  // namespace
 
-bool has_image_name(const std::filesystem::path& name) {
+std::string lower_extension(const std::filesystem::path& name) {
   std::string extension = name.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+bool has_image_name(const std::filesystem::path& name) {
+  const std::string extension = lower_extension(name);
   return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
 }
 
@@ -75,13 +80,15 @@ Tensor<uint8_t> read_image(const InputFile& file) {
 }
 
 Tensor<uint16_t> read_image16(const InputFile& file) {
-  if (kind_of(file) == Kind::png) return read_png16(file);
-  const Tensor<uint8_t> stored = read_jpeg(file);
-  Tensor<uint16_t> pixels;
-  pixels.resize(stored.shape());
-  std::transform(stored.data(), stored.data() + stored.size(), pixels.data(),
-                 [](uint8_t v) { return static_cast<uint16_t>(v * 257); });
-  return pixels;
+  return kind_of(file) == Kind::png ? read_png16(file) : in_16_bits(read_jpeg(file));
+}
+
+Tensor<uint16_t> in_16_bits(const Tensor<uint8_t>& pixels) {
+  Tensor<uint16_t> wide;
+  wide.resize(pixels.shape());
+  std::ranges::transform(pixels.values(), wide.data(),
+                         [](uint8_t v) { return static_cast<uint16_t>(v * 257); });
+  return wide;
 }
 
 }  // namespace traceflow

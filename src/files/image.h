@@ -1,7 +1,7 @@
 #pragma once
 
 #include <filesystem>
-#include <string_view>
+#include <string>
 
 #include "base/tensor.h"
 #include "files/input_file.h"
@@ -16,6 +16,8 @@ struct ImageSize {
   int orientation = 1;  // of EXIF, 1 to 8. Pixels are read as stored, since calibrations refer to them so.
 };
 
+// The extension of a file's name in lower case: ".png".
+std::string lower_extension(const std::filesystem::path& name);
 // Whether a file of this name may be a PNG or JPEG image.
 bool has_image_name(const std::filesystem::path& name);
 
@@ -26,5 +28,7 @@ ImageSize read_image_size(const InputFile& file);
 Tensor<uint8_t> read_image(const InputFile& file);
 // The same in 16 bits, full scale 65,535.
 Tensor<uint16_t> read_image16(const InputFile& file);
+// Converts 8 bits to 16, full scale to full scale.
+Tensor<uint16_t> in_16_bits(const Tensor<uint8_t>& pixels);
 
 }  // namespace traceflow

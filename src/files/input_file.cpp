@@ -2,8 +2,6 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstdlib>
 #include <string>
@@ -27,40 +25,38 @@ constexpr int to_read = O_RDONLY | O_CLOEXEC | O_NONBLOCK;
 InputFile::InputFile(const std::filesystem::path& path) : InputFile(path, path) {}
 
 InputFile::InputFile(const std::filesystem::path& path, std::filesystem::path name)
-    : InputFile(std::move(name), ::open(path.c_str(), to_read)) {}
+    : InputFile(std::move(name), Descriptor(::open(path.c_str(), to_read))) {}
 
-InputFile::InputFile(std::filesystem::path path, int descriptor)
-    : path_(std::move(path)), descriptor_(descriptor) {
-  if (descriptor_ < 0 && errno == ENOENT) throw InputError(path_.string(), "", reason(), "a readable file");
-  if (descriptor_ < 0) throw UnreadableFile(path_, reason());
+InputFile::InputFile(std::filesystem::path path, Descriptor descriptor)
+    : path_(std::move(path)), descriptor_(std::move(descriptor)) {
+  if (!descriptor_ && errno == ENOENT) throw InputError(path_.string(), "", reason(), "a readable file");
+  if (!descriptor_) throw UnreadableFile(path_, reason());
   struct stat status {};
-  if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
-    close();
+  if (::fstat(descriptor_.number(), &status) != 0 || !S_ISREG(status.st_mode))
     throw InputError(path_.string(), "", "something that is not a regular file", "a readable file");
-  }
   size_ = status.st_size;
 }
 
-InputFile::InputFile(std::filesystem::path path, int descriptor, int64_t size)
-    : path_(std::move(path)), descriptor_(descriptor), size_(size) {}
+InputFile::InputFile(std::filesystem::path path, Descriptor descriptor, int64_t size)
+    : path_(std::move(path)), descriptor_(std::move(descriptor)), size_(size) {}
 
 InputFile InputFile::scratch(const std::filesystem::path& origin) {
   std::string name = (std::filesystem::temp_directory_path() / "traceflow-XXXXXX").string();
-  const int descriptor = ::mkostemp(name.data(), O_CLOEXEC);
-  if (descriptor < 0) {
+  Descriptor descriptor(::mkostemp(name.data(), O_CLOEXEC));
+  if (!descriptor) {
     throw InputError(origin.string(), "temporary file " + name, reason(), "room to unpack",
                      "set TMPDIR to a folder with space");
   }
   ::unlink(name.c_str());
-  return {origin, descriptor, 0};
+  return {origin, std::move(descriptor), 0};
 }
 
 InputFile InputFile::part(int64_t offset, int64_t size, std::filesystem::path name) const {
   require(offset >= 0 && size >= 0 && offset <= size_ && size <= size_ - offset, "a part lies in its file",
           path_.string());
-  const int descriptor = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
-  if (descriptor < 0) throw UnreadableFile(name, reason());
-  InputFile result(std::move(name), descriptor, size);
+  Descriptor descriptor(::fcntl(descriptor_.number(), F_DUPFD_CLOEXEC, 0));
+  if (!descriptor) throw UnreadableFile(name, reason());
+  InputFile result(std::move(name), std::move(descriptor), size);
   result.begin_ = begin_ + offset;
   return result;
 }
@@ -68,29 +64,6 @@ InputFile InputFile::part(int64_t offset, int64_t size, std::filesystem::path na
 InputFile InputFile::renamed(std::filesystem::path name) && {
   path_ = std::move(name);
   return std::move(*this);
-}
-
-InputFile::~InputFile() { close(); }
-
-InputFile::InputFile(InputFile&& other) noexcept
-    : path_(std::move(other.path_)),
-      descriptor_(std::exchange(other.descriptor_, -1)),
-      begin_(other.begin_),
-      size_(other.size_) {}
-
-InputFile& InputFile::operator=(InputFile&& other) noexcept {
-  if (this == &other) return *this;
-  close();
-  path_ = std::move(other.path_);
-  descriptor_ = std::exchange(other.descriptor_, -1);
-  begin_ = other.begin_;
-  size_ = other.size_;
-  return *this;
-}
-
-void InputFile::close() noexcept {
-  if (descriptor_ >= 0) ::close(descriptor_);
-  descriptor_ = -1;
 }
 
 void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
@@ -102,7 +75,7 @@ void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
   };
   if (offset < 0 || offset > size_ || wanted > size_ - offset) cut_short();
   for (size_t done = 0; done < bytes.size();) {
-    const ssize_t n = ::pread(descriptor_, bytes.data() + done, bytes.size() - done,
+    const ssize_t n = ::pread(descriptor_.number(), bytes.data() + done, bytes.size() - done,
                               static_cast<off_t>(begin_ + offset) + static_cast<off_t>(done));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) throw UnreadableFile(path_, reason());
@@ -114,7 +87,7 @@ void InputFile::read_at(int64_t offset, std::span<std::byte> bytes) const {
 void InputFile::append(std::span<const std::byte> bytes) {
   for (size_t done = 0; done < bytes.size();) {
     const ssize_t n =
-        ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(size_));
+        ::pwrite(descriptor_.number(), bytes.data() + done, bytes.size() - done, static_cast<off_t>(size_));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) {
       throw InputError(path_.string(), "unpacking", reason(), "room in the temporary folder",

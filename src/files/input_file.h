@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "base/descriptor.h"
 #include "base/error.h"
 
 namespace traceflow {
@@ -30,11 +31,6 @@ class InputFile {
   InputFile part(int64_t offset, int64_t size, std::filesystem::path name) const;
   // The same file under another name in errors.
   InputFile renamed(std::filesystem::path name) &&;
-  ~InputFile();
-  InputFile(InputFile&& other) noexcept;
-  InputFile& operator=(InputFile&& other) noexcept;
-  InputFile(const InputFile&) = delete;
-  InputFile& operator=(const InputFile&) = delete;
 
   const std::filesystem::path& path() const { return path_; }
   int64_t size() const { return size_; }
@@ -44,13 +40,12 @@ class InputFile {
   void append(std::span<const std::byte> bytes);
 
  private:
-  // Takes a descriptor opened for reading; if it is -1, errno has the reason.
-  InputFile(std::filesystem::path path, int descriptor);
-  InputFile(std::filesystem::path path, int descriptor, int64_t size);
-  void close() noexcept;
+  // Takes a descriptor opened for reading; if there is none, errno has the reason.
+  InputFile(std::filesystem::path path, Descriptor descriptor);
+  InputFile(std::filesystem::path path, Descriptor descriptor, int64_t size);
 
   std::filesystem::path path_;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
   int64_t begin_ = 0;  // offset in the descriptor's file
   int64_t size_ = 0;
 };

@@ -1,16 +1,18 @@
 #include "files/npy.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cctype>
 #include <cstring>
+#include <Eigen/Core>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
-#include "files/half.h"
 #include "files/zip.h"
 
 namespace traceflow {
@@ -65,20 +67,10 @@ Shape parse_shape(std::string_view text, const std::filesystem::path& path) {
     }
     dims.push_back(dim);
   }
-  switch (dims.size()) {
-    case 0:
-      return {1};
-    case 1:
-      return {dims[0]};
-    case 2:
-      return {dims[0], dims[1]};
-    case 3:
-      return {dims[0], dims[1], dims[2]};
-    case 4:
-      return {dims[0], dims[1], dims[2], dims[3]};
-    default:
-      fail(path, "shape", std::to_string(dims.size()) + " dimensions", "4 at most", "reshape the array");
-  }
+  if (dims.empty()) dims.push_back(1);
+  if (dims.size() > 4)
+    fail(path, "shape", std::to_string(dims.size()) + " dimensions", "4 at most", "reshape the array");
+  return Shape(dims);
 }
 
 template <class T>
@@ -90,20 +82,12 @@ void widen(const std::byte* from, int64_t count, float* to) {
   }
 }
 
-void widen_halves(const std::byte* from, int64_t count, float* to) {
-  for (int64_t i = 0; i < count; ++i) {
-    uint16_t bits = 0;
-    std::memcpy(&bits, from + 2 * i, 2);
-    to[i] = widen_half(bits);
-  }
-}
-
 using Widen = void (*)(const std::byte*, int64_t, float*);
 
 // Null for an unsupported type.
 Widen widen_for(char kind, int width) {
   if (kind == 'f')
-    return width == 2 ? widen_halves : width == 4 ? widen<float> : width == 8 ? widen<double> : nullptr;
+    return width == 2 ? widen<Eigen::half> : width == 4 ? widen<float> : width == 8 ? widen<double> : nullptr;
   if (kind == 'b') return width == 1 ? widen<uint8_t> : nullptr;
   const bool is_signed = kind == 'i';
   if (!is_signed && kind != 'u') return nullptr;
@@ -230,9 +214,8 @@ Tensor<float> NpyFile::slice(int64_t i) const {
   require(shape_.rank() >= 2 && i >= 0 && i < shape_[0], "a slice lies in the array",
           std::to_string(i) + " of " + shape_.to_string());
   if (fortran_order_) fail(path(), "fortran_order", "True", "C order", "save numpy.ascontiguousarray of it");
-  const Shape shape = shape_.rank() == 2   ? Shape{shape_[1]}
-                      : shape_.rank() == 3 ? Shape{shape_[1], shape_[2]}
-                                           : Shape{shape_[1], shape_[2], shape_[3]};
+  const std::array dims{shape_[1], shape_[2], shape_[3]};
+  const Shape shape{std::span(dims).first(static_cast<size_t>(shape_.rank() - 1))};
   return read_elements(i * shape.elements(), shape);
 }
 

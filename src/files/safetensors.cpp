@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cstring>
+#include <Eigen/Core>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
@@ -14,11 +16,12 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
-#include "files/half.h"
 #include "files/input_file.h"
 #include "files/json_document.h"
 
 namespace traceflow {
+
+static_assert(std::endian::native == std::endian::little, "numbers are read as they stand in the file");
 
 namespace {
 
@@ -39,8 +42,7 @@ constexpr std::array<Type, 7> types{
     {{"F64", 8}, {"I64", 8}, {"F32", 4}, {"I32", 4}, {"F16", 2}, {"BF16", 2}, {"U8", 1}}};
 
 const Type* find_type(std::string_view name) {
-  const auto* const found =
-      std::find_if(types.begin(), types.end(), [&](const Type& t) { return t.name == name; });
+  const auto* const found = std::ranges::find(types, name, &Type::name);
   return found == types.end() ? nullptr : found;
 }
 
@@ -107,10 +109,8 @@ Json read_header(const InputFile& file, const std::string& origin, uint64_t& dat
     throw InputError(origin, "", std::to_string(file_size) + " bytes",
                      "a safetensors file of 8 bytes or more");
   }
-  std::array<std::byte, length_bytes> length{};
-  file.read_at(0, length);
   uint64_t header_bytes = 0;
-  for (size_t i = 0; i < length_bytes; ++i) header_bytes |= std::to_integer<uint64_t>(length[i]) << (8 * i);
+  file.read_at(0, std::as_writable_bytes(std::span(&header_bytes, 1)));
   const uint64_t limit = std::min(max_header_bytes, file_size - length_bytes);
   if (header_bytes > limit) {
     throw InputError(origin, "header length", std::to_string(header_bytes),
@@ -145,18 +145,8 @@ Shape parse_shape(const Json& dims, const std::string& origin, const std::string
     sizes[i] = static_cast<int64_t>(size);
   }
   elements = static_cast<uint64_t>(product);
-  switch (dims.size()) {
-    case 0:
-      return {1};  // a scalar
-    case 1:
-      return {sizes[0]};
-    case 2:
-      return {sizes[0], sizes[1]};
-    case 3:
-      return {sizes[0], sizes[1], sizes[2]};
-    default:
-      return {sizes[0], sizes[1], sizes[2], sizes[3]};
-  }
+  // A scalar is one number.
+  return dims.empty() ? Shape{1} : Shape(std::span(sizes).first(dims.size()));
 }
 
 Described parse_entry(const std::string& name, const Json& entry, const std::string& origin,
@@ -285,23 +275,16 @@ class Checksums {
   Json tensors_;
 };
 
-template <class Widen>
-std::vector<std::byte> widened(const std::vector<std::byte>& narrow, Widen widen) {
+template <class Narrow>
+std::vector<std::byte> widened(const std::vector<std::byte>& narrow) {
   std::vector<std::byte> wide(narrow.size() * 2);
   for (size_t i = 0; i < narrow.size() / 2; ++i) {
-    uint16_t bits = 0;
-    std::memcpy(&bits, narrow.data() + 2 * i, sizeof bits);
-    const float value = widen(bits);
-    std::memcpy(wide.data() + 4 * i, &value, sizeof value);
+    Narrow value{};
+    std::memcpy(&value, narrow.data() + 2 * i, sizeof value);
+    const auto wide_value = static_cast<float>(value);
+    std::memcpy(wide.data() + 4 * i, &wide_value, sizeof wide_value);
   }
   return wide;
-}
-
-template <class T>
-std::vector<std::byte> bytes_of(const Tensor<T>& tensor) {
-  std::vector<std::byte> bytes(static_cast<size_t>(tensor.size()) * sizeof(T));
-  memory::copy(Device::cpu, bytes.data(), tensor.device(), tensor.data(), bytes.size());
-  return bytes;
 }
 
 }  // namespace
@@ -322,7 +305,7 @@ Safetensors Safetensors::read(const std::filesystem::path& path) {
       tensors.push_back(parse_entry(name, entry, result.origin_, data_bytes));
     }
   }
-  std::sort(tensors.begin(), tensors.end(), [](const Described& a, const Described& b) {
+  std::ranges::sort(tensors, [](const Described& a, const Described& b) {
     return std::pair(a.begin, a.end) < std::pair(b.begin, b.end);
   });
   check_tiling(tensors, result.origin_, data_bytes);
@@ -336,7 +319,7 @@ Safetensors Safetensors::read(const std::filesystem::path& path) {
     if (checksums.exist()) checksums.check(t, bytes);
     std::string type(t.type.name);
     if (type == "F16" || type == "BF16") {
-      bytes = widened(bytes, type == "F16" ? widen_half : widen_bfloat16);
+      bytes = type == "F16" ? widened<Eigen::half>(bytes) : widened<Eigen::bfloat16>(bytes);
       type = "F32";
     }
     result.entries_[t.name] = {type, t.shape, std::move(bytes)};
@@ -344,20 +327,11 @@ Safetensors Safetensors::read(const std::filesystem::path& path) {
   return result;
 }
 
-void Safetensors::add(const std::string& name, const Tensor<float>& tensor) {
-  entries_[name] = {type_name<float>(), tensor.shape(), bytes_of(tensor)};
-}
-void Safetensors::add(const std::string& name, const Tensor<double>& tensor) {
-  entries_[name] = {type_name<double>(), tensor.shape(), bytes_of(tensor)};
-}
-void Safetensors::add(const std::string& name, const Tensor<int32_t>& tensor) {
-  entries_[name] = {type_name<int32_t>(), tensor.shape(), bytes_of(tensor)};
-}
-void Safetensors::add(const std::string& name, const Tensor<int64_t>& tensor) {
-  entries_[name] = {type_name<int64_t>(), tensor.shape(), bytes_of(tensor)};
-}
-void Safetensors::add(const std::string& name, const Tensor<uint8_t>& tensor) {
-  entries_[name] = {type_name<uint8_t>(), tensor.shape(), bytes_of(tensor)};
+template <class T>
+void Safetensors::add(const std::string& name, const Tensor<T>& tensor) {
+  std::vector<std::byte> bytes(static_cast<size_t>(tensor.size()) * sizeof(T));
+  memory::copy(Device::cpu, bytes.data(), tensor.device(), tensor.data(), bytes.size());
+  entries_[name] = {type_name<T>(), tensor.shape(), std::move(bytes)};
 }
 
 void Safetensors::write(const std::filesystem::path& path) const {
@@ -366,7 +340,7 @@ void Safetensors::write(const std::filesystem::path& path) const {
   // Wide types come first, so that every tensor starts at a multiple of its element size.
   std::vector<std::pair<const std::string*, const Entry*>> order;
   for (const auto& [name, entry] : entries_) order.emplace_back(&name, &entry);
-  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) {
+  std::ranges::stable_sort(order, [](const auto& a, const auto& b) {
     return find_type(a.second->type)->bytes > find_type(b.second->type)->bytes;
   });
 
@@ -385,10 +359,9 @@ void Safetensors::write(const std::filesystem::path& path) const {
   std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
   text.resize((text.size() + 7) / 8 * 8, ' ');
 
-  std::string head;
-  for (size_t i = 0; i < length_bytes; ++i) head += static_cast<char>(text.size() >> (8 * i) & 0xFFU);
-  head += text;
-  std::vector<std::span<const std::byte>> parts{std::as_bytes(std::span(head))};
+  const uint64_t length = text.size();
+  std::vector<std::span<const std::byte>> parts{std::as_bytes(std::span(&length, 1)),
+                                                std::as_bytes(std::span(text))};
   for (const auto& [name, entry] : order) parts.emplace_back(entry->bytes);
   write_atomically(path, parts);
 }
@@ -432,6 +405,11 @@ Tensor<T> Safetensors::tensor(const std::string& name) const {
   return result;
 }
 
+template void Safetensors::add(const std::string&, const Tensor<float>&);
+template void Safetensors::add(const std::string&, const Tensor<double>&);
+template void Safetensors::add(const std::string&, const Tensor<int32_t>&);
+template void Safetensors::add(const std::string&, const Tensor<int64_t>&);
+template void Safetensors::add(const std::string&, const Tensor<uint8_t>&);
 template Tensor<float> Safetensors::tensor(const std::string&) const;
 template Tensor<double> Safetensors::tensor(const std::string&) const;
 template Tensor<int32_t> Safetensors::tensor(const std::string&) const;

@@ -22,12 +22,9 @@ class Safetensors {
   // UnreadableFile (files/input_file.h) if the system denies access.
   static Safetensors read(const std::filesystem::path& path);
 
-  // Stores a copy of the tensor, from any device.
-  void add(const std::string& name, const Tensor<float>& tensor);
-  void add(const std::string& name, const Tensor<double>& tensor);
-  void add(const std::string& name, const Tensor<int32_t>& tensor);
-  void add(const std::string& name, const Tensor<int64_t>& tensor);
-  void add(const std::string& name, const Tensor<uint8_t>& tensor);
+  // Stores a copy of the tensor, from any device. T is float, double, int32_t, int64_t or uint8_t.
+  template <class T>
+  void add(const std::string& name, const Tensor<T>& tensor);
   // Writes atomically (base/atomic_file.h). Equal contents give equal bytes.
   void write(const std::filesystem::path& path) const;
 
@@ -35,8 +32,7 @@ class Safetensors {
   const std::string& origin() const { return origin_; }
   bool has(const std::string& name) const;
   std::vector<std::string> names() const;
-  // T is float, double, int32_t, int64_t or uint8_t. Throws InputError with the file and the tensor if it is
-  // missing or has another type.
+  // T as above. Throws InputError with the file and the tensor if it is missing or has another type.
   template <class T>
   Tensor<T> tensor(const std::string& name) const;
 

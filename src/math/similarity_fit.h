@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cmath>
+#include <Eigen/LU>
+#include <Eigen/SVD>
 #include <numbers>
 #include <span>
 
-#include "math/rotation.h"
-#include "math/symmetric_eigen.h"
+#include "math/types.h"
 
 namespace traceflow {
 
@@ -19,38 +20,28 @@ struct Similarity {
 };
 
 // The similarity that maps the points `from` to the points `to`, of the same number, with the least sum of
-// squared distances (Horn 1987). The rotation's quaternion is the last eigenvector of a symmetric 4×4 matrix.
-// So the result is a proper rotation for any points, also coplanar or mirrored ones. If the rotation is
-// ambiguous, as for collinear points, it is one of those that fit. If all points of `from` coincide, the
-// rotation is the identity and the scale 1.
+// squared distances (Umeyama 1991). Its rotation is proper for any points, also coplanar or mirrored ones. If
+// the rotation is ambiguous, as for collinear points, it is one of those that fit. If all points of `from`
+// coincide, the rotation is the identity and the scale 1.
 inline Similarity fit_similarity(std::span<const Vec3<double>> from, std::span<const Vec3<double>> to) {
-  const auto count = static_cast<double>(from.size());
-  Vec3<double> centroid_from(0), centroid_to(0);
-  for (size_t i = 0; i < from.size(); ++i) {
-    centroid_from += from[i] / count;
-    centroid_to += to[i] / count;
-  }
-  Mat3<double> moments(0);  // Σ b aᵀ
-  double size = 0;          // Σ |a|²
-  for (size_t i = 0; i < from.size(); ++i) {
-    const Vec3<double> a = from[i] - centroid_from, b = to[i] - centroid_to;
-    moments += outerProduct(b, a);
-    size += dot(a, a);
-  }
-
-  // The entry for b_row · a_column.
-  const auto m = [&](int row, int column) { return moments[column][row]; };
-  // qᵀ n q = Σ b · R(q) a.
-  glm::mat<4, 4, double, glm::defaultp> n(0);
-  n[0] = {m(0, 0) + m(1, 1) + m(2, 2), m(2, 1) - m(1, 2), m(0, 2) - m(2, 0), m(1, 0) - m(0, 1)};
-  n[1] = {n[0][1], m(0, 0) - m(1, 1) - m(2, 2), m(0, 1) + m(1, 0), m(2, 0) + m(0, 2)};
-  n[2] = {n[0][2], n[1][2], m(1, 1) - m(0, 0) - m(2, 2), m(1, 2) + m(2, 1)};
-  n[3] = {n[0][3], n[1][3], n[2][3], m(2, 2) - m(0, 0) - m(1, 1)};
-  const auto eigen = symmetric_eigen(n);
+  const auto count = static_cast<Eigen::Index>(from.size());
+  const Eigen::Map<const Eigen::Matrix3Xd> a(&from.data()->x, 3, count), b(&to.data()->x, 3, count);
+  const Eigen::Vector3d centroid_a = a.rowwise().mean(), centroid_b = b.rowwise().mean();
+  // Not as one product: how Eigen splits a long one depends on the processor's caches.
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (Eigen::Index i = 0; i < count; ++i)
+    moments += (b.col(i) - centroid_b) * (a.col(i) - centroid_a).transpose();
+  const double size = (a.colwise() - centroid_a).squaredNorm();
   Similarity result;
-  if (size > 0) result.scale = eigen.values[3] / size;
-  if (eigen.values[3] > 0) result.rotation = rotation_from_quaternion(eigen.vectors[3]);
-  result.shift = centroid_to - result.scale * (result.rotation * centroid_from);
+  Eigen::Map<Eigen::Matrix3d> rotation(&result.rotation[0][0]);
+  if (size > 0) {
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moments, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const bool mirrors = svd.matrixU().determinant() * svd.matrixV().determinant() < 0;
+    const Eigen::Vector3d signs(1, 1, mirrors ? -1 : 1);
+    rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+    result.scale = svd.singularValues().dot(signs) / size;
+  }
+  Eigen::Map<Eigen::Vector3d>(&result.shift.x) = centroid_b - result.scale * (rotation * centroid_a);
   return result;
 }
 

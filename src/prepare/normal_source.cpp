@@ -10,18 +10,7 @@
 
 namespace traceflow::prepare {
 
-namespace {
-
 namespace fs = std::filesystem;
-
-Tensor<uint16_t> in_16_bits(const Tensor<uint8_t>& picture) {
-  Tensor<uint16_t> wide(picture.shape());
-  std::transform(picture.data(), picture.data() + picture.size(), wide.data(),
-                 [](uint8_t v) { return static_cast<uint16_t>(257 * v); });
-  return wide;
-}
-
-}  // namespace
 
 NormalSource::NormalSource(const fs::path& path, const fs::path& log, const std::atomic<bool>& stop) {
   if (!fs::exists(path))

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 
 #include "base/error.h"
 #include "base/utf8.h"
 #include "capture/formats/image_names.h"
+#include "files/image.h"
 #include "prepare/film.h"
 #include "prepare/programs.h"
 
@@ -21,10 +21,7 @@ bool is_picture(const fs::path& path) {
   if (path.filename().string().starts_with('.')) return false;
   constexpr std::array endings{".png",  ".jpg", ".jpeg", ".tif", ".tiff",
                                ".webp", ".bmp", ".ppm",  ".exr", ".dng"};
-  std::string ending = path.extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::find(endings.begin(), endings.end(), ending) != endings.end();
+  return std::ranges::find(endings, lower_extension(path)) != endings.end();
 }
 
 }  // namespace
@@ -34,7 +31,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) {
     if (entry.is_regular_file() && is_picture(entry.path())) files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end(), [](const fs::path& a, const fs::path& b) {
+  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
     return natural_less(a.filename().string(), b.filename().string());
   });
   return files;

@@ -3,25 +3,22 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/robust.h"
+
 namespace traceflow::prepare {
 
 namespace {
 
 // The quantile of the values at this share; reorders them.
 double quantile(std::vector<double>& values, double share) {
-  const auto place = static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
-  std::nth_element(values.begin(), values.begin() + place, values.end());
-  return values[static_cast<size_t>(place)];
+  return ranked(values, static_cast<size_t>(std::lround(share * static_cast<double>(values.size() - 1))));
 }
 
 std::vector<double> depths_seen(const std::vector<Vec3<double>>& points,
                                 const std::vector<Camera<double>>& cameras) {
   std::vector<double> depths;
   for_each_sampled_pair(points, cameras, [&](const Vec3<double>& point, const Camera<double>& camera) {
-    const Vec3<double> x = camera.point_in_camera(point);
-    if (!(x.z > 0)) return;
-    const Vec2<double> at = camera.project(x);
-    if (at.x >= 0 && at.y >= 0 && at.x < camera.width && at.y < camera.height) depths.push_back(x.z);
+    if (camera.sees(point)) depths.push_back(camera.point_in_camera(point).z);
   });
   return depths;
 }

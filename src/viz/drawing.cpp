@@ -1,56 +1,15 @@
 #include "viz/drawing.h"
 
+#include <stb/stb_easy_font.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 namespace traceflow::viz {
 
 namespace {
-
-// The highest of 15 bits is the left dot of the top row.
-constexpr std::array<uint16_t, 26> letters = {
-    0b010101111101101, 0b110101110101110, 0b011100100100011, 0b110101101101110, 0b111100110100111,
-    0b111100110100100, 0b011100101101011, 0b101101111101101, 0b111010010010111, 0b001001001101010,
-    0b101101110101101, 0b100100100100111, 0b101111111101101, 0b110101101101101, 0b010101101101010,
-    0b110101110100100, 0b010101101111011, 0b110101110101101, 0b011100010001110, 0b111010010010010,
-    0b101101101101111, 0b101101101101010, 0b101101111111101, 0b101101010101101, 0b101101010010010,
-    0b111001010100111};
-constexpr std::array<uint16_t, 10> digits = {
-    0b111101101101111, 0b010110010010111, 0b111001111100111, 0b111001111001111, 0b101101111001001,
-    0b111100111001111, 0b111100111101111, 0b111001001010010, 0b111101111101111, 0b111101111001111};
-
-uint16_t glyph_of(char c) {
-  if (c >= 'a' && c <= 'z') return letters[static_cast<size_t>(c - 'a')];
-  if (c >= 'A' && c <= 'Z') return letters[static_cast<size_t>(c - 'A')];
-  if (c >= '0' && c <= '9') return digits[static_cast<size_t>(c - '0')];
-  switch (c) {
-    case '.':
-      return 0b000000000000010;
-    case ',':
-      return 0b000000000010100;
-    case ':':
-      return 0b000010000010000;
-    case '-':
-      return 0b000000111000000;
-    case '_':
-      return 0b000000000000111;
-    case '+':
-      return 0b000010111010000;
-    case '=':
-      return 0b000111000111000;
-    case '/':
-      return 0b001001010100100;
-    case '%':
-      return 0b101001010100101;
-    case '(':
-      return 0b001010010010001;
-    case ')':
-      return 0b100010010010100;
-    default:
-      return 0;
-  }
-}
 
 void dot(int64_t x, int64_t y, const Ink& ink, Tensor<uint8_t>& picture) {
   if (x < 0 || y < 0 || y >= picture.dim(0) || x >= picture.dim(1)) return;
@@ -63,13 +22,18 @@ void dot(int64_t x, int64_t y, const Ink& ink, Tensor<uint8_t>& picture) {
 }  // namespace
 
 void write_text(std::string_view text, const Pixel& at, const Ink& ink, Tensor<uint8_t>& picture) {
+  struct Corner {
+    float x, y, z;
+    unsigned char colour[4];
+  };
+  std::array<std::array<Corner, 4>, 16> boxes{};  // a letter has 11 at most
   int64_t left = at.x;
   for (const char letter : text) {
-    const uint16_t glyph = glyph_of(letter);
-    for (int64_t bit = 0; bit < 15; ++bit) {
-      if (((glyph >> (14 - bit)) & 1) != 0)
-        fill_box({left + bit % 3 * 2, at.y + bit / 3 * 2}, {2, 2}, ink, picture);
-    }
+    char one[] = {letter > ' ' && letter <= '~' ? letter : ' ', '\0'};
+    const int count = stb_easy_font_print(0, 0, one, nullptr, boxes.data(), sizeof boxes);
+    for (const auto& [first, right, last, below] : std::span(boxes).first(static_cast<size_t>(count)))
+      fill_box({left + std::lround(first.x), at.y + std::lround(first.y)},
+               {std::lround(last.x - first.x), std::lround(last.y - first.y)}, ink, picture);
     left += letter_width;
   }
 }

@@ -14,8 +14,7 @@ struct Ink {
 
 using Pixel = Vec2<int64_t>;  // x to the right, y down
 
-// Letters of 3×5 dots of 2×2 pixels each: a to z (also for capitals), 0 to 9 and . , : - _ + = / % ( ); other
-// characters are blank. A letter takes letter_width pixels. at: the upper left corner.
+// Characters of ASCII; others are blank. Each takes letter_width pixels. at: the upper left corner.
 inline constexpr int64_t letter_width = 8, letter_height = 10;
 void write_text(std::string_view text, const Pixel& at, const Ink& ink, Tensor<uint8_t>& picture);
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "base/robust.h"
 #include "files/png.h"
 
 namespace traceflow::viz {
@@ -14,8 +15,7 @@ bool shown(float v) { return std::isfinite(v) && v != 0; }
 
 Tensor<float> inverse(const Tensor<float>& depth) {
   Tensor<float> result(depth.shape());
-  std::transform(depth.data(), depth.data() + depth.size(), result.data(),
-                 [](float z) { return shown(z) ? 1 / z : 0.0F; });
+  std::ranges::transform(depth.values(), result.data(), [](float z) { return shown(z) ? 1 / z : 0.0F; });
   return result;
 }
 
@@ -37,11 +37,7 @@ std::optional<Painter::Range> Painter::range_of(const Tensor<float>& values) {
   }
   if (seen.empty()) return std::nullopt;
   // Two percent at each end are clamped, so that single outliers do not determine the range.
-  const auto at = [&](size_t percent) {
-    const auto place = seen.begin() + static_cast<std::ptrdiff_t>(((seen.size() - 1) * percent + 50) / 100);
-    std::nth_element(seen.begin(), place, seen.end());
-    return *place;
-  };
+  const auto at = [&](size_t percent) { return ranked(seen, ((seen.size() - 1) * percent + 50) / 100); };
   const float low = at(2), high = at(98);
   return Range{low, high > low ? high : low + 1};
 }
@@ -132,6 +128,20 @@ Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width, int64_t heig
     }
   }
   return small;
+}
+
+Tensor<uint8_t> side_by_side(const Tensor<uint8_t>& left, const Tensor<uint8_t>& right) {
+  if (left.dim(0) != right.dim(0)) {
+    throw InputError("pictures", "",
+                     "heights of " + std::to_string(left.dim(0)) + " and " + std::to_string(right.dim(0)),
+                     "one height, to stand side by side");
+  }
+  Tensor<uint8_t> both(Shape{left.dim(0), left.dim(1) + right.dim(1), 3});
+  for (int64_t y = 0; y < both.dim(0); ++y) {
+    std::copy(left.row(y), left.row(y) + left.row_size(), both.row(y));
+    std::copy(right.row(y), right.row(y) + right.row_size(), both.row(y) + left.row_size());
+  }
+  return both;
 }
 
 Tensor<uint8_t> in_colour(const Tensor<uint8_t>& image) {

@@ -51,6 +51,9 @@ class Painter {
 Tensor<uint8_t> shrink(const Tensor<uint8_t>& image, int64_t width,
                        int64_t height = std::numeric_limits<int64_t>::max());
 
+// Joins two pictures (H×W×3) of equal height, left and right. Throws InputError if the heights differ.
+Tensor<uint8_t> side_by_side(const Tensor<uint8_t>& left, const Tensor<uint8_t>& right);
+
 // Converts grey (H×W) to three channels; three channels are unchanged.
 Tensor<uint8_t> in_colour(const Tensor<uint8_t>& image);
 

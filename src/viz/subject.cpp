@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/robust.h"
 #include "files/options_json.h"
 #include "ops/deform/deform.h"
 #include "ops/lighting/lighting.h"
@@ -120,9 +121,8 @@ float extent_seen_from(const Surfels& surfels, const std::vector<Shot>& shots) {
     if (std::isfinite(d)) distances.push_back(d);
   }
   if (distances.empty()) return 1;
-  const auto median = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), median, distances.end());
-  return *median > 0 ? *median : 1;
+  const float median = ranked(distances, distances.size() / 2);
+  return median > 0 ? median : 1;
 }
 
 std::vector<std::filesystem::path> export_subject(const Subject& subject, std::optional<float> time,

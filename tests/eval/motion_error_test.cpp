@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "base/random.h"
+#include "math/rotation.h"
 #include "math/similarity_fit.h"
 
 namespace traceflow::eval {

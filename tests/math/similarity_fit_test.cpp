@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "math/random_vector.h"
+#include "math/rotation.h"
 
 namespace traceflow {
 namespace {

@@ -9,7 +9,6 @@
 #include "math/rotation.h"
 #include "prepare/motion/motion.h"
 #include "prepare/motion/moving_mask.h"
-#include "prepare/motion/null_vector.h"
 #include "prepare/motion/track.h"
 #include "prepare/motion/two_view.h"
 
@@ -50,29 +49,6 @@ TEST(Track, FindsNothingWhereThereIsNothingToSee) {
   const Pyramid flat = make_pyramid(painted(64, 64, [](double, double) { return 90.0; }));
   EXPECT_TRUE(find_corners(flat, 8).empty());
   EXPECT_TRUE(track(flat, flat, {{30, 30}}).empty());
-}
-
-TEST(Equations9, FindTheNullVector) {
-  Random random(3);
-  std::array<double, 9> truth{};
-  double size = 0;
-  for (double& v : truth) {
-    v = random.normal();
-    size += v * v;
-  }
-  Equations9 equations;
-  for (int k = 0; k < 12; ++k) {
-    std::array<double, 9> row{};
-    double along = 0;
-    for (double& v : row) v = random.normal();
-    for (size_t i = 0; i < 9; ++i) along += row[i] * truth[i] / size;
-    for (size_t i = 0; i < 9; ++i) row[i] -= along * truth[i];
-    equations.add(row);
-  }
-  const std::array<double, 9> found = equations.least();
-  double product = 0;
-  for (size_t i = 0; i < 9; ++i) product += found[i] * truth[i];
-  EXPECT_NEAR(std::abs(product), std::sqrt(size), 1e-9);
 }
 
 struct Cameras {

@@ -5,6 +5,7 @@
 #include <array>
 #include <vector>
 
+#include "math/rotation.h"
 #include "math/similarity_fit.h"
 #include "track/ball_body.h"
 #include "track/mirror_image.h"

@@ -10,6 +10,7 @@
 #include "capture/motion_truth.h"
 #include "files/png.h"
 #include "math/activation.h"
+#include "math/rotation.h"
 #include "math/rotation_group.h"
 #include "math/similarity_fit.h"
 #include "support/refusal.h"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "capture/motion_truth.h"
+#include "math/rotation.h"
 #include "math/similarity_fit.h"
 #include "track/bodies.h"
 #include "train/initialise.h"

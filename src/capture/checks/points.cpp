@@ -36,13 +36,9 @@ Sighting look(const Capture& capture) {
     bool is_seen = false, is_before = false;
     for (size_t v = 0; v < capture.train.size(); ++v) {
       const Camera<float>& camera = capture.train[v].camera;
-      const Vec3<float> x = camera.point_in_camera(point);
-      if (!(x.z > 0)) continue;
+      if (!(camera.point_in_camera(point).z > 0)) continue;
       is_before = true;
-      const Vec2<float> at = camera.project(x);
-      if (!(at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
-            at.y < static_cast<float>(camera.height)))
-        continue;
+      if (!camera.sees(point)) continue;
       is_seen = true;
       ++hits[v];
     }
@@ -57,7 +53,7 @@ Sighting look(const Capture& capture) {
 
 void emit_unseen(const Sighting& sighting, Findings& findings) {
   const auto is_told = [&](const std::string& kind) {
-    return std::any_of(findings.begin(), findings.end(), [&](const Finding& f) { return f.kind == kind; });
+    return std::ranges::any_of(findings, [&](const Finding& f) { return f.kind == kind; });
   };
   if (sighting.behind > behind_share) {
     Finding& finding = findings.emplace_back(
@@ -113,9 +109,9 @@ void emit_far(const Tensor<float>& points, Findings& findings) {
   for (int64_t i = 0; i < points.dim(0); ++i)
     distances.push_back(distance(load3<double>(points.row(i)), middle));
   const double usual = median(distances), limit = far_distance * usual;
-  const auto far = std::count_if(distances.begin(), distances.end(), [&](double d) { return d > limit; });
+  const auto far = std::ranges::count_if(distances, [&](double d) { return d > limit; });
   if (far == 0 || !(usual > 0)) return;
-  const double worst = *std::max_element(distances.begin(), distances.end()) / usual;
+  const double worst = *std::ranges::max_element(distances) / usual;
   Finding& finding = findings.emplace_back(
       fmt::format(
           "{} of {} points lie far out, the farthest {:.0f} times as far from the middle as the median", far,

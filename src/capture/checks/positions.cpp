@@ -34,17 +34,14 @@ Vec3<double> middle_of(const Positions& positions) {
 // The 90th percentile of a camera's distance to the nearer of its two neighbours in time. For an outlier both
 // neighbours are far; for its neighbours only one is.
 double usual_step(std::vector<const View*> views) {
-  std::stable_sort(views.begin(), views.end(),
-                   [](const View* a, const View* b) { return a->time < b->time; });
+  std::ranges::stable_sort(views, {}, &View::time);
   std::vector<float> steps(views.size(), std::numeric_limits<float>::infinity());
   for (size_t i = 1; i < views.size(); ++i) {
     const float step = distance(views[i]->camera.position, views[i - 1]->camera.position);
     steps[i - 1] = std::min(steps[i - 1], step);
     steps[i] = step;
   }
-  const auto place = steps.begin() + static_cast<std::ptrdiff_t>((steps.size() - 1) * 9 / 10);
-  std::nth_element(steps.begin(), place, steps.end());
-  return *place;
+  return ranked(steps, (steps.size() - 1) * 9 / 10);
 }
 
 // Removes from `far` the cameras that a chain of gaps of at most max_gap connects to a camera not in `far`.
@@ -65,8 +62,7 @@ void connect(const Positions& positions, double max_gap, std::vector<bool>& far)
 std::string extent_text(const Capture& capture, const std::vector<std::string>& apart) {
   Positions rest;
   for (const View& view : capture.train) {
-    if (std::find(apart.begin(), apart.end(), view.id) == apart.end())
-      rest.emplace_back(view.camera.position);
+    if (std::ranges::find(apart, view.id) == apart.end()) rest.emplace_back(view.camera.position);
   }
   if (rest.size() == capture.train.size()) return "";
   return fmt::format("; without {} the scene's extent would be {:.3g} instead of {:.3g}",

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -29,10 +28,7 @@ std::string_view take_number(const std::string& text, size_t& at) {
 bool has_foreign_name(const std::filesystem::path& name) {
   constexpr std::array<std::string_view, 9> kinds = {".tif", ".tiff", ".bmp", ".webp", ".heic",
                                                      ".exr", ".dng",  ".ppm", ".jp2"};
-  std::string extension = name.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::find(kinds.begin(), kinds.end(), extension) != kinds.end();
+  return std::ranges::find(kinds, lower_extension(name)) != kinds.end();
 }
 
 std::string bare_name(const std::string& path) {
@@ -72,7 +68,7 @@ bool natural_less(const std::string& a, const std::string& b) {
 }
 
 std::string tidy_path(std::string path) {
-  std::replace(path.begin(), path.end(), '\\', '/');
+  std::ranges::replace(path, '\\', '/');
   return std::filesystem::path(path).lexically_normal().generic_string();
 }
 
@@ -108,7 +104,7 @@ std::vector<std::string> image_ids(const std::vector<std::string>& paths,
   for (size_t i = 0; i < paths.size(); ++i) {
     const std::string& path = paths[i];
     std::string id = without_extension(path).substr(shared);
-    std::replace(id.begin(), id.end(), '/', '_');
+    std::ranges::replace(id, '/', '_');
     constexpr size_t longest = 200;
     if (id.empty() || id == "." || id == ".." || printable(id, longest) != id) {
       throw InputError(where(i), "image names", "\"" + printable(path, 60) + "\"",
@@ -133,8 +129,8 @@ std::vector<double> times_by_names(const std::vector<std::string>& paths,
   std::map<std::string, double> place;
   for (const std::string& name : names) place.emplace(name, static_cast<double>(place.size()));
   std::vector<double> times(paths.size());
-  std::transform(paths.begin(), paths.end(), times.begin(),
-                 [&](const std::string& path) { return place.at(bare_name(path)); });
+  std::ranges::transform(paths, times.begin(),
+                         [&](const std::string& path) { return place.at(bare_name(path)); });
   return times;
 }
 

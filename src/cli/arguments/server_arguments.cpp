@@ -7,7 +7,6 @@
 #include <optional>
 
 #include "base/error.h"
-#include "serve/net/page.h"
 
 namespace traceflow::cli {
 

@@ -12,7 +12,6 @@
 #include "base/option_fields.h"
 #include "base/version.h"
 #include "cli/terminal/count_progress.h"
-#include "record/log_history.h"
 #include "scene/run_folder.h"
 #include "scene/viewpoint.h"
 #include "train/camera_alignment.h"
@@ -52,14 +51,6 @@ std::vector<eval::Setting> settings_of(const TrainOptions& options) {
     nearest = std::move(settings);
   }
   return nearest;
-}
-
-void put_log(const std::filesystem::path& log, eval::ReportPage& page) {
-  const std::vector<LoggedEvent> events = read_log(log);
-  for (LoggedPhase& phase : phases_of(events))
-    page.phases.push_back(
-        {std::move(phase.name), phase.first, phase.last, phase.seconds, std::move(phase.steps)});
-  for (LoggedEvent& event : thinned(events)) page.events.push_back(std::move(event.line));
 }
 
 }  // namespace
@@ -149,7 +140,9 @@ void Evaluation::write_page(const std::filesystem::path& path) {
   page.machine = this_machine(device_);
   page.report = report_;
   page.settings = settings_of(run_.options);
-  put_log(RunFolder{folder_}.log(), page);
+  const std::vector<LoggedEvent> events = read_log(RunFolder{folder_}.log());
+  page.phases = phases_of(events);
+  page.events = lines_of(thinned(events));
   page.pictures = pictures_.take();
   write_atomically(path, eval::report_page(page));
 }

@@ -17,7 +17,6 @@
 #include "cli/verbs/verbs.h"
 #include "files/png.h"
 #include "viz/layer_files.h"
-#include "viz/side_by_side.h"
 #include "viz/video.h"
 
 namespace traceflow::cli {
@@ -124,7 +123,7 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
   subject.scene.move_to(devices.choose());
 
   std::optional<viz::TrackFollower> follower;
-  if (std::find(layers.begin(), layers.end(), viz::Layer::tracks) != layers.end())
+  if (std::ranges::find(layers, viz::Layer::tracks) != layers.end())
     follower.emplace(subject.scene, subject.request, subject.render, times_for_tracks(a, scene, chosen));
   Output output(a, chosen, subject.scene.normalisation.scale);
   const size_t done = take(chosen.shots, subject, follower ? &*follower : nullptr, output);

@@ -56,27 +56,17 @@ Vec2<double> gradient(const Tensor<float>& image, double x, double y) {
           0.5 * (sample(image, x, y + 1) - sample(image, x, y - 1))};
 }
 
-// Sums of the products of gradients over a window.
-struct Structure {
-  double xx = 0, xy = 0, yy = 0;
+using Structure = glm::dmat2;  // sum of the products of gradients over a window
 
-  void add(const Vec2<double>& g) {
-    xx += g.x * g.x;
-    xy += g.x * g.y;
-    yy += g.y * g.y;
-  }
-  double least_eigenvalue() const { return 0.5 * (xx + yy - std::hypot(xx - yy, 2 * xy)); }
-  Vec2<double> solve(const Vec2<double>& b) const {
-    const double determinant = xx * yy - xy * xy;
-    return {(yy * b.x - xy * b.y) / determinant, (xx * b.y - xy * b.x) / determinant};
-  }
-};
+double least_eigenvalue(const Structure& m) {
+  return 0.5 * (m[0][0] + m[1][1] - std::hypot(m[0][0] - m[1][1], 2 * m[0][1]));
+}
 
 // The surroundings of a point on one level.
 struct Patch {
   std::array<double, window> value;
   std::array<Vec2<double>, window> slope;
-  Structure structure;
+  Structure structure{0};
 
   Patch(const Tensor<float>& image, const Vec2<double>& at) {
     size_t k = 0;
@@ -84,7 +74,7 @@ struct Patch {
       for (int dx = -radius; dx <= radius; ++dx, ++k) {
         value[k] = sample(image, at.x + dx, at.y + dy);
         slope[k] = gradient(image, at.x + dx, at.y + dy);
-        structure.add(slope[k]);
+        structure += outerProduct(slope[k], slope[k]);
       }
     }
   }
@@ -114,7 +104,7 @@ std::optional<Track> follow(const Pyramid& from, const Pyramid& to, const Vec2<d
     const Vec2<double> at = place / static_cast<double>(int64_t{1} << level);
     const Patch patch(from.levels[level], at);
     shift *= 2.0;
-    if (patch.structure.least_eigenvalue() < least_contrast * window) {
+    if (least_eigenvalue(patch.structure) < least_contrast * window) {
       if (level == 0) return std::nullopt;
       continue;
     }
@@ -122,7 +112,7 @@ std::optional<Track> follow(const Pyramid& from, const Pyramid& to, const Vec2<d
       Vec2<double> b(0);
       compare(patch, to.levels[level], at + shift,
               [&](size_t k, double apart) { b += apart * patch.slope[k]; });
-      const Vec2<double> step = patch.structure.solve(b);
+      const Vec2<double> step = inverse(patch.structure) * b;
       shift += step;
       if (dot(step, step) < converged * converged) break;
     }
@@ -156,13 +146,15 @@ std::vector<Vec2<double>> find_corners(const Pyramid& picture, int spacing) {
       std::optional<Vec2<double>> corner;
       for (int64_t y = top; y < top + spacing; y += step) {
         for (int64_t x = left; x < left + spacing; x += step) {
-          Structure around;
+          Structure around{0};
           for (int64_t dy = -half_window; dy <= half_window; ++dy) {
             for (int64_t dx = -half_window; dx <= half_window; ++dx) {
-              around.add(gradient(image, static_cast<double>(x + dx), static_cast<double>(y + dy)));
+              const Vec2<double> g =
+                  gradient(image, static_cast<double>(x + dx), static_cast<double>(y + dy));
+              around += outerProduct(g, g);
             }
           }
-          const double contrast = around.least_eigenvalue();
+          const double contrast = least_eigenvalue(around);
           if (contrast <= best) continue;
           best = contrast;
           corner = Vec2<double>(x, y);

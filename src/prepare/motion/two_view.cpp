@@ -3,25 +3,20 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <Eigen/Eigenvalues>
 #include <limits>
 
 #include "base/random.h"
 #include "math/symmetric_eigen.h"
-#include "prepare/motion/null_vector.h"
 
 namespace traceflow::prepare {
 
 namespace {
 
 using Kind = TwoView::Kind;
-using Row = std::array<double, 9>;
+using Row = Eigen::Matrix<double, 9, 1>;  // an equation for the nine numbers of a matrix, row by row
 
 Vec3<double> homogeneous(const Vec2<double>& p) { return {p, 1}; }
-
-// Converts rows of nine numbers to a matrix and back.
-Mat3<double> matrix_of(const Row& m) {
-  return transpose(Mat3<double>(m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]));
-}
 
 // Moves the mean to zero and scales the mean distance from it to √2. Otherwise the coefficients would differ
 // by the square of the image width (Hartley 1997).
@@ -38,22 +33,24 @@ Mat3<double> to_unit(const std::vector<Track>& tracks, Vec2<double> Track::*plac
   return m;
 }
 
-// The unit null vector of the equations that `add` makes of each track, in normalised coordinates.
+// The matrix of unit norm that best fits the equations of all tracks, in normalised coordinates.
 template <class F>
 Mat3<double> null_matrix(const std::vector<Track>& tracks, const Mat3<double>& unit_from,
                          const Mat3<double>& unit_to, F&& equations_of) {
-  Equations9 normal;
+  Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
   for (const Track& t : tracks) {
     const Vec3<double> a = unit_from * homogeneous(t.from), b = unit_to * homogeneous(t.to);
-    for (const Row& row : equations_of(a, b)) normal.add(row);
+    for (const Row& row : equations_of(a, b)) normal += row * row.transpose();
   }
-  return matrix_of(normal.least());
+  const Row null = Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>>(normal).eigenvectors().col(0);
+  Mat3<double> m;
+  std::copy_n(null.data(), 9, &m[0][0]);
+  return transpose(m);
 }
 
 Mat3<double> normalised(const Mat3<double>& m) {
-  double sum = 0;
-  for (int i = 0; i < 9; ++i) sum += m[i / 3][i % 3] * m[i / 3][i % 3];
-  return sum > 0 ? m / std::sqrt(sum) : m;
+  const double norm = Eigen::Map<const Row>(&m[0][0]).norm();
+  return norm > 0 ? m / norm : m;
 }
 
 // The nearest matrix of rank 2: removes the smallest singular value.
@@ -75,8 +72,8 @@ double cost(const TwoView& model, const std::vector<Track>& tracks, double toler
 
 std::vector<Track> obeying(const TwoView& model, const std::vector<Track>& tracks, double tolerance) {
   std::vector<Track> kept;
-  std::copy_if(tracks.begin(), tracks.end(), std::back_inserter(kept),
-               [&](const Track& t) { return model.distance(t) < tolerance; });
+  std::ranges::copy_if(tracks, std::back_inserter(kept),
+                       [&](const Track& t) { return model.distance(t) < tolerance; });
   return kept;
 }
 
@@ -84,7 +81,7 @@ std::vector<Track> draw(const std::vector<Track>& tracks, size_t count, Random& 
   std::vector<size_t> chosen;
   while (chosen.size() < count) {
     const auto i = static_cast<size_t>(random.below(static_cast<int64_t>(tracks.size())));
-    if (std::find(chosen.begin(), chosen.end(), i) == chosen.end()) chosen.push_back(i);
+    if (std::ranges::find(chosen, i) == chosen.end()) chosen.push_back(i);
   }
   std::vector<Track> sample;
   sample.reserve(count);

@@ -121,9 +121,7 @@ struct Server::State {
   template <class Socket>
   void start_session(Socket socket) {
     auto& sessions = shared.sessions;
-    sessions.erase(
-        std::remove_if(sessions.begin(), sessions.end(), [](const auto& s) { return s.expired(); }),
-        sessions.end());
+    std::erase_if(sessions, [](const auto& s) { return s.expired(); });
     if (sessions.size() >= connections) close_unauthenticated();
     if (sessions.size() >= connections + spare_connections) return;
     error_code ignored;
@@ -136,7 +134,7 @@ struct Server::State {
   // Clients without the token must not block those that have it: closes the oldest without the token.
   void close_unauthenticated() {
     auto& sessions = shared.sessions;
-    const auto unauthenticated = std::find_if(sessions.begin(), sessions.end(), [](const auto& s) {
+    const auto unauthenticated = std::ranges::find_if(sessions, [](const auto& s) {
       const auto alive = s.lock();
       return alive && !alive->is_authenticated();
     });

@@ -23,12 +23,15 @@ struct ServerOptions {
   void validate() const;
 };
 
+// The viewer's page and its files, from web/page/.
+std::span<const EmbeddedFile> embedded_files();
+
 // Serves the viewer's page over HTTP and its messages over a WebSocket at /ws, on its own thread. Every
 // request must carry the token of the server's address (docs/view.md, Safety).
 class Server {
  public:
-  // Starts to listen. page (embedded_files() of serve/net/page.h) and handler must outlive the server. Throws
-  // InputError if it cannot listen on the address.
+  // Starts to listen. page and handler must outlive the server. Throws InputError if it cannot listen on the
+  // address.
   Server(const ServerOptions& options, std::span<const EmbeddedFile> page, MessageHandler& handler,
          const Limits& limits = {});
   // Closes all connections. When it returns, every client is disconnected.

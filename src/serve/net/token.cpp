@@ -1,5 +1,6 @@
 #include "serve/net/token.h"
 
+#include <fmt/format.h>
 #include <sys/random.h>
 
 #include <array>
@@ -13,13 +14,7 @@ std::string random_token() {
   // getrandom returns up to 256 bytes completely or fails.
   const ssize_t got = getrandom(bytes.data(), bytes.size(), 0);
   require(got == static_cast<ssize_t>(bytes.size()), "the system gives random bytes", std::to_string(got));
-  constexpr std::string_view digits = "0123456789abcdef";
-  std::string token;
-  for (const unsigned char byte : bytes) {
-    token += digits[byte >> 4];
-    token += digits[byte & 15];
-  }
-  return token;
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
 }
 
 bool same_secret(std::string_view a, std::string_view b) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/robust.h"
+
 namespace traceflow::viz {
 
 using V = Vec3<double>;
@@ -77,10 +79,7 @@ V median_point(const Tensor<float>& points) {
     for (int64_t i = 0; i < points.dim(0); ++i) {
       if (std::isfinite(points(i, axis))) values.push_back(points(i, axis));
     }
-    if (values.empty()) continue;
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
+    if (!values.empty()) median[axis] = ranked(values, values.size() / 2);
   }
   return median;
 }

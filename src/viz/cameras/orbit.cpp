@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/robust.h"
 #include "viz/cameras/look_at.h"
 
 namespace traceflow::viz {
@@ -85,12 +86,8 @@ std::vector<Shot> orbit_around_points(const Tensor<float>& points, int width, in
     const double d = length(load3<double>(points.row(i)) - circle.target);
     if (std::isfinite(d)) distances.push_back(d);
   }
-  double extent = 1;
-  if (!distances.empty()) {
-    const auto most = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 9 / 10);
-    std::nth_element(distances.begin(), most, distances.end());
-    if (*most > 0) extent = *most;
-  }
+  double extent = distances.empty() ? 0 : ranked(distances, distances.size() * 9 / 10);
+  if (extent == 0) extent = 1;
   circle.radius = 2.5 * extent;
   circle.height = 0.75 * extent;
   Camera<float> like;

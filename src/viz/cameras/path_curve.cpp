@@ -3,71 +3,30 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/ext/quaternion_exponential.hpp>
 
 #include "base/error.h"
-#include "math/rotation.h"
 
 namespace traceflow::viz {
 
 namespace {
 
 using V = Vec3<double>;
-using Q = Vec4<double>;
-
-Q product(const Q& a, const Q& b) {
-  const V u(a[1], a[2], a[3]), v(b[1], b[2], b[3]);
-  const V w = a[0] * v + b[0] * u + cross(u, v);
-  return {a[0] * b[0] - dot(u, v), w.x, w.y, w.z};
-}
-Q inverse(const Q& q) { return {q[0], -q[1], -q[2], -q[3]}; }
+using Q = glm::dquat;
 
 // Half the rotation vector from a to b in the axes of a, the shorter way.
 V half_turn(const Q& a, const Q& b) {
-  Q d = product(inverse(a), b);
-  if (d[0] < 0) d = -d;
-  const V axis(d[1], d[2], d[3]);
-  const double sine = length(axis);
-  return sine < 1e-12 ? axis : axis * (std::atan2(sine, d[0]) / sine);
+  const Q d = glm::conjugate(a) * b, turn = glm::log(d.w < 0 ? -d : d);
+  return {turn.x, turn.y, turn.z};
 }
-Q from_half_turn(const V& v) {
-  const double angle = length(v);
-  const V axis = v * (angle < 1e-12 ? 1 : std::sin(angle) / angle);
-  return {std::cos(angle), axis.x, axis.y, axis.z};
-}
-
-// Converts a rotation matrix by its largest component.
-Q quaternion_of(const Mat3<double>& r) {
-  const auto at = [&](int row, int column) { return r[column][row]; };
-  std::array<double, 4> squares{};  // four times the square of each component
-  for (size_t i = 0; i < 4; ++i) {
-    const auto sign = [&](size_t axis) { return i == 0 || i == axis ? 1.0 : -1.0; };
-    squares[i] = 1 + sign(1) * at(0, 0) + sign(2) * at(1, 1) + sign(3) * at(2, 2);
-  }
-  Q q;
-  switch (std::max_element(squares.begin(), squares.end()) - squares.begin()) {
-    case 0:
-      q = {squares[0], at(2, 1) - at(1, 2), at(0, 2) - at(2, 0), at(1, 0) - at(0, 1)};
-      break;
-    case 1:
-      q = {at(2, 1) - at(1, 2), squares[1], at(1, 0) + at(0, 1), at(0, 2) + at(2, 0)};
-      break;
-    case 2:
-      q = {at(0, 2) - at(2, 0), at(1, 0) + at(0, 1), squares[2], at(2, 1) + at(1, 2)};
-      break;
-    default:
-      q = {at(1, 0) - at(0, 1), at(0, 2) + at(2, 0), at(2, 1) + at(1, 2), squares[3]};
-  }
-  return q / length(q);
-}
-
-Q between(const Q& a, const Q& b, double u) { return product(a, from_half_turn(u * half_turn(a, b))); }
+Q from_half_turn(const V& v) { return glm::exp(Q(0, v)); }
 
 // The quaternion Bézier curve by de Casteljau's algorithm.
 Q bezier(std::array<Q, 4> q, double u) {
   for (size_t level = 3; level > 0; --level) {
-    for (size_t i = 0; i < level; ++i) q.at(i) = between(q.at(i), q.at(i + 1), u);
+    for (size_t i = 0; i < level; ++i) q.at(i) = glm::slerp(q.at(i), q.at(i + 1), u);
   }
-  return q[0] / length(q[0]);
+  return glm::normalize(q[0]);
 }
 
 // The cubic from a to b with these slopes at its ends, over an interval of length h.
@@ -123,7 +82,7 @@ PathCurve::PathCurve(const CameraPath& path) : closed_(path.closed), keys_(path.
   for (const Keyframe& key : keys_) {
     fovs.push_back(key.fov_y);
     times.push_back(key.time);
-    rotations_.push_back(quaternion_of(key.world_from_camera));
+    rotations_.push_back(glm::quat_cast(key.world_from_camera));
   }
   knot_slopes_ = monotone_slopes(knots_, durations, closed_);
   fov_slopes_ = monotone_slopes(fovs, durations, closed_);
@@ -176,10 +135,9 @@ Pose PathCurve::at(double seconds) const {
                             std::clamp((knot - knots_[i]) / step, 0.0, 1.0));
   }
   const Q &a = rotations_[i], &b = rotations_[i + 1];
-  const Q q = bezier({a, product(a, from_half_turn(turns_[i] * (h / 3))),
-                      product(b, from_half_turn(turns_[i + 1] * (-h / 3))), b},
-                     u);
-  pose.world_from_camera = rotation_from_quaternion(q);
+  const Q q = bezier(
+      {a, a * from_half_turn(turns_[i] * (h / 3)), b * from_half_turn(turns_[i + 1] * (-h / 3)), b}, u);
+  pose.world_from_camera = glm::mat3_cast(q);
   pose.time = std::clamp(pose.time, 0.0, 1.0);
   return pose;
 }

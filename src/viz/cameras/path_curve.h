@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/gtc/quaternion.hpp>
 #include <vector>
 
 #include "viz/cameras/camera_path.h"
@@ -22,9 +23,6 @@ class PathCurve {
   Pose at(double seconds) const;
 
  private:
-  // A unit quaternion, (w, x, y, z).
-  using Quaternion = Vec4<double>;
-
   void turn(const std::vector<double>& durations);
 
   bool closed_;
@@ -33,7 +31,7 @@ class PathCurve {
   std::vector<double> knots_;           // curve parameter of each key
   std::vector<Vec3<double>> tangents_;  // dposition/dknot
   std::vector<double> knot_slopes_, fov_slopes_, time_slopes_;  // d/dsecond
-  std::vector<Quaternion> rotations_;
+  std::vector<glm::dquat> rotations_;
   std::vector<Vec3<double>> turns_;  // half the angular velocity in the camera's axes, radians per second
 };
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "base/error.h"
+#include "base/robust.h"
 #include "viz/cameras/look_at.h"
 
 namespace traceflow::viz {
@@ -24,9 +25,7 @@ double extent_along(const std::vector<Camera<float>>& cameras, const V& centroid
   std::vector<double> distances;
   distances.reserve(cameras.size());
   for (const Camera<float>& c : cameras) distances.push_back(std::abs(dot(V(c.position) - centroid, axis)));
-  const auto most = distances.begin() + static_cast<std::ptrdiff_t>((distances.size() - 1) * 9 / 10);
-  std::nth_element(distances.begin(), most, distances.end());
-  return *most;
+  return ranked(distances, (distances.size() - 1) * 9 / 10);
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <set>
 
 #include "serve/net/mailbox.h"
-#include "serve/net/page.h"
 #include "serve/net/server.h"
 #include "serve/net/token.h"
 
