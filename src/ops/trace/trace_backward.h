@@ -97,7 +97,7 @@ struct FinishSurfel {
 };
 
 // dL/d(ray) through the geometry of its hits. `direction` is the derivative by a unit vector.
-struct RayGradient {
+struct GradRay {
   Vec3<float> origin{0}, direction{0};
   float width = 0;
 };

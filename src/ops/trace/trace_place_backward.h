@@ -32,7 +32,7 @@ TRACEFLOW_HD inline AxisGradient axis_backward(float grad_exponent, float along,
 // Sets the contributions of one hit and adds the effect of its position to the ray. The CPU processes several
 // hits at once (cpu/geometry-inl.h).
 TRACEFLOW_HD inline void place_backward(const BackwardFrame& f, const UnitRay& ray, const HitGradient& hit,
-                                        float* parts, RayGradient& grad_ray) {
+                                        float* parts, GradRay& grad_ray) {
   const Vec3<float> x = ray.origin - f.position + hit.distance * ray.direction;
   const float along_u = dot(f.t_u, x), along_v = dot(f.t_v, x);
   const float spread = ray.width * hit.distance;

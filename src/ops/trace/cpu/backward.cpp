@@ -124,7 +124,7 @@ void backward_ray(const BackwardInput& input, int64_t r, const RayHits& hits, Ra
   const Vec3<float> by_colour =
       colours_backward<degree>(input.surfels, hits, sums, grad, ray.direction, basis, scratch);
   blend_backward(hits, sums, grad, input.options, scratch);
-  const RayGradient by_place =
+  const GradRay by_place =
       places_backward(input.frames.data(), ray,
                       {hits.surfel, scratch.row.data(), scratch.distance.data(), scratch.grad_exponent.data(),
                        scratch.grad_distance.data(), hits.count});

@@ -53,7 +53,7 @@ struct RayBackward {
   Vec3<float> grad_colour{0};
   float grad_alpha = 0, grad_distance = 0;  // distance in scene units
   float behind = 0;                         // Σ weight · dL/dweight over the hits behind
-  RayGradient grad_ray;                     // dL/d(ray) through the geometry of the hits
+  GradRay grad_ray;                         // dL/d(ray) through the geometry of the hits
   float grad_basis[sh_coefficients(degree)] = {};
 
   __device__ void load(const BackwardTask& task, int64_t i, int64_t r) {
