@@ -356,8 +356,8 @@ Nodes place_nodes(const Motion& motion, const Surfels& surfels, int64_t each, in
     if (points.empty()) continue;
     // Farthest-point sampling, starting at the centre.
     std::vector<double> off(points.size());
-    const Vec3<double> centre = load3<double>(motion.centre.row(b));
-    for (size_t k = 0; k < points.size(); ++k) off[k] = -glm::length(points[k] - centre);
+    const Vec3<double> of_body = load3<double>(motion.centre.row(b));
+    for (size_t k = 0; k < points.size(); ++k) off[k] = -glm::length(points[k] - of_body);
     for (int64_t n = 0; n < each; ++n) {
       const auto next = static_cast<size_t>(std::max_element(off.begin(), off.end()) - off.begin());
       if (n > 0 && !(off[next] > 0)) break;
@@ -454,7 +454,7 @@ Sphere sphere_around(const Tensor<float>& position, const Surfels& surfels, int3
   }
   if (count == 0) return {Vec3<float>(0), 1};
   const Vec3<double> centroid = sum / count;
-  const double radius = std::sqrt(std::max(0.0, squares / count - dot(centroid, middle)));
+  const double radius = std::sqrt(std::max(0.0, squares / count - dot(centroid, centroid)));
   return {Vec3<float>(centroid), radius > 0 ? static_cast<float>(radius) : 1.0F};
 }
 

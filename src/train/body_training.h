@@ -1,6 +1,7 @@
 #pragma once
 
 #include "record/events.h"
+#include "render/renderer.h"
 #include "track/tracker.h"
 #include "train/schedule.h"
 #include "train/training_state.h"

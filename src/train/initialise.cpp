@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "capture/image_cache.h"
+#include "math/activation.h"
 #include "math/rotation.h"
 #include "math/rotation_group.h"
 #include "math/spherical_harmonics.h"
