@@ -85,8 +85,8 @@ class Assembly {
 
   void make_views() {
     if (found_.train.empty()) {
-      const auto missing = std::find_if(capture_.warnings.begin(), capture_.warnings.end(),
-                                        [](const Finding& f) { return f.kind.starts_with("missing-"); });
+      const auto missing = std::ranges::find_if(
+          capture_.warnings, [](const Finding& f) { return f.kind.starts_with("missing-"); });
       if (missing == capture_.warnings.end()) {
         throw InputError(capture_.folder.string(), "training views",
                          "none, and " + std::to_string(found_.test.size()) + " test views", "at least one",
@@ -118,9 +118,8 @@ class Assembly {
   }
 
   void warn_about_times() {
-    const bool moves = std::any_of(capture_.train.begin(), capture_.train.end(), [&](const View& view) {
-      return view.time != capture_.train.front().time;
-    });
+    const bool moves = std::ranges::any_of(
+        capture_.train, [&](const View& view) { return view.time != capture_.train.front().time; });
     if (moves) return;
     warn("all training views are of one time: the scene cannot move", "one-time",
          found_.times == CaptureTimes::none ? Severity::notice : Severity::problem);
@@ -245,7 +244,7 @@ class Assembly {
     }
     const size_t count = kept.size() / 3, all = found_.points.size();
     capture_.points = Tensor<float>({static_cast<int64_t>(count), 3});
-    std::copy(kept.begin(), kept.end(), capture_.points.data());
+    std::ranges::copy(kept, capture_.points.data());
     if (count < all) {
       warn(found_.points_file + ": " + std::to_string(all - count) + " of " + std::to_string(all) +
                " points are not finite: left out",
@@ -264,8 +263,7 @@ class Assembly {
     int64_t seen = 0, count = 0;
     for (int64_t i = 0; i < capture_.points.dim(0); i += step, ++count) {
       const Vec3<float> point = load3<float>(capture_.points.row(i));
-      seen += std::any_of(capture_.train.begin(), capture_.train.end(),
-                          [&](const View& view) { return view.camera.sees(point); });
+      seen += std::ranges::any_of(capture_.train, [&](const View& view) { return view.camera.sees(point); });
     }
     return static_cast<double>(seen) / static_cast<double>(count);
   }

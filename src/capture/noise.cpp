@@ -39,7 +39,7 @@ std::optional<double> noise_deviation(const Tensor<uint8_t>& picture, const Tens
       for (int64_t c = 0; c < channels; ++c) {
         const std::array<int, 4> block{picture(y, x, c), picture(y, x + 1, c), picture(y + 1, x, c),
                                        picture(y + 1, x + 1, c)};
-        const auto [least, most] = std::minmax_element(block.begin(), block.end());
+        const auto [least, most] = std::ranges::minmax_element(block);
         if (*least == 0 || *most == 255) continue;
         ++histogram[static_cast<size_t>(std::abs(block[0] - block[1] - block[2] + block[3]))];
         ++count;

@@ -64,15 +64,14 @@ std::string prior_axes_name(PriorAxes axes) {
 
 std::vector<const View*> views_for_axes(std::vector<const View*> with_priors) {
   constexpr size_t most = 6;
-  std::stable_sort(with_priors.begin(), with_priors.end(),
-                   [](const View* a, const View* b) { return a->time < b->time; });
+  std::ranges::stable_sort(with_priors, {}, &View::time);
   with_priors.resize(std::min(with_priors.size(), most));
   return with_priors;
 }
 
 std::vector<PriorAxes> agreeing_axes(const AxisEvidence& evidence) {
   std::vector<PriorAxes> agreeing;
-  std::copy_if(named_axes.begin(), named_axes.end(), std::back_inserter(agreeing), [&](PriorAxes axes) {
+  std::ranges::copy_if(named_axes, std::back_inserter(agreeing), [&](PriorAxes axes) {
     const Vec3<double> signs = prior_axis_signs(axes);
     for (int axis = 0; axis < 3; ++axis) {
       if (decides(evidence.correlation[axis]) && evidence.correlation[axis] * signs[axis] < 0) return false;
@@ -112,7 +111,7 @@ AxisEvidence measure_prior_axes(const Tensor<float>& points, const std::vector<P
 AxisChoice choose_prior_axes(PriorAxes asked, const AxisEvidence& evidence) {
   const PriorAxes preferred = asked == PriorAxes::automatic ? PriorAxes::opengl : asked;
   const std::vector<PriorAxes> agreeing = agreeing_axes(evidence);
-  if (std::find(agreeing.begin(), agreeing.end(), preferred) != agreeing.end()) return {preferred, ""};
+  if (std::ranges::find(agreeing, preferred) != agreeing.end()) return {preferred, ""};
   const std::string disagrees = "normal priors: the axes " + prior_axes_name(preferred) +
                                 " disagree with the geometry, which reads " +
                                 signs_text(evidence.correlation) + " against x right, y down, z forward";

@@ -54,7 +54,7 @@ void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
 
 Instructions instructions_of(const std::string& name) {
   constexpr auto names = enum_names(Instructions{});
-  return static_cast<Instructions>(std::find(names.begin(), names.end(), name) - names.begin());
+  return static_cast<Instructions>(std::ranges::find(names, name) - names.begin());
 }
 
 void print_profile() {

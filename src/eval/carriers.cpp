@@ -53,8 +53,8 @@ Carriers carriers_of(const viz::Subject& subject) {
   return {std::move(rest),
           [&subject, opaque_rows = std::move(opaque.source)](const std::vector<int32_t>& listed, float time) {
             std::vector<int32_t> chosen(listed.size());
-            std::transform(listed.begin(), listed.end(), chosen.begin(),
-                           [&](int32_t i) { return opaque_rows[static_cast<size_t>(i)]; });
+            std::ranges::transform(listed, chosen.begin(),
+                                   [&](int32_t i) { return opaque_rows[static_cast<size_t>(i)]; });
             return in_capture(subject.scene.normalisation, posed_rows(subject, chosen, time).position);
           }};
 }

@@ -155,7 +155,7 @@ MotionReport motion_error(const MotionTruth& truth, const Carriers& surfels) {
   }
   report.objects.reserve(held.size());
   for (const auto& [object, points] : held) {
-    const auto all = std::count(truth.object.values().begin(), truth.object.values().end(), object);
+    const auto all = std::ranges::count(truth.object.values(), object);
     report.objects.push_back({object, all, static_cast<int64_t>(points.size()), {}, {}});
   }
 

@@ -54,8 +54,8 @@ void evaluate(const viz::Subject& subject, const Capture& capture, const std::ve
          view.time});
     if (!images->mask.empty()) {
       masked_surfels += surfels_in_mask(frame, images->mask);
-      masked_pixels += std::count_if(images->mask.values().begin(), images->mask.values().end(),
-                                     [](uint8_t inside) { return inside != 0; });
+      masked_pixels +=
+          std::ranges::count_if(images->mask.values(), [](uint8_t inside) { return inside != 0; });
     }
     if (listener) listener(view, *images, frame);
   }

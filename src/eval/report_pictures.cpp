@@ -37,8 +37,8 @@ size_t encode(const Pictures& pictures, int quality, ReportPicture& result) {
 
 Pictures shrunk(const Pictures& pictures, int64_t width) {
   Pictures small;
-  std::transform(pictures.begin(), pictures.end(), small.begin(),
-                 [&](const Tensor<uint8_t>& picture) { return viz::shrink(picture, width); });
+  std::ranges::transform(pictures, small.begin(),
+                         [&](const Tensor<uint8_t>& picture) { return viz::shrink(picture, width); });
   return small;
 }
 

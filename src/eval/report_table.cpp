@@ -64,8 +64,8 @@ std::string motion_text(const MotionReport& report) {
 std::string report_table(const Report& report) {
   const Metrics mean = mean_of(report);
   std::vector<Column> shown;
-  std::copy_if(columns.begin(), columns.end(), std::back_inserter(shown),
-               [&](const Column& c) { return (mean.*c.figure).has_value(); });
+  std::ranges::copy_if(columns, std::back_inserter(shown),
+                       [&](const Column& c) { return (mean.*c.figure).has_value(); });
   size_t width = report.aligned ? 8 : 6;
   for (const ViewReport& view : report.views) width = std::max(width, view.id.size() + 1);
   std::string text = fmt::format("{:<{}}", "view", width);

@@ -23,8 +23,8 @@ std::string common_folder(const std::map<std::string, ZipMember>& members) {
   const size_t slash = first.find('/');
   if (slash == std::string::npos) return "";
   const std::string folder = first.substr(0, slash + 1);
-  const bool all = std::all_of(members.begin(), members.end(),
-                               [&](const auto& member) { return member.first.starts_with(folder); });
+  const bool all =
+      std::ranges::all_of(members, [&](const auto& member) { return member.first.starts_with(folder); });
   return all ? folder : "";
 }
 

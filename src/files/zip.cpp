@@ -108,8 +108,7 @@ void apply_zip64(const Bytes& bytes, int64_t extra, int64_t extra_end, ZipMember
 }
 
 void refuse_overlaps(const InputFile& file, std::vector<ZipMember> members) {
-  std::sort(members.begin(), members.end(),
-            [](const ZipMember& a, const ZipMember& b) { return a.offset < b.offset; });
+  std::ranges::sort(members, {}, &ZipMember::offset);
   for (size_t i = 1; i < members.size(); ++i) {
     const ZipMember& before = members[i - 1];
     if (members[i].offset < before.offset + std::max<int64_t>(before.stored_size, 1))

@@ -112,8 +112,8 @@ ViewIds ids_in(const Capture& capture, const CaptureOptions& options) {
   ViewIds ids{ids_of(capture.train), {}, found.train_ids, found.all_ids};
   std::set<std::string> there(ids.train.begin(), ids.train.end());
   for (const View& view : capture.test) there.insert(view.id);
-  std::copy_if(found.all_ids.begin(), found.all_ids.end(), std::back_inserter(ids.all),
-               [&](const std::string& id) { return there.contains(id); });
+  std::ranges::copy_if(found.all_ids, std::back_inserter(ids.all),
+                       [&](const std::string& id) { return there.contains(id); });
   return ids;
 }
 
@@ -253,13 +253,12 @@ std::map<std::string, int64_t> match_views(const std::string& origin, const std:
     const auto found = by_name.find(id);
     if (found != by_name.end()) matched.emplace(id, found->second);
   }
-  const auto training = std::count_if(ids.train.begin(), ids.train.end(),
-                                      [&](const std::string& id) { return matched.contains(id); });
+  const auto training =
+      std::ranges::count_if(ids.train, [&](const std::string& id) { return matched.contains(id); });
   if (training == static_cast<std::ptrdiff_t>(ids.train.size())) return matched;
   const std::array lists{&ids.train, &ids.all, &ids.listed_train, &ids.listed};
-  const auto list = std::find_if(lists.begin(), lists.end(), [&](const std::vector<std::string>* l) {
-    return count == static_cast<int64_t>(l->size());
-  });
+  const auto list = std::ranges::find_if(
+      lists, [&](const std::vector<std::string>* l) { return count == static_cast<int64_t>(l->size()); });
   if (list == lists.end()) {
     throw InputError(
         origin, "count", fmt::format("{}, of which {} have a training view's name", count, training),

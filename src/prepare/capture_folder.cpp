@@ -206,8 +206,7 @@ std::string write_capture(const PrepareOptions& options, const CaptureParts& par
                           const Work& work) {
   const std::vector<PosedFrame> posed = posed_frames(parts);
   const std::vector<NerfiesView> views = views_of(options, posed);
-  const auto tests =
-      std::count_if(views.begin(), views.end(), [](const NerfiesView& view) { return view.is_test; });
+  const auto tests = std::ranges::count_if(views, [](const NerfiesView& view) { return view.is_test; });
   if (tests == 0 || tests == static_cast<std::ptrdiff_t>(views.size())) {
     throw InputError("COLMAP's model", "poses",
                      fmt::format("{} training and {} test views",

@@ -51,8 +51,7 @@ std::vector<int64_t> nearest_frames(const std::vector<Candidate>& candidates,
                                     const std::vector<double>& times, double tolerance) {
   std::vector<int64_t> nearest;
   for (const double time : times) {
-    const auto after = std::lower_bound(candidates.begin(), candidates.end(), time,
-                                        [](const Candidate& c, double t) { return c.time < t; });
+    const auto after = std::ranges::lower_bound(candidates, time, {}, &Candidate::time);
     auto best = after;
     if (after == candidates.end() ||
         (after != candidates.begin() && time - std::prev(after)->time <= after->time - time)) {

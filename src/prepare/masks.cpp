@@ -96,8 +96,8 @@ std::vector<std::optional<int64_t>> match_masks(const std::string& origin,
     const auto found = by_name.find(name);
     return found == by_name.end() ? std::nullopt : std::optional(found->second);
   };
-  const auto first_camera = std::count_if(frames.frames.begin(), frames.frames.end(),
-                                          [](const Frame& frame) { return frame.camera == 0; });
+  const auto first_camera =
+      std::ranges::count_if(frames.frames, [](const Frame& frame) { return frame.camera == 0; });
   const int64_t of_film = frames.source_frames.front();
   int64_t order = 0;
   std::optional<Matched> matched =

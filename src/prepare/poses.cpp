@@ -124,7 +124,7 @@ Registered largest_model(const fs::path& models) {
   for (const auto& entry : fs::directory_iterator(models)) {
     if (entry.is_directory()) folders.push_back(entry.path());
   }
-  std::sort(folders.begin(), folders.end());
+  std::ranges::sort(folders);
   for (const fs::path& folder : folders) {
     const auto count = static_cast<int64_t>(read_colmap_model(*FileTree::open(folder), "").images.size());
     if (count > best.frames) best = {folder, count};

@@ -72,7 +72,7 @@ json identity_of(const fs::path& path) {
   };
   if (!fs::is_directory(path)) return one(path);
   std::vector<fs::path> files = pictures_in(path);
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   json all = json::array();
   for (const fs::path& file : files) all.push_back(one(file));
   return all;

@@ -93,7 +93,7 @@ std::span<const Stop> stops_of(ColourMap map) {
 
 ColourMap parse_colour_map(const std::string& name) {
   constexpr auto names = enum_names(ColourMap{});
-  const auto* const found = std::find(names.begin(), names.end(), name);
+  const auto* const found = std::ranges::find(names, name);
   if (found == names.end()) {
     std::string expected;
     for (const std::string_view known : names)

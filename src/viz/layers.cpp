@@ -21,7 +21,7 @@ Tensor<float> divided(Tensor<float> depth, double scale) {
 bool has_colours(Layer layer) {
   constexpr std::array<Layer, 6> colours = {Layer::rgb,    Layer::diffuse, Layer::specular,
                                             Layer::normal, Layer::surfels, Layer::tracks};
-  return std::find(colours.begin(), colours.end(), layer) != colours.end();
+  return std::ranges::find(colours, layer) != colours.end();
 }
 
 bool needs_reflections(Layer layer) {
@@ -32,7 +32,7 @@ std::vector<Layer> parse_layers(const std::string& list) {
   std::vector<Layer> layers;
   std::istringstream words(list);
   for (std::string word; std::getline(words, word, ',');) {
-    const auto* const found = std::find(layer_names.begin(), layer_names.end(), word);
+    const auto* const found = std::ranges::find(layer_names, word);
     const bool all = word == "all";
     if (found == layer_names.end() && !all) {
       std::string expected;
@@ -42,7 +42,7 @@ std::vector<Layer> parse_layers(const std::string& list) {
     for (size_t i = 0; i < layer_names.size(); ++i) {
       const auto layer = static_cast<Layer>(i);
       const bool wanted = all || layer_names[i] == word;
-      if (wanted && std::find(layers.begin(), layers.end(), layer) == layers.end()) layers.push_back(layer);
+      if (wanted && std::ranges::find(layers, layer) == layers.end()) layers.push_back(layer);
     }
   }
   if (layers.empty()) throw InputError("option", "layers", "none", "at least one");

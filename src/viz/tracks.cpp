@@ -54,7 +54,7 @@ double place_among(const std::vector<float>& times, float time) {
 std::vector<size_t> apart(const std::vector<Vec3<float>>& points, float gap, size_t most) {
   std::vector<size_t> taken;
   for (size_t i = 0; i < points.size() && taken.size() <= most; ++i) {
-    const bool is_free = std::none_of(taken.begin(), taken.end(), [&](size_t other) {
+    const bool is_free = std::ranges::none_of(taken, [&](size_t other) {
       const Vec3<float> d = points[i] - points[other];
       return dot(d, d) < gap * gap;
     });
@@ -69,8 +69,8 @@ float size_of(const std::vector<Vec3<float>>& points) {
   Vec3<float> sides(0);
   std::vector<float> values(points.size());
   for (int axis = 0; axis < 3; ++axis) {
-    std::transform(points.begin(), points.end(), values.begin(), [&](const auto& p) { return p[axis]; });
-    std::sort(values.begin(), values.end());
+    std::ranges::transform(points, values.begin(), [&](const auto& p) { return p[axis]; });
+    std::ranges::sort(values);
     const size_t left_out = values.size() / 20;
     sides[axis] = values[values.size() - 1 - left_out] - values[left_out];
   }
@@ -112,8 +112,7 @@ std::vector<float> hues_of(const std::vector<Vec3<float>>& points) {
   for (int a = 1; a < 3; ++a) axis = variance[a] > variance[axis] ? a : axis;
   std::vector<size_t> order(points.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](size_t a, size_t b) { return points[a][axis] < points[b][axis]; });
+  std::ranges::stable_sort(order, [&](size_t a, size_t b) { return points[a][axis] < points[b][axis]; });
   std::vector<float> hue(points.size());
   for (size_t rank = 0; rank < order.size(); ++rank)
     hue[order[rank]] = static_cast<float>((static_cast<double>(rank) + 0.5) / count);
@@ -186,7 +185,7 @@ void TrackFollower::choose(const Scene& scene) {
     if (opacity[k] >= least_opacity && moved[k] >= options_.least_move * scene.extent && moved[k] > 0)
       movers.push_back(static_cast<int64_t>(k));
   }
-  std::stable_sort(movers.begin(), movers.end(), [&](int64_t a, int64_t b) {
+  std::ranges::stable_sort(movers, [&](int64_t a, int64_t b) {
     return opacity[static_cast<size_t>(a)] > opacity[static_cast<size_t>(b)];
   });
   std::vector<Vec3<float>> points;
@@ -197,7 +196,7 @@ void TrackFollower::choose(const Scene& scene) {
   if (kept.empty()) return;
 
   // In surfel order, each with its hue.
-  std::sort(kept.begin(), kept.end());
+  std::ranges::sort(kept);
   std::vector<int32_t> chosen;
   points.clear();
   for (const int64_t k : kept) {

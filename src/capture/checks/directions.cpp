@@ -74,9 +74,8 @@ Vec3<double> place_looked_at(const std::vector<View>& views) {
 void check_directions(const Capture& capture, Findings& findings) {
   if (capture.train.size() < fewest_views) return;
   const Vec3<double> place = place_looked_at(capture.train);
-  const auto seeing = std::count_if(capture.train.begin(), capture.train.end(), [&](const View& view) {
-    return angle_to(view, place) <= half_diagonal(view.camera);
-  });
+  const auto seeing = std::ranges::count_if(
+      capture.train, [&](const View& view) { return angle_to(view, place) <= half_diagonal(view.camera); });
   if (static_cast<double>(seeing) < agreeing_share * static_cast<double>(capture.train.size())) return;
 
   std::vector<std::string> away;

@@ -90,8 +90,8 @@ void list_missing(const Capture& capture, Inspection& result) {
 
 // Adds the warnings of loading, except those that the list of missing parts already covers.
 void take_warnings(const Capture& capture, Findings& findings) {
-  std::copy_if(capture.warnings.begin(), capture.warnings.end(), std::back_inserter(findings),
-               [](const Finding& f) { return f.kind != "no-points" && f.kind != "no-test"; });
+  std::ranges::copy_if(capture.warnings, std::back_inserter(findings),
+                       [](const Finding& f) { return f.kind != "no-points" && f.kind != "no-test"; });
 }
 
 std::vector<const View*> spread(const std::vector<View>& views, int64_t count) {
@@ -180,8 +180,7 @@ Inspection inspect(const Capture& capture, bool quick) {
   if (!quick) check_neighbours(capture, facts, result.findings);
   check_masks(facts, result.findings);
   check_priors(facts, result.findings);
-  std::stable_sort(result.findings.begin(), result.findings.end(),
-                   [](const Finding& a, const Finding& b) { return a.severity < b.severity; });
+  std::ranges::stable_sort(result.findings, {}, &Finding::severity);
   return result;
 }
 

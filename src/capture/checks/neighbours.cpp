@@ -34,7 +34,7 @@ std::vector<Sequence> sequences(const Capture& capture, const std::vector<ViewFa
   }
   std::vector<Sequence> result;
   for (auto& [camera, sequence] : by_camera) {
-    std::stable_sort(sequence.begin(), sequence.end(), [](const ViewFacts* a, const ViewFacts* b) {
+    std::ranges::stable_sort(sequence, [](const ViewFacts* a, const ViewFacts* b) {
       if (a->view->time != b->view->time) return a->view->time < b->view->time;
       return natural_less(a->view->id, b->view->id);
     });
@@ -105,8 +105,8 @@ void find_blur(const Sequence& sequence, Found& found) {
 
 void find_jumps(const Sequence& whole, Found& found) {
   Sequence sequence;
-  std::copy_if(whole.begin(), whole.end(), std::back_inserter(sequence),
-               [](const ViewFacts* view) { return view->exposure.has_value(); });
+  std::ranges::copy_if(whole, std::back_inserter(sequence),
+                       [](const ViewFacts* view) { return view->exposure.has_value(); });
   std::vector<double> steps, sizes;
   for (size_t i = 1; i < sequence.size(); ++i) {
     steps.push_back(*sequence[i]->exposure - *sequence[i - 1]->exposure);

@@ -21,8 +21,7 @@ constexpr double repeated_share = 0.5;
 void check_gaps(const Capture& capture, Findings& findings) {
   std::vector<const View*> views;
   for (const View& view : capture.train) views.push_back(&view);
-  std::stable_sort(views.begin(), views.end(),
-                   [](const View* a, const View* b) { return a->time < b->time; });
+  std::ranges::stable_sort(views, {}, &View::time);
   const auto same = [](const View* a, const View* b) { return a->time == b->time; };
   views.erase(std::unique(views.begin(), views.end(), same), views.end());
   if (views.size() < fewest_times) return;

@@ -32,12 +32,10 @@ Tensor<uint8_t> thumbnail_of(const Tensor<uint8_t>& grey) {
   const double step = static_cast<double>(grey.dim(1)) / static_cast<double>(width);
   const auto height = std::max<int64_t>(1, static_cast<int64_t>(static_cast<double>(grey.dim(0)) / step));
   Tensor<float> values({grey.dim(0), grey.dim(1), 1});
-  std::transform(grey.data(), grey.data() + grey.size(), values.data(),
-                 [](uint8_t v) { return from_8bit(v); });
+  std::ranges::transform(grey.values(), values.data(), [](uint8_t v) { return from_8bit(v); });
   const Tensor<float> small = resample(values, {width, height, step, step});
   Tensor<uint8_t> result({height, width});
-  std::transform(small.data(), small.data() + small.size(), result.data(),
-                 [](float v) { return to_8bit(v); });
+  std::ranges::transform(small.values(), result.data(), [](float v) { return to_8bit(v); });
   return result;
 }
 
@@ -86,7 +84,7 @@ void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& fa
   if (source.mask) {
     mask = decode_mask(source).mask;
     facts.masked_noise = noise_deviation(colour, mask);
-    const auto on = std::count(mask.data(), mask.data() + mask.size(), uint8_t{1});
+    const auto on = std::ranges::count(mask.values(), 1);
     facts.masked = static_cast<double>(on) / static_cast<double>(mask.size());
   }
   if (source.has_prior()) measure_prior(capture, mask, surface, facts);

@@ -28,14 +28,11 @@ constexpr std::array<Format, 4> formats = {{{CaptureFormat::dycheck, is_dycheck,
                                             {CaptureFormat::colmap, is_colmap, read_colmap},
                                             {CaptureFormat::transforms, is_transforms, read_transforms}}};
 
-const Format& format_called(CaptureFormat name) {
-  return *std::find_if(formats.begin(), formats.end(), [&](const Format& f) { return f.name == name; });
-}
+const Format& format_called(CaptureFormat name) { return *std::ranges::find(formats, name, &Format::name); }
 
 // Selects the format by the files at the top.
 const Format& look(const FileTree& tree) {
-  const auto* const found =
-      std::find_if(formats.begin(), formats.end(), [&](const Format& f) { return f.lies_in(tree); });
+  const auto* const found = std::ranges::find_if(formats, [&](const Format& f) { return f.lies_in(tree); });
   if (found != formats.end()) return *found;
   // Other programs write files of this name too. Without the others it is an incomplete capture.
   if (tree.has("metadata.json")) return format_called(CaptureFormat::nerfies);

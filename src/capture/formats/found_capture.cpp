@@ -18,7 +18,7 @@ std::vector<std::string> keep_whole(const std::vector<std::string>& ids, const s
         warnings.emplace_back(std::to_string(missing.size()) + " of " + std::to_string(ids.size()) + " " +
                                   split + " views have no " + what + " (" + ids_text(missing) + "): left out",
                               kind);
-    if (path_of) std::transform(missing.begin(), missing.end(), std::back_inserter(finding.files), path_of);
+    if (path_of) std::ranges::transform(missing, std::back_inserter(finding.files), path_of);
     finding.views = std::move(missing);
   }
   return kept;

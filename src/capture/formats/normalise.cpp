@@ -31,7 +31,7 @@ void take_inner(Box& box, const std::vector<Vec3<double>>& places) {
       if (is_finite(x)) values.push_back(x[axis]);
     }
     if (values.empty()) return;
-    std::sort(values.begin(), values.end());
+    std::ranges::sort(values);
     const size_t cut = values.size() / 40;
     low[axis] = values[cut];
     high[axis] = values[values.size() - 1 - cut];
@@ -70,9 +70,8 @@ std::optional<Vec3<double>> common_sight(const std::vector<FoundView>& views) {
   const auto count = static_cast<double>(views.size());
   if (views.empty() || std::min({values[0], values[1], values[2]}) < flattest * count) return std::nullopt;
   const Vec3<double> sight = inverse(sum) * right;
-  const auto in_front = std::count_if(views.begin(), views.end(), [&](const FoundView& view) {
-    return dot(axis_of(view), sight - view.position) > 0;
-  });
+  const auto in_front = std::ranges::count_if(
+      views, [&](const FoundView& view) { return dot(axis_of(view), sight - view.position) > 0; });
   if (2 * in_front < static_cast<std::ptrdiff_t>(views.size())) return std::nullopt;
   return sight;
 }

@@ -131,7 +131,7 @@ class TextReader {
       if (column_[i] < 0)
         fail("property " + std::string(1, static_cast<char>('x' + i)), "none", "a float or a double");
     }
-    last_column_ = *std::max_element(column_.begin(), column_.end());
+    last_column_ = *std::ranges::max_element(column_);
   }
 
   Vec3<double> read_row(int64_t row) {

@@ -14,7 +14,7 @@ namespace traceflow::cli {
 namespace {
 
 std::string kebab_case(std::string name) {
-  std::replace(name.begin(), name.end(), '_', '-');
+  std::ranges::replace(name, '_', '-');
   return name;
 }
 
@@ -22,7 +22,7 @@ bool has_flag(const OptionField& field, const std::vector<std::string>& promoted
   const size_t dot = field.path.find('.');
   if (dot == std::string::npos) return true;
   return field.path.find('.', dot + 1) == std::string::npos &&
-         std::find(promoted.begin(), promoted.end(), field.path.substr(0, dot)) != promoted.end();
+         std::ranges::find(promoted, field.path.substr(0, dot)) != promoted.end();
 }
 
 // Placeholder of the value in the help: "N", "X" or the choices.

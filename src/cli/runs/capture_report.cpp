@@ -104,7 +104,7 @@ void print_extras(const Capture& capture, const Inspection& found) {
   }
   if (!capture.tracks.empty()) {
     const PointTracks& tracks = capture.tracks;
-    const auto seen = std::count(tracks.seen.data(), tracks.seen.data() + tracks.seen.size(), uint8_t{1});
+    const auto seen = std::ranges::count(tracks.seen.values(), 1);
     row("tracks", fmt::format("{} points, a view sees {:.0f} of them", tracks.count(),
                               static_cast<double>(seen) / static_cast<double>(capture.train.size())));
   }

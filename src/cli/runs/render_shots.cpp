@@ -130,8 +130,7 @@ class Chooser {
     const std::string split = a_.split.empty() ? "test" : a_.split;
     const std::vector<View>& first = split == "train" ? capture().train : capture().test;
     for (const std::vector<View>* list : {&first, &capture().test, &capture().train}) {
-      const auto found =
-          std::find_if(list->begin(), list->end(), [&](const View& v) { return v.id == a_.freeze_camera; });
+      const auto found = std::ranges::find(*list, a_.freeze_camera, &View::id);
       if (found != list->end()) return *found;
     }
     // Only after the search by id: a capture without test views can still freeze a training view.

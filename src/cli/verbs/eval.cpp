@@ -33,7 +33,7 @@ void run_eval(const EvalArguments& a, const DeviceArguments& devices) {
   viz::LayerFiles files(folder, layers, viz::ImageFormat::png, evaluation.scale());
   std::optional<viz::TrackFollower> follower;
   const viz::Subject& subject = evaluation.subject();
-  if (std::find(layers.begin(), layers.end(), viz::Layer::tracks) != layers.end())
+  if (std::ranges::find(layers, viz::Layer::tracks) != layers.end())
     follower.emplace(subject.scene, subject.request, subject.render, times_of(evaluation.capture()));
   viz::ContactSheet sheet(a.sheet_width);
   evaluation.measure([&](const View& view, const ViewImages& images, const Frame& frame) {

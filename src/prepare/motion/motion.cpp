@@ -49,8 +49,8 @@ void look_again(Motion& motion, const Pyramid& from, const Pyramid& to) {
   const double limit = limit_of(motion);
   for (int round = 0; round < rounds; ++round) {
     std::vector<Track> obeying;
-    std::copy_if(motion.tracks.begin(), motion.tracks.end(), std::back_inserter(obeying),
-                 [&](const Track& t) { return motion.still.distance(t) <= limit; });
+    std::ranges::copy_if(motion.tracks, std::back_inserter(obeying),
+                         [&](const Track& t) { return motion.still.distance(t) <= limit; });
     for (Track& t : motion.tracks) {
       if (motion.still.distance(t) <= limit) continue;
       const auto shift = shift_around(t.from, obeying);

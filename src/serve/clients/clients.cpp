@@ -151,7 +151,7 @@ void Clients::scene_changed(Clock::duration refresh) {
 }
 
 bool Clients::has_job(Clock::time_point now) {
-  return std::any_of(clients_.begin(), clients_.end(), [&](const auto& entry) {
+  return std::ranges::any_of(clients_, [&](const auto& entry) {
     return entry.second.has_question() || entry.second.wants_frame({}, scene_, now);
   });
 }
@@ -211,8 +211,7 @@ void Clients::no_memory_for(const Job& job) {
 bool Clients::any_lacks_memory() {
   const std::lock_guard lock(mutex_);
   const Clock::time_point now = Clock::now();
-  return std::any_of(clients_.begin(), clients_.end(),
-                     [&](const auto& entry) { return entry.second.lacks_memory(now); });
+  return std::ranges::any_of(clients_, [&](const auto& entry) { return entry.second.lacks_memory(now); });
 }
 
 bool Clients::is_connected(uint64_t number) {
@@ -227,8 +226,7 @@ int64_t Clients::viewers() {
 
 bool Clients::any_awake() {
   const std::lock_guard lock(mutex_);
-  return std::any_of(clients_.begin(), clients_.end(),
-                     [](const auto& entry) { return entry.second.is_awake(); });
+  return std::ranges::any_of(clients_, [](const auto& entry) { return entry.second.is_awake(); });
 }
 
 }  // namespace traceflow::serve

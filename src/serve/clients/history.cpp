@@ -27,7 +27,7 @@ void History::add(const std::string& line) {
   if (step < 0 || ++steps_ <= most_steps) return;
   stride_ *= 2;
   std::erase_if(lines_, [&](const Line& kept) { return kept.step >= 0 && kept.step % stride_ != 0; });
-  steps_ = std::count_if(lines_.begin(), lines_.end(), [](const Line& kept) { return kept.step >= 0; });
+  steps_ = std::ranges::count_if(lines_, [](const Line& kept) { return kept.step >= 0; });
 }
 
 void History::clear() { *this = {}; }

@@ -76,8 +76,7 @@ Answer answer(const RequestGuard& guard, std::span<const EmbeddedFile> page, con
   }
   // Looks up the name in the embedded page only: no folder is ever read.
   const std::string_view name = path == "/" ? "index.html" : path.substr(1);
-  const auto file =
-      std::find_if(page.begin(), page.end(), [&](const EmbeddedFile& f) { return f.name == name; });
+  const auto file = std::ranges::find(page, name, &EmbeddedFile::name);
   if (file == page.end() || request.upgrade) return plain_answer(404, "There is nothing at this address.");
   Answer found{200, std::string(content_type(name)), std::string(file->text()), {}};
   if (guard.brings_token(request)) found.fields.emplace_back("Set-Cookie", guard.cookie());

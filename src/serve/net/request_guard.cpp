@@ -14,7 +14,7 @@ namespace {
 // treat other ports of this machine as the same site, so only the same origin is accepted.
 bool is_cross_site(const Request& request) {
   const auto sites = request.all("Sec-Fetch-Site");
-  const bool foreign = std::any_of(sites.begin(), sites.end(), [](std::string_view site) {
+  const bool foreign = std::ranges::any_of(sites, [](std::string_view site) {
     return !same_word(site, "same-origin") && !same_word(site, "none");
   });
   if (!foreign) return false;
@@ -29,7 +29,7 @@ bool is_cross_site(const Request& request) {
 bool has_body(const Request& request) {
   if (!request.all("Transfer-Encoding").empty()) return true;
   const auto lengths = request.all("Content-Length");
-  return std::any_of(lengths.begin(), lengths.end(), [](std::string_view length) { return length != "0"; });
+  return std::ranges::any_of(lengths, [](std::string_view length) { return length != "0"; });
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ std::string RequestGuard::cookie() const {
 }
 
 bool RequestGuard::is_host(std::string_view text) const {
-  return std::any_of(hosts_.begin(), hosts_.end(), [&](const auto& host) { return same_word(host, text); });
+  return std::ranges::any_of(hosts_, [&](const auto& host) { return same_word(host, text); });
 }
 
 // One valid cookie is enough: a server on another port of this machine can set a cookie of the same name.

@@ -16,7 +16,7 @@ bool is_address(const std::string& text) {
 }
 
 bool is_port(std::string_view text) {
-  const bool digits = std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
+  const bool digits = std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
   if (!digits || text.empty() || text.size() > 5 || text[0] == '0') return false;
   return std::stoi(std::string(text)) <= 65535;
 }
@@ -29,7 +29,7 @@ bool is_host(std::string_view text) {
   const std::string_view name = text.substr(0, colon);
   if (name.front() == '[')
     return name.back() == ']' && is_address(std::string(name.substr(1, name.size() - 2)));
-  return std::all_of(name.begin(), name.end(), [](unsigned char c) {
+  return std::ranges::all_of(name, [](unsigned char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
            c == '-' || c == '_';
   });

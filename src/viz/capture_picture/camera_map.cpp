@@ -54,13 +54,8 @@ std::vector<Vec3<double>> subject_of(const Capture& capture) {
   for (int64_t i = 0; i < capture.points.size() / 3; i += step) {
     const Vec3<float> point = load3<float>(capture.points.row(i));
     all.emplace_back(point);
-    const auto views = std::count_if(capture.train.begin(), capture.train.end(), [&](const View& view) {
-      const Camera<float>& camera = view.camera;
-      const Vec3<float> x = camera.point_in_camera(point);
-      const Vec2<float> at = camera.project(x);
-      return x.z > 0 && at.x >= 0 && at.y >= 0 && at.x < static_cast<float>(camera.width) &&
-             at.y < static_cast<float>(camera.height);
-    });
+    const auto views =
+        std::ranges::count_if(capture.train, [&](const View& view) { return view.camera.sees(point); });
     if (4 * views >= static_cast<std::ptrdiff_t>(capture.train.size())) seen.push_back(all.back());
   }
   return seen.empty() ? all : seen;
@@ -95,7 +90,7 @@ class Map {
     }
     low_ = Vec2<double>(HUGE_VAL), high_ = Vec2<double>(-HUGE_VAL);
     for (int k = 0; k < 2 && !along[k].empty(); ++k) {
-      std::sort(along[k].begin(), along[k].end());
+      std::ranges::sort(along[k]);
       low_[k] = along[k][along[k].size() / 20];
       high_[k] = along[k][along[k].size() - 1 - along[k].size() / 20];
     }

@@ -30,8 +30,7 @@ std::vector<Tile> all_tiles(const Capture& capture) {
   std::vector<Tile> tiles;
   for (const View& view : capture.train) tiles.push_back({&view, false});
   for (const View& view : capture.test) tiles.push_back({&view, true});
-  std::stable_sort(tiles.begin(), tiles.end(),
-                   [](const Tile& a, const Tile& b) { return a.view->time < b.view->time; });
+  std::ranges::stable_sort(tiles, [](const Tile& a, const Tile& b) { return a.view->time < b.view->time; });
   return tiles;
 }
 

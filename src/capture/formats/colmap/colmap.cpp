@@ -17,8 +17,8 @@ constexpr std::array<const char*, 3> model_folders = {"sparse/0", "sparse", ""};
 constexpr std::array<const char*, 4> image_folders = {"images", "input", "rgb", ""};
 
 std::string model_folder(const FileTree& tree) {
-  const auto found = std::find_if(model_folders.begin(), model_folders.end(),
-                                  [&](const char* folder) { return has_colmap_model(tree, folder); });
+  const auto found =
+      std::ranges::find_if(model_folders, [&](const char* folder) { return has_colmap_model(tree, folder); });
   if (found != model_folders.end()) return *found;
   throw InputError(tree.path().string(), "", "no COLMAP model",
                    "cameras and images (.bin or .txt) in sparse/0, sparse or the folder itself");
@@ -36,8 +36,7 @@ class ColmapReader {
       : tree_(std::move(tree)), options_(options), folder_(model_folder(*tree_)) {
     model_ = read_colmap_model(*tree_, folder_);
     for (ColmapImage& image : model_.images) image.name = tidy_path(image.name);
-    std::sort(model_.images.begin(), model_.images.end(),
-              [](const ColmapImage& a, const ColmapImage& b) { return natural_less(a.name, b.name); });
+    std::ranges::sort(model_.images, natural_less, &ColmapImage::name);
     for (const ColmapImage& image : model_.images) names_.push_back(image.name);
   }
 
@@ -74,12 +73,12 @@ class ColmapReader {
     const auto is_stored_in = [&](const std::string& folder) {
       return [&, folder](int stored) { return has_some(folder, stored); };
     };
-    const auto* root = std::find_if(image_folders.begin(), image_folders.end(), [&](const char* folder) {
+    const auto* root = std::ranges::find_if(image_folders, [&](const char* folder) {
       return fitting_scale(options_.downscale, is_stored_in(folder)) > 0;
     });
     if (root == image_folders.end()) {
-      root = std::find_if(image_folders.begin(), image_folders.end(),
-                          [&](const char* folder) { return !stored_scales(is_stored_in(folder)).empty(); });
+      root = std::ranges::find_if(
+          image_folders, [&](const char* folder) { return !stored_scales(is_stored_in(folder)).empty(); });
     }
     if (names_.empty()) {
       throw InputError(tree_->name_of(model_.images_file), "", "no images", "those that COLMAP registered",
@@ -98,7 +97,7 @@ class ColmapReader {
   bool has_some(const std::string& root, int stored) const {
     const std::string folder = folder_at(root, stored);
     if (stored > 1 && (root.empty() || !tree_->has_folder(folder))) return false;
-    return std::any_of(names_.begin(), names_.end(), [&](const std::string& name) {
+    return std::ranges::any_of(names_, [&](const std::string& name) {
       return !find_image(*tree_, in_folder(folder, name)).empty();
     });
   }
@@ -149,8 +148,8 @@ class ColmapReader {
 }  // namespace
 
 bool is_colmap(const FileTree& tree) {
-  return std::any_of(model_folders.begin(), model_folders.end(),
-                     [&](const char* folder) { return has_colmap_model(tree, folder); });
+  return std::ranges::any_of(model_folders,
+                             [&](const char* folder) { return has_colmap_model(tree, folder); });
 }
 
 FoundCapture read_colmap(const std::shared_ptr<const FileTree>& tree, const CaptureOptions& options) {

@@ -72,13 +72,12 @@ void set_distortion(Lens& lens, std::string_view name, std::span<const double> p
 }  // namespace
 
 const ColmapLensModel* find_colmap_lens_model(int id) {
-  const auto found = std::find_if(models.begin(), models.end(), [&](const auto& m) { return m.id == id; });
+  const auto found = std::ranges::find(models, id, &ColmapLensModel::id);
   return found == models.end() ? nullptr : &*found;
 }
 
 const ColmapLensModel* find_colmap_lens_model(std::string_view name) {
-  const auto found =
-      std::find_if(models.begin(), models.end(), [&](const auto& m) { return m.name == name; });
+  const auto found = std::ranges::find(models, name, &ColmapLensModel::name);
   return found == models.end() ? nullptr : &*found;
 }
 

@@ -93,8 +93,7 @@ class Builder {
           {row.id, row.model,
            colmap_lens(*model, row.parameters, row.width, row.height, tree_.name_of(path), field)});
     }
-    std::sort(model_.cameras.begin(), model_.cameras.end(),
-              [](const ColmapCamera& a, const ColmapCamera& b) { return a.id < b.id; });
+    std::ranges::sort(model_.cameras, {}, &ColmapCamera::id);
   }
 
   void take_images() {
@@ -108,8 +107,7 @@ class Builder {
     }
     for (size_t i = 0; i < rows.size(); ++i)
       model_.images.push_back(image_of(rows[i], "images[" + std::to_string(i) + "]"));
-    std::sort(model_.images.begin(), model_.images.end(),
-              [](const ColmapImage& a, const ColmapImage& b) { return a.id < b.id; });
+    std::ranges::sort(model_.images, {}, &ColmapImage::id);
   }
 
   ColmapImage image_of(const ColmapImageRow& row, const std::string& field) const {
@@ -141,8 +139,7 @@ class Builder {
       }
     }
     check_ids(rows, path, "points3D");
-    std::sort(rows.begin(), rows.end(),
-              [](const ColmapPointRow& a, const ColmapPointRow& b) { return a.id < b.id; });
+    std::ranges::sort(rows, {}, &ColmapPointRow::id);
     for (const ColmapPointRow& row : rows)
       model_.points.push_back({row.position, row.colour, row.error, row.track_length});
   }
@@ -155,8 +152,7 @@ class Builder {
 }  // namespace
 
 const ColmapCamera* ColmapModel::camera(int64_t id) const {
-  const auto found = std::lower_bound(cameras.begin(), cameras.end(), id,
-                                      [](const ColmapCamera& camera, int64_t i) { return camera.id < i; });
+  const auto found = std::ranges::lower_bound(cameras, id, {}, &ColmapCamera::id);
   return found != cameras.end() && found->id == id ? &*found : nullptr;
 }
 

@@ -70,8 +70,8 @@ void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
   }
   const std::set<std::string> train(layout.train_ids.begin(), layout.train_ids.end());
   std::vector<std::string> both;
-  std::copy_if(layout.test_ids.begin(), layout.test_ids.end(), std::back_inserter(both),
-               [&](const std::string& id) { return train.contains(id); });
+  std::ranges::copy_if(layout.test_ids, std::back_inserter(both),
+                       [&](const std::string& id) { return train.contains(id); });
   if (!both.empty()) {
     warnings
         .emplace_back(
@@ -82,7 +82,7 @@ void read_split(const FileTree& tree, NerfiesLayout& layout, std::vector<Finding
 }
 
 bool has_sides(const std::vector<std::string>& ids, const std::string& side) {
-  return std::any_of(ids.begin(), ids.end(), [&](const std::string& id) { return id.ends_with(side); });
+  return std::ranges::any_of(ids, [&](const std::string& id) { return id.ends_with(side); });
 }
 
 // The formats differ in what they leave out. Only the name depends on this.

@@ -45,7 +45,7 @@ std::vector<std::string> ends_of(const std::string& path) {
   for (size_t slash = path.rfind('/'); slash != std::string::npos && ends.size() < most;
        slash = slash == 0 ? std::string::npos : path.rfind('/', slash - 1))
     ends.push_back(path.substr(slash + 1));
-  std::reverse(ends.begin(), ends.end());
+  std::ranges::reverse(ends);
   return ends;
 }
 
@@ -55,7 +55,7 @@ std::set<int> scales_of(const FileTree& tree) {
   const std::vector<std::string> folders = tree.folders_in("");
   for (int stored = 2; stored <= 64; ++stored) {
     const std::string end = "_" + std::to_string(stored);
-    if (std::any_of(folders.begin(), folders.end(), [&](const auto& name) { return name.ends_with(end); }))
+    if (std::ranges::any_of(folders, [&](const auto& name) { return name.ends_with(end); }))
       scales.insert(stored);
   }
   return scales;
@@ -115,12 +115,11 @@ class TransformsReader {
     TransformsFile file = file_called(whole_file);
     refuse_no_frames(file);
     found_.format = file.is_nerfstudio ? "nerfstudio" : "instant-ngp";
-    std::stable_sort(file.frames.begin(), file.frames.end(),
-                     [](const auto& a, const auto& b) { return natural_less(a.path, b.path); });
+    std::ranges::stable_sort(file.frames, natural_less, &TransformsFrame::path);
     const std::set<std::string> train(file.train.begin(), file.train.end()),
         test(file.test.begin(), file.test.end());
-    const bool trains = std::any_of(file.frames.begin(), file.frames.end(),
-                                    [&](const auto& f) { return train.contains(f.path); });
+    const bool trains =
+        std::ranges::any_of(file.frames, [&](const auto& f) { return train.contains(f.path); });
     if (!trains && !(train.empty() && test.empty())) {
       const JsonFile& json = *file.json;
       constexpr const char* expected = "the file_path of the frames to train on";
@@ -166,8 +165,8 @@ class TransformsReader {
     }
     if (file.depths > 0)
       warn(number(file.depths) + " frames name depth images: not used", "not-used", Severity::notice);
-    const auto rolling = std::count_if(file.frames.begin(), file.frames.end(),
-                                       [](const auto& frame) { return frame.lens.rolling_shutter; });
+    const auto rolling =
+        std::ranges::count_if(file.frames, [](const auto& frame) { return frame.lens.rolling_shutter; });
     if (rolling > 0) {
       warn(std::to_string(rolling) +
                " frames say how their camera moved while it took them (rolling_shutter): not used, "
@@ -198,23 +197,22 @@ class TransformsReader {
 
   // Whether the image exists at full size or at another stored scale.
   bool is_there(const std::string& path) {
-    return std::any_of(scales_.begin(), scales_.end(),
-                       [&](int stored) { return !image_at(path, stored).empty(); });
+    return std::ranges::any_of(scales_, [&](int stored) { return !image_at(path, stored).empty(); });
   }
 
   // The longest end of the path that is an image in the tree; empty if there is none.
   std::string end_here(const std::string& path) {
     const std::vector<std::string> ends = ends_of(path);
     // is_there comes first: it is cheaper than path_in_tree, and most ends do not exist.
-    const auto found = std::find_if(
-        ends.begin(), ends.end(), [&](const std::string& end) { return is_there(end) && path_in_tree(end); });
+    const auto found = std::ranges::find_if(
+        ends, [&](const std::string& end) { return is_there(end) && path_in_tree(end); });
     return found == ends.end() ? "" : *found;
   }
 
   // Removes a beginning that the paths of existing images also had; empty if the path has no such beginning.
   std::string without_beginning(const std::string& path) const {
     const std::vector<std::string> ends = ends_of(path);
-    const auto known = std::find_if(ends.begin(), ends.end(), [&](const std::string& end) {
+    const auto known = std::ranges::find_if(ends, [&](const std::string& end) {
       return beginnings_.contains(path.substr(0, path.size() - end.size())) && path_in_tree(end);
     });
     return known == ends.end() ? "" : *known;
@@ -233,14 +231,14 @@ class TransformsReader {
     std::vector<std::string> places = ends_of(points_path_);
     places.insert(places.begin(), {points_path_, without_beginning(points_path_)});
     const auto found =
-        std::find_if(places.begin(), places.end(), [&](const std::string& path) { return tree_->has(path); });
+        std::ranges::find_if(places, [&](const std::string& path) { return tree_->has(path); });
     return found == places.end() ? points_path_ : *found;
   }
 
   // Paths may be of another machine or folder. Their ends are searched in the tree.
   void settle_paths() {
-    const bool as_written = std::any_of(frames_.begin(), frames_.end(),
-                                        [&](const TransformsFrame& frame) { return is_there(frame.path); });
+    const bool as_written =
+        std::ranges::any_of(frames_, [&](const TransformsFrame& frame) { return is_there(frame.path); });
     const auto end_of = [&](const std::string& path) {
       return as_written && path_in_tree(path) ? path : end_here(path);
     };
@@ -288,12 +286,12 @@ class TransformsReader {
 
   void choose_sizes() {
     const auto has_some = [&](int stored) {
-      return scales_.contains(stored) &&
-             std::any_of(frames_.begin(), frames_.end(),
-                         [&](const TransformsFrame& frame) { return !image_at(frame.path, stored).empty(); });
+      return scales_.contains(stored) && std::ranges::any_of(frames_, [&](const TransformsFrame& frame) {
+               return !image_at(frame.path, stored).empty();
+             });
     };
-    const auto first = std::find_if(frames_.begin(), frames_.end(),
-                                    [&](const TransformsFrame& frame) { return is_there(frame.path); });
+    const auto first =
+        std::ranges::find_if(frames_, [&](const TransformsFrame& frame) { return is_there(frame.path); });
     if (first == frames_.end()) {
       throw InputError(tree_->name_of(origin_), "frames",
                        "none of " + std::to_string(frames_.size()) + " images",

@@ -42,14 +42,14 @@ bool is_fisheye_model(const JsonField& field) {
   constexpr std::array<std::string_view, 3> fisheye = {"OPENCV_FISHEYE", "RADIAL_FISHEYE",
                                                        "SIMPLE_RADIAL_FISHEYE"};
   const std::string model = field.text();
-  if (std::find(fisheye.begin(), fisheye.end(), model) != fisheye.end()) return true;
-  if (std::find(perspective.begin(), perspective.end(), model) != perspective.end()) return false;
+  if (std::ranges::find(fisheye, model) != fisheye.end()) return true;
+  if (std::ranges::find(perspective, model) != perspective.end()) return false;
   field.fail(model, known_models, undistort_remedy);
 }
 
 // Whether the value disables its key: false, zero, or a list of such values.
 bool is_off(const nlohmann::json& value) {
-  if (value.is_array()) return std::all_of(value.begin(), value.end(), is_off);
+  if (value.is_array()) return std::ranges::all_of(value, is_off);
   if (value.is_boolean()) return !value.get<bool>();
   return value.is_null() || (value.is_number() && value.get<double>() == 0);
 }
@@ -79,7 +79,7 @@ void TransformsLens::take(const JsonField& field) {
   take_positive(field, "h", height);
   // A frame's angle overrides all values that the file gives for all frames.
   constexpr std::array angles = {"camera_angle_x", "camera_angle_y", "x_fov", "y_fov"};
-  if (std::any_of(angles.begin(), angles.end(), [&](const char* key) { return field.has(key); })) {
+  if (std::ranges::any_of(angles, [&](const char* key) { return field.has(key); })) {
     for (auto* inherited : {&focal_x, &focal_y, &angle_x, &angle_y}) inherited->reset();
   }
   for (const auto& [key, focal] :
