@@ -115,7 +115,8 @@ struct PhotometricAdjustment::State : BodyInFilm {
           return distance(in_views[other].view->drawn.position, view.drawn.position);
         };
         for (size_t k = 0; k < later; ++k) {
-          if (in_views[k].view->key == view.key - apart && (!nearest || away(k) < away(*nearest))) nearest = k;
+          if (in_views[k].view->key == view.key - apart && (!nearest || away(k) < away(*nearest)))
+            nearest = k;
         }
         if (!nearest) continue;
         pairs.push_back({later, *nearest});
