@@ -59,15 +59,15 @@ class Hold {
   // Positions of the points at a time; points without carriers stay.
   Points at(float time) const {
     const Tensor<double> now = surfels_.at(listed_, time);
-    Points carried = point_;
-    for (size_t i = 0; i < carried.size(); ++i) {
+    Points moved = point_;
+    for (size_t i = 0; i < moved.size(); ++i) {
       for (const Carrier& carrier : carriers_[i]) {
         const Vec3<double> step = load3<double>(now.row(static_cast<int64_t>(carrier.listed))) -
                                   load3<double>(surfels_.rest.row(listed_[carrier.listed]));
-        if (std::isfinite(dot(step, step))) carried[i] += carrier.weight * step;
+        if (std::isfinite(dot(step, step))) moved[i] += carrier.weight * step;
       }
     }
-    return carried;
+    return moved;
   }
 
  private:
@@ -87,12 +87,12 @@ double median_distance(const Points& a, const Points& b) {
   return median(std::span<double>(distances));
 }
 
-MotionMoment moment_of(double time, const Points& rest, const Points& truth, const Points& carried) {
-  const Similarity fitted = fit_similarity(rest, carried), true_fit = fit_similarity(rest, truth);
+MotionMoment moment_of(double time, const Points& rest, const Points& truth, const Points& moved) {
+  const Similarity fitted = fit_similarity(rest, moved), true_fit = fit_similarity(rest, truth);
   MotionMoment m;
   m.time = time;
   m.moved = median_distance(truth, rest);
-  m.missed = median_distance(truth, carried);
+  m.missed = median_distance(truth, moved);
   m.rotation_error_deg = rotation_angle_deg(fitted.rotation * transpose(true_fit.rotation));
   m.scale = fitted.scale;
   m.true_scale = true_fit.scale;
@@ -167,11 +167,11 @@ MotionReport motion_error(const MotionTruth& truth, const Carriers& surfels) {
   };
   for (int64_t t = 0; t < truth.times(); ++t) {
     const double time = static_cast<double>(t) / static_cast<double>(truth.times() - 1);
-    const Points now = points_at(truth, t), carried = hold.at(static_cast<float>(time));
+    const Points now = points_at(truth, t), moved = hold.at(static_cast<float>(time));
     for (ObjectMotion& o : report.objects) {
       const std::vector<size_t>& points = held.at(o.object);
       if (points.size() < least_points) continue;
-      o.curve.push_back(moment_of(time, chosen(rest, points), chosen(now, points), chosen(carried, points)));
+      o.curve.push_back(moment_of(time, chosen(rest, points), chosen(now, points), chosen(moved, points)));
     }
   }
   for (ObjectMotion& o : report.objects) {

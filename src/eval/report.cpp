@@ -31,7 +31,7 @@ void evaluate(const viz::Subject& subject, const Capture& capture, const std::ve
   for (const View& view : views) {
     FrameRequest request = subject.request;
     // If views were added to the capture since training, its normalisation differs from the run's.
-    request.camera = carried(view.camera, capture.normalisation, subject.scene.normalisation);
+    request.camera = renormalised(view.camera, capture.normalisation, subject.scene.normalisation);
     request.time = view.time;
     const Clock::time_point start = Clock::now();
     const Frame& frame = renderer.forward(subject.scene, request);

@@ -13,7 +13,7 @@ template void cuda::for_each_index(const char*, int64_t, const AddBehindBackward
 template void cuda::for_each_index(const char*, int64_t, const ConeWidths&);
 template void cuda::for_each_index(const char*, int64_t, const ConeWidthsBackward&);
 template void cuda::for_each_index(const char*, int64_t, const PlaceSignal&);
-template void cuda::for_each_index(const char*, int64_t, const IsCarried&);
+template void cuda::for_each_index(const char*, int64_t, const IsInBody&);
 template void cuda::for_each_index(const char*, int64_t, const FlagNonZero&);
 template void cuda::for_each_index(const char*, int64_t, const FollowMaxDisplacement&);
 template void cuda::for_each_index(const char*, int64_t, const FlagWhere<CanShow>&);

@@ -99,7 +99,7 @@ struct PlaceSignal {
 };
 
 // 1 for a surfel of a body, else 0.
-struct IsCarried {
+struct IsInBody {
   StoredRow row;
   const int32_t* body;
   float* to;

@@ -166,10 +166,10 @@ const Frame& Renderer::forward(const Scene& scene, const FrameRequest& request, 
 
   // Rasterise them.
   const bool draws_silhouette = request.silhouette && !scene.main.body.empty();
-  frame_.main.carried.place(device).resize({draws_silhouette ? frame_.main.count() : 0});
+  frame_.main.in_body.place(device).resize({draws_silhouette ? frame_.main.count() : 0});
   if (draws_silhouette) {
-    parallel_for(device, "render: carried surfels", frame_.main.carried.size(),
-                 IsCarried{stored_row(frame_), scene.main.body.data(), frame_.main.carried.data()});
+    parallel_for(device, "render: surfels in bodies", frame_.main.in_body.size(),
+                 IsInBody{stored_row(frame_), scene.main.body.data(), frame_.main.in_body.data()});
   }
   draw(request);
   if (request.pseudo_normals) {

@@ -120,7 +120,7 @@ void get_motion(const Safetensors& file, Scene& scene) {
   motion.shift = take(file, "scene/motion/shift", {bodies, keys, 3});
   scene.main.body = file.tensor<int32_t>("scene/main/body");
   bool fits = scene.main.body.shape() == Shape{scene.main.count()};
-  for (const int32_t body : scene.main.body.values()) fits = fits && body >= stands_still && body < bodies;
+  for (const int32_t body : scene.main.body.values()) fits = fits && body >= motionless && body < bodies;
   if (!fits) {
     throw InputError(file.origin(), "scene/main/body", scene.main.body.shape().to_string(),
                      "for each main surfel a body from -2 to " + std::to_string(bodies - 1));

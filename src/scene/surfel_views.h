@@ -11,7 +11,7 @@ namespace traceflow {
 template <class T>
 struct BasicPosedSurfelsView {
   T *position, *scale, *rotation, *opacity, *sh;
-  T *tint, *carried, *roughness;  // null if absent
+  T *tint, *in_body, *roughness;  // null if absent
   int64_t count;
   int64_t sh_row;  // numbers of harmonics per surfel
   int sh_degree;
@@ -29,7 +29,7 @@ View view_of(Surfels& s) {
           s.opacity.data(),
           s.sh.data(),
           s.has_tint() ? s.tint.data() : nullptr,
-          s.carried.empty() ? nullptr : s.carried.data(),
+          s.in_body.empty() ? nullptr : s.in_body.data(),
           s.has_roughness() ? s.roughness.data() : nullptr,
           count,
           count > 0 ? s.sh.row_size() : 0,

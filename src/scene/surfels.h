@@ -8,7 +8,7 @@
 namespace traceflow {
 
 // Values of `body` for surfels of no body: the field may move it, or it is static.
-inline constexpr int32_t moved_by_field = -1, stands_still = -2;
+inline constexpr int32_t moved_by_field = -1, motionless = -2;
 
 // A set of N surfels as stored and trained, before activation (method §1.1). Also holds gradients and Adam's
 // moments. T is float in the program, double in references.
@@ -78,7 +78,7 @@ struct BasicPosedSurfels {
   Tensor<T> opacity;   // M, in (0, 1)
   Tensor<T> sh;        // M×K×3, only the degrees in use: K = (active degree + 1)²
   Tensor<T> tint;      // M, in (0, 1); empty for the environment
-  Tensor<T> carried;   // M, 1 if the surfel belongs to a body, otherwise 0; empty if no silhouette is drawn.
+  Tensor<T> in_body;   // M, 1 if the surfel belongs to a body, otherwise 0; empty if no silhouette is drawn.
                        // Has no gradient
   // M, in (0, ¼): standard deviation, as a tangent, of the directions that a surfel reflects a ray into
   // (method §4.5); empty if all are 0.
@@ -92,10 +92,10 @@ struct BasicPosedSurfels {
   // A copy on a device.
   BasicPosedSurfels on(Device device) const {
     return {position.on(device), scale.on(device), rotation.on(device), opacity.on(device),
-            sh.on(device),       tint.on(device),  carried.on(device),  roughness.on(device)};
+            sh.on(device),       tint.on(device),  in_body.on(device),  roughness.on(device)};
   }
 
-  // Sets zeros in the shapes of another set, on its device, to start a gradient. Without `carried`.
+  // Sets zeros in the shapes of another set, on its device, to start a gradient. Without `in_body`.
   template <class U>
   void reset_like(const BasicPosedSurfels<U>& other) {
     const Device device = other.device();
@@ -131,7 +131,7 @@ BasicSurfels<To> convert(const BasicSurfels<From>& s) {
 template <class To, class From>
 BasicPosedSurfels<To> convert(const BasicPosedSurfels<From>& s) {
   return {convert<To>(s.position), convert<To>(s.scale), convert<To>(s.rotation), convert<To>(s.opacity),
-          convert<To>(s.sh),       convert<To>(s.tint),  convert<To>(s.carried),  convert<To>(s.roughness)};
+          convert<To>(s.sh),       convert<To>(s.tint),  convert<To>(s.in_body),  convert<To>(s.roughness)};
 }
 
 }  // namespace traceflow

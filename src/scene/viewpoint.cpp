@@ -25,7 +25,8 @@ Viewpoint viewpoint_of(const Camera<float>& camera, const SceneNormalisation& no
           std::atan(half_tangent) * 360 / std::numbers::pi};
 }
 
-Camera<float> carried(Camera<float> camera, const SceneNormalisation& from, const SceneNormalisation& to) {
+Camera<float> renormalised(Camera<float> camera, const SceneNormalisation& from,
+                           const SceneNormalisation& to) {
   if (from == to) return camera;
   camera.position = Vec3<float>(to.in_scene(from.in_capture(Vec3<double>(camera.position))));
   return camera;

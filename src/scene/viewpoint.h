@@ -21,6 +21,7 @@ Camera<float> camera_at(const Viewpoint& viewpoint, int width, int height,
 Viewpoint viewpoint_of(const Camera<float>& camera, const SceneNormalisation& normalisation);
 
 // Converts a camera from the units of `from` to those of `to`, another scene of the same capture.
-Camera<float> carried(Camera<float> camera, const SceneNormalisation& from, const SceneNormalisation& to);
+Camera<float> renormalised(Camera<float> camera, const SceneNormalisation& from,
+                           const SceneNormalisation& to);
 
 }  // namespace traceflow

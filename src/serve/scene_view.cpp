@@ -11,7 +11,7 @@ std::vector<CapturedCamera> cameras_of(const std::vector<View>& views, const Sce
   std::vector<CapturedCamera> cameras;
   cameras.reserve(views.size());
   for (const View& view : views)
-    cameras.push_back({view.id, view.time, carried(view.camera, capture, scene)});
+    cameras.push_back({view.id, view.time, renormalised(view.camera, capture, scene)});
   return cameras;
 }
 

@@ -576,7 +576,7 @@ int64_t mark_still(const Unrest& unrest, Surfels& surfels) {
   int64_t still = 0;
   for (size_t k = 0; k < rows.size(); ++k) {
     if (moves[k] != 0) continue;
-    surfels.body[rows[k]] = stands_still;
+    surfels.body[rows[k]] = motionless;
     ++still;
   }
   return still;

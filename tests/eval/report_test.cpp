@@ -242,7 +242,7 @@ TEST(Evaluate, TheSceneIsSeenFromWhereItStands) {
   normalised_anew.normalisation = {capture.normalisation.centre + Vec3<double>(1, 2, 3),
                                    2.5 * capture.normalisation.scale};
   for (View& view : normalised_anew.train)
-    view.camera = carried(view.camera, capture.normalisation, normalised_anew.normalisation);
+    view.camera = renormalised(view.camera, capture.normalisation, normalised_anew.normalisation);
   EXPECT_NEAR(psnr_of(subject, normalised_anew), psnr, 1e-3);
 }
 

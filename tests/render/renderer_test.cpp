@@ -335,7 +335,7 @@ TEST(Renderer, TheSilhouetteIsWhatBodiesCover) {
   EXPECT_TRUE(renderer.forward(f.scene, f.request).raster.silhouette.empty());
 }
 
-// Where everything is carried, the silhouette is the picture's alpha, and so are their gradients.
+// Where everything belongs to a body, the silhouette is the picture's alpha, and so are their gradients.
 TEST(Renderer, TheGradientOfASilhouetteOfAllIsThatOfAlpha) {
   Fixture f;
   f.request.silhouette = true;

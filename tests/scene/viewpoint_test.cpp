@@ -33,13 +33,13 @@ TEST(Viewpoint, TheAngleIsFromTopToBottom) {
 TEST(Viewpoint, ACarriedCameraSeesTheSame) {
   const SceneNormalisation other = {{-1, 0, 5}, 3};
   const Camera<float> camera = camera_at(oblique(), 320, 200, scene);
-  const Camera<float> moved = carried(camera, scene, other);
+  const Camera<float> moved = renormalised(camera, scene, other);
   const Vec3<double> point(1, 1, 1);  // of the capture
   const Vec2<float> here = camera.project(camera.point_in_camera(Vec3<float>(scene.in_scene(point))));
   const Vec2<float> there = moved.project(moved.point_in_camera(Vec3<float>(other.in_scene(point))));
   EXPECT_NEAR(here.x, there.x, 1e-2);
   EXPECT_NEAR(here.y, there.y, 1e-2);
-  EXPECT_EQ(carried(camera, scene, scene).position, camera.position);
+  EXPECT_EQ(renormalised(camera, scene, scene).position, camera.position);
 }
 
 }  // namespace

@@ -427,7 +427,7 @@ TEST(Tracker, LetsBodiesGoThatNeitherMasksNorPhotographsShow) {
   EXPECT_NE(warning.find("silhouettes"), std::string::npos) << warning;
   // What stands still is told from what moves, and the rest of the run goes on, also where it is resumed.
   const Tensor<int32_t>& body = trainer.scene().main.body;
-  EXPECT_GT(std::count(body.values().begin(), body.values().end(), stands_still), 100);
+  EXPECT_GT(std::count(body.values().begin(), body.values().end(), motionless), 100);
   trainer.save();
   Trainer resumed(options, capture, folder);
   resumed.resume();
@@ -541,7 +541,7 @@ TEST(Bodies, WhatThePicturesMissIsLeftToTheField) {
   EXPECT_EQ(wall.body[side * side - 1], 0);
   int64_t counted = 0;
   for (int64_t i = 0; i < wall.position.dim(0); ++i) {
-    if (wall.body[i] == stands_still) ++counted;
+    if (wall.body[i] == motionless) ++counted;
     const int64_t x = pixel_of(i), y = row_of(i);
     const bool inside = x > 21 && x < 38 && y > 21 && y < 38, outside = x < 18 || x > 41 || y < 18 || y > 41;
     const bool by_the_mask = std::abs(x - 30) < 2 && std::abs(y - 30) < 2;

@@ -105,7 +105,7 @@ TEST(Rescale, IsForWhatMoves) {
 
 TEST(Rescale, LeavesOthersAlone) {
   MovingBall at;
-  at.surfels.body[0] = stands_still;
+  at.surfels.body[0] = motionless;
   const Surfels before = at.surfels;
   rescale_bodies({1.08}, at.eyes, 1, at.surfels, at.motion);
   EXPECT_EQ(load3<float>(at.surfels.position.row(0)), load3<float>(before.position.row(0)));

@@ -33,7 +33,7 @@ struct MovingBoard : Fixture {
       store3(s.position.row(i), is_wall ? Vec3<float>(column, row, 2) : Vec3<float>(column, row, 0) * 0.15F);
       for (int64_t k = 0; k < 4; ++k) s.rotation(i, k) = k == 0 ? 1 : 0;
       if (is_wall) s.log_scale(i, 0) = s.log_scale(i, 1) = 0;
-      s.body[i] = is_wall ? stands_still : 0;
+      s.body[i] = is_wall ? motionless : 0;
     }
     Tensor<float> centre(Shape{1, 3});
     centre(0, 0) = 0.1F;

@@ -54,7 +54,8 @@ bool enters(const Vector& low, const Vector& high, const Ray& ray, const Vector&
 }
 
 // The point of triangle `to` with the barycentric coordinates of `point` in triangle `from`.
-Vector carried(const std::array<Vector, 3>& from, const std::array<Vector, 3>& to, const Vector& point) {
+Vector deformed_with(const std::array<Vector, 3>& from, const std::array<Vector, 3>& to,
+                     const Vector& point) {
   const Vector edge_1 = from[1] - from[0];
   const Vector edge_2 = from[2] - from[0];
   const Vector normal = cross(edge_1, edge_2);
@@ -163,11 +164,11 @@ Vector Mesh::normal(int triangle) const {
 }
 
 Vector Mesh::at_rest(int triangle, const Vector& deformed_point) const {
-  return carried(corners(deformed_, triangle), corners(rest_, triangle), deformed_point);
+  return deformed_with(corners(deformed_, triangle), corners(rest_, triangle), deformed_point);
 }
 
 Vector Mesh::deformed(int triangle, const Vector& rest_point) const {
-  return carried(corners(rest_, triangle), corners(deformed_, triangle), rest_point);
+  return deformed_with(corners(rest_, triangle), corners(deformed_, triangle), rest_point);
 }
 
 }  // namespace traceflow::synth

@@ -120,11 +120,12 @@ std::vector<View> Evaluation::aligned_views() {
   const Clock::time_point start = Clock::now();
   for (size_t i = 0; i < views.size(); ++i) {
     FrameRequest request = subject.request;
-    request.camera = carried(views[i].camera, of_capture, of_scene);
+    request.camera = renormalised(views[i].camera, of_capture, of_scene);
     request.time = views[i].time;
     ViewImages& photograph = targets.of(capture_, views[i], false);
-    views[i].camera = carried(aligned_camera(renderer, subject.scene, request, photograph, run_.options.loss),
-                              of_scene, of_capture);
+    views[i].camera =
+        renormalised(aligned_camera(renderer, subject.scene, request, photograph, run_.options.loss),
+                     of_scene, of_capture);
     progress.show({"align", "cameras", static_cast<int64_t>(i) + 1, static_cast<int64_t>(views.size())},
                   seconds_since(start));
   }

@@ -86,7 +86,7 @@ class Chooser {
 
   // A capture's camera in the scene's coordinates: a .ply has the capture's own coordinates.
   Camera<float> placed(const Camera<float>& camera) {
-    return carried(camera, capture().normalisation, scene_.subject.scene.normalisation);
+    return renormalised(camera, capture().normalisation, scene_.subject.scene.normalisation);
   }
 
   void captured(ChosenShots& chosen) {

@@ -27,8 +27,8 @@ double distance2(const BasicNodes<double>& nodes, int64_t n, const Vec3<double>&
   return dot(arm, arm);
 }
 
-Vec3<double> carried(const BasicNodes<double>& nodes, int64_t n, const Vec3<double>& turn,
-                     const Vec3<double>& shift, const Vec3<double>& p) {
+Vec3<double> moved_by_node(const BasicNodes<double>& nodes, int64_t n, const Vec3<double>& turn,
+                           const Vec3<double>& shift, const Vec3<double>& p) {
   const Vec3<double> centre = load3<double>(nodes.centre.row(n));
   return rotation_from_quaternion(quaternion_exp(turn)) * (p - centre) + centre + shift;
 }
@@ -64,7 +64,7 @@ void forward_reference(const BasicNodes<double>& nodes, const Tensor<int32_t>& b
       const Vec3<double> w = value_at(nodes, nodes.turn, n, time);
       sum += weight;
       turn += weight * w;
-      bent += weight * carried(nodes, n, w, value_at(nodes, nodes.shift, n, time), p);
+      bent += weight * moved_by_node(nodes, n, w, value_at(nodes, nodes.shift, n, time), p);
     }
     if (sum == 0) continue;
     store3(posed.position.row(i), bent / sum);
@@ -88,7 +88,7 @@ double resist_reference(const BasicNodes<double>& nodes, const BasicMotion<doubl
         const Vec3<double> other = load3<double>(nodes.centre.row(m));
         const double touch = std::exp(-distance2(nodes, n, other) / (8 * radius2));
         const Vec3<double> off =
-            carried(nodes, n, turn, shift, other) - other - load3<double>(&nodes.shift(m, k, 0));
+            moved_by_node(nodes, n, turn, shift, other) - other - load3<double>(&nodes.shift(m, k, 0));
         apart += touch * dot(off, off);
         all += touch;
       }

@@ -32,7 +32,7 @@ TRACEFLOW_LANES_INLINE auto grad_weight(const L& l, const KernelOptions& o, cons
   if constexpr (asked != Asked::colour) own = l.mul_add(l.z(f, s), l.at(g.z), own);
   for (int c = 0; c < 3; ++c) own = l.mul_add(l.set(s.colour[c]), l.at(g.colour[c]), own);
   own = l.mul_add(l.set(s.tint), l.at(g.tint), own);
-  own = l.mul_add(l.set(s.carried()), l.at(g.silhouette), own);
+  own = l.mul_add(l.set(s.in_body()), l.at(g.silhouette), own);
   own = l.mul_add(l.set(s.roughness()), l.at(g.roughness), own);
   if constexpr (asked != Asked::colour) {
     for (int c = 0; c < 3; ++c) own = l.mul_add(l.set(s.normal[c]), l.at(g.normal[c]), own);

@@ -7,7 +7,7 @@ namespace traceflow::raster {
 void project_surfels(const PosedSurfels& surfels, const Camera<float>& camera, const Options& options,
                      Saved& saved) {
   saved.count = surfels.count();
-  saved.has_silhouette = !surfels.carried.empty();
+  saved.has_silhouette = !surfels.in_body.empty();
   saved.has_roughness = surfels.has_roughness();
   saved.rho_per_pixel2 = options.low_pass > 0 ? 2 / (options.low_pass * options.low_pass) : 2;
   saved.width = camera.width;

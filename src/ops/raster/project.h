@@ -238,10 +238,10 @@ class ProjectSurfel {
     store3(splat.colour, finite ? colour : Vec3<float>(std::numeric_limits<float>::quiet_NaN()));
     store3(splat.normal, normal * (dot(normal, from_camera) > 0 ? -1.0 : 1.0));
     splat.tint = surfels_.tint != nullptr ? surfels_.tint[i] : 0;
-    const float carried = surfels_.carried != nullptr ? surfels_.carried[i] : 0;
+    const float in_body = surfels_.in_body != nullptr ? surfels_.in_body[i] : 0;
     const float roughness = surfels_.roughness != nullptr ? surfels_.roughness[i] : 0;
     // The product keeps a value that is not finite.
-    splat.signed_roughness = std::copysign(roughness + 0 * carried, carried != 0 ? -1.0F : 1.0F);
+    splat.signed_roughness = std::copysign(roughness + 0 * in_body, in_body != 0 ? -1.0F : 1.0F);
   }
 
   TRACEFLOW_HD static void store_ellipse(const Vec2<double>& centre, Splat& s) {

@@ -41,8 +41,8 @@ void check_input(const PosedSurfels& surfels, const Camera<float>& camera) {
           surfels.tint.shape().to_string());
   require(!surfels.has_roughness() || surfels.roughness.size() == n, "a roughness for every surfel",
           surfels.roughness.shape().to_string());
-  require(surfels.carried.empty() || surfels.carried.size() == n, "whether each surfel is carried",
-          surfels.carried.shape().to_string());
+  require(surfels.in_body.empty() || surfels.in_body.size() == n,
+          "it is known of each surfel whether it is in a body", surfels.in_body.shape().to_string());
   require(camera.width >= 0 && camera.height >= 0 && camera.width < (1 << 20) && camera.height < (1 << 20),
           "an image size from 0 to 2^20", std::to_string(camera.width) + "×" + std::to_string(camera.height));
 }

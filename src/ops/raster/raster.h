@@ -43,7 +43,7 @@ struct BasicOutput {
   Tensor<T> colour;        // H×W×3, Σ w c + background · remaining transmittance
   Tensor<T> alpha;         // H×W, Σ w
   Tensor<T> tint;          // H×W, Σ w s_tint (α_spec); zero if the surfels have no tint
-  Tensor<T> silhouette;    // H×W, Σ w s_carried; empty if the surfels have no `carried`
+  Tensor<T> silhouette;    // H×W, Σ w s_body; empty if the surfels have no `in_body`
   Tensor<T> roughness;     // H×W, Σ w s_roughness; empty if the surfels have no roughness
   Tensor<T> normal;        // H×W×3, world axes, Σ w n with n facing the camera; not normalised
   Tensor<T> depth;         // H×W, expected camera z: Σ w z / Σ w; 0 where alpha is 0

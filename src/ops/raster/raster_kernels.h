@@ -44,7 +44,7 @@ struct alignas(16) Splat {
   float signed_roughness;  // negative, also as -0, if a body carries the surfel
 
   // The value of the silhouette.
-  TRACEFLOW_HD float carried() const { return std::signbit(signed_roughness) ? 1.0F : 0.0F; }
+  TRACEFLOW_HD float in_body() const { return std::signbit(signed_roughness) ? 1.0F : 0.0F; }
   TRACEFLOW_HD float roughness() const { return std::abs(signed_roughness); }
   static constexpr float far_away = 1e15F;
   TRACEFLOW_HD bool has_low_pass() const { return centre_x < far_away; }

@@ -30,7 +30,7 @@ struct Projected {
   Vector2 pixel;      // the projected centre, if has_low_pass
   Vector3 direction;  // unit, from the camera to the centre
   Vector3 colour;
-  double opacity, tint, carried, roughness;
+  double opacity, tint, in_body, roughness;
 };
 
 // A hit of a pixel's ray with a surfel.
@@ -122,7 +122,7 @@ class Scene {
     p.opacity = s.opacity[i];
     p.tint = s.has_tint() ? s.tint[i] : 0;
     p.roughness = s.has_roughness() ? s.roughness[i] : 0;
-    p.carried = s.carried.empty() ? 0 : s.carried[i];
+    p.in_body = s.in_body.empty() ? 0 : s.in_body[i];
     return p;
   }
 
@@ -182,7 +182,7 @@ void resize(const Surfels& surfels, const Camera<double>& camera, BasicOutput<do
        {&output.alpha, &output.tint, &output.depth, &output.median_depth, &output.distortion}) {
     tensor->reset(plane);
   }
-  output.silhouette.reset(surfels.carried.empty() ? Shape{0} : plane);
+  output.silhouette.reset(surfels.in_body.empty() ? Shape{0} : plane);
   output.roughness.reset(surfels.has_roughness() ? plane : Shape{0});
   output.colour.reset(vectors);
   output.normal.reset(vectors);
@@ -197,7 +197,7 @@ void write_pixel(const Scene& scene, const Pixel& pixel, const Options& options,
     colour += b.weight * p.colour;
     normal += b.weight * p.normal;
     output.tint[index] += b.weight * p.tint;
-    if (!output.silhouette.empty()) output.silhouette[index] += b.weight * p.carried;
+    if (!output.silhouette.empty()) output.silhouette[index] += b.weight * p.in_body;
     if (!output.roughness.empty()) output.roughness[index] += b.weight * p.roughness;
     for (const Blended& nearer :
          std::span(pixel.blended.data(), static_cast<size_t>(&b - pixel.blended.data()))) {
@@ -275,7 +275,7 @@ class Backward {
     const double from_depth = g.depth * (b.hit.z - pixel.depth()) / pixel.alpha();
     const double from_distortion = b.m * b.m * pixel.alpha() + pixel.m2_sum - 2 * b.m * pixel.m_sum;
     return dot(g.colour, p.colour - Vector3(options_.background)) + dot(g.normal, p.normal) +
-           g.tint * p.tint + g.silhouette * p.carried + g.roughness * p.roughness + g.alpha + from_depth +
+           g.tint * p.tint + g.silhouette * p.in_body + g.roughness * p.roughness + g.alpha + from_depth +
            g.distortion * from_distortion;
   }
 

@@ -59,7 +59,7 @@ std::vector<Case> cases() {
   outside.scale_max = 5;
   outside.scale_min = 0.1;
   SceneOptions bare = mixed;
-  bare.has_tint = bare.says_carried = bare.has_roughness = false;
+  bare.has_tint = bare.has_bodies = bare.has_roughness = false;
   bare.sh_degree = 0;
   return {{"mixed", 53, 37, centre, mixed},       {"mixed_hit", 53, 37, hit, mixed},
           {"sharp", 48, 32, sharp, mixed},        {"blurred", 48, 32, blurred, mixed},

@@ -127,7 +127,7 @@ TEST_P(Orders, do_not_depend_on_the_order_of_the_surfels) {
     std::copy_n(row, size, to[group]->row(i));
   });
   for (int64_t i = 0; i < n; ++i)
-    shuffled.surfels.carried[i] = scene.surfels.carried[order[static_cast<size_t>(i)]];
+    shuffled.surfels.in_body[i] = scene.surfels.in_body[order[static_cast<size_t>(i)]];
   Result a;
   Result b;
   run(scene, options(), a);

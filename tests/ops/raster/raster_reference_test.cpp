@@ -95,7 +95,7 @@ std::vector<GradientCase> gradient_cases() {
   dense.opacity_max = 1.3;
   dense.sh_degree = 1;
   SceneOptions bare;
-  bare.has_tint = bare.says_carried = bare.has_roughness = false;
+  bare.has_tint = bare.has_bodies = bare.has_roughness = false;
   bare.sh_degree = 0;
   SceneOptions near;  // centres on both sides of the near plane, surfels that reach behind the camera
   near.depth_min = -0.5;

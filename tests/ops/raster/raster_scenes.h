@@ -20,7 +20,7 @@ struct SceneOptions {
   double spread = 0.5;  // centres reach this far from the axis, in tangents of the view angle
   double opacity_min = 0.2, opacity_max = 0.9;
   bool has_tint = true;
-  bool says_carried = true;
+  bool has_bodies = true;
   bool has_roughness = true;
   bool rotated_camera = true;
 };
@@ -59,7 +59,7 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
   s.opacity = Tensor<double>({o.count});
   s.sh = Tensor<double>({o.count, k, 3});
   if (o.has_tint) s.tint = Tensor<double>({o.count});
-  if (o.says_carried) s.carried = Tensor<double>({o.count});
+  if (o.has_bodies) s.in_body = Tensor<double>({o.count});
   if (o.has_roughness) s.roughness = Tensor<double>({o.count});
   for (int64_t i = 0; i < o.count; ++i) {
     const double z = random.uniform(o.depth_min, o.depth_max);
@@ -73,7 +73,7 @@ inline TestScene<double> random_scene(uint64_t seed, int width, int height, cons
     s.opacity[i] = random.uniform(o.opacity_min, o.opacity_max);
     for (int64_t c = 0; c < 3 * k; ++c) s.sh.row(i)[c] = (c < 3 ? 0.8 : 0.2) * random.normal();
     if (o.has_tint) s.tint[i] = random.uniform();
-    if (o.says_carried) s.carried[i] = i % 3 == 0 ? 1 : 0;
+    if (o.has_bodies) s.in_body[i] = i % 3 == 0 ? 1 : 0;
     // Not drawn, so that the rest of a scene is as it is without.
     if (o.has_roughness) s.roughness[i] = 0.05 + 0.07 * static_cast<double>(i % 5);
   }
@@ -162,7 +162,7 @@ void for_each_group(Surfels& s, F&& f) {
 template <class Surfels, class F>
 void for_each_input(Surfels& s, F&& f) {
   for_each_group(s, f);
-  f("carried", s.carried);
+  f("in_body", s.in_body);
 }
 
 }  // namespace traceflow::raster

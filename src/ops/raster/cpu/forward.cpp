@@ -87,7 +87,7 @@ class Blend {
     green_ = hn::MulAdd(weight, set(s.colour[1]), green_);
     blue_ = hn::MulAdd(weight, set(s.colour[2]), blue_);
     tint_ = hn::MulAdd(weight, set(s.tint), tint_);
-    silhouette_ = hn::MulAdd(weight, set(s.carried()), silhouette_);
+    silhouette_ = hn::MulAdd(weight, set(s.in_body()), silhouette_);
     roughness_ = hn::MulAdd(weight, set(s.roughness()), roughness_);
     normal_x_ = hn::MulAdd(weight, set(s.normal[0]), normal_x_);
     normal_y_ = hn::MulAdd(weight, set(s.normal[1]), normal_y_);

@@ -46,7 +46,7 @@ class Blend {
     alpha_ += weight;
     colour_ += weight * load3<float>(s.colour);
     tint_ += weight * s.tint;
-    silhouette_ += weight * s.carried();
+    silhouette_ += weight * s.in_body();
     roughness_ += weight * s.roughness();
     normal_ += weight * load3<float>(s.normal);
     depth_ += weight * z;
