@@ -49,8 +49,8 @@ TRACEFLOW_HD T cutoff_radius2(const BlendRules<T>& rules, T opacity) {
   return opacity > T(0) ? T(2) * std::log(opacity / rules.alpha_min) : T(-1);
 }
 
-// The depth m = far/(far - near) · (1 - near/z) with which the distortion compares hits (method §3.5): 0 at the
-// near plane and 1 at the far plane, as in 2DGS.
+// The depth m = far/(far - near) · (1 - near/z) with which the distortion compares hits (method §3.5): 0 at
+// the near plane and 1 at the far plane, as in 2DGS.
 template <class T>
 TRACEFLOW_HD T distortion_depth(T near_plane, T far_plane, T z) {
   return far_plane / (far_plane - near_plane) * (T(1) - near_plane / z);

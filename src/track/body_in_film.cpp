@@ -30,7 +30,8 @@ void BodyInFilm::observe(FilmViews views) {
   for (const FilmView& view : *film) {
     BodyInView in_view;
     in_view.view = &view;
-    if (bends()) in_view.span = motion::KeySpan<float>(all_nodes->time.data(), times(), motion.time[view.key]);
+    if (bends())
+      in_view.span = motion::KeySpan<float>(all_nodes->time.data(), times(), motion.time[view.key]);
     in_views.push_back(std::move(in_view));
   }
   find_what_is_in_front();
@@ -81,7 +82,7 @@ void BodyInFilm::pose(BodyInView& in_view) const {
     };
     const Vec3<double> turned = at(all_nodes->turn);
     in_view.nodes.push_back({rotation_from_quaternion(quaternion_exp(turned)),
-                          load3<double>(all_nodes->centre.row(nodes[n])), at(all_nodes->shift), turned});
+                             load3<double>(all_nodes->centre.row(nodes[n])), at(all_nodes->shift), turned});
   }
 }
 
@@ -96,7 +97,8 @@ Vec3<double> BodyInFilm::bent(const FilmPoint& point, const BodyInView& in_view)
 }
 Mat3<double> BodyInFilm::bend_of(const FilmPoint& point, const BodyInView& in_view) {
   Vec3<double> sum(0);
-  for (const NodeWeight& of : point.nodes) sum += of.weight * in_view.nodes[static_cast<size_t>(of.node)].turn;
+  for (const NodeWeight& of : point.nodes)
+    sum += of.weight * in_view.nodes[static_cast<size_t>(of.node)].turn;
   return rotation_from_quaternion(quaternion_exp(sum));
 }
 Vec3<double> BodyInFilm::arm(const FilmPoint& point, const BodyInView& in_view) const {
@@ -137,7 +139,8 @@ void BodyInFilm::find_what_is_in_front(const raster::Output& picture, BodyInView
                row = static_cast<int64_t>(std::floor(pixel.y));
     if (column < 0 || row < 0 || column >= camera.width || row >= camera.height) continue;
     const int64_t k = row * camera.width + column;
-    in_view.in_front[i] = picture.alpha[k] >= known && in_camera.z < picture.depth[k] + behind * radius ? 1 : 0;
+    in_view.in_front[i] =
+        picture.alpha[k] >= known && in_camera.z < picture.depth[k] + behind * radius ? 1 : 0;
   }
 }
 
@@ -162,8 +165,8 @@ void BodyInFilm::show(BodyInView& in_view, bool with_derivatives) const {
   }
 }
 
-bool BodyInFilm::show(const BodyInView& in_view, const DetailPhoto& photo, size_t first, bool with_derivatives,
-                      ShownPoint& shown) const {
+bool BodyInFilm::show(const BodyInView& in_view, const DetailPhoto& photo, size_t first,
+                      bool with_derivatives, ShownPoint& shown) const {
   const Camera<double> camera = convert<double>(photo.camera);
   const Vec3<double> in_camera = camera.point_in_camera(pivot(in_view) + shown.arm);
   if (!(in_camera.z > 0)) return false;

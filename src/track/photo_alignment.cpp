@@ -142,7 +142,7 @@ std::optional<PhotoSample> sample_at(const DetailPhoto& photo, double x, double 
   const Vec3<double> top = (1 - right) * at(0, 0) + right * at(0, 1);
   const Vec3<double> bottom = (1 - right) * at(1, 0) + right * at(1, 1);
   return PhotoSample{(1 - down) * top + down * bottom,
-                (1 - down) * (at(0, 1) - at(0, 0)) + down * (at(1, 1) - at(1, 0)), bottom - top};
+                     (1 - down) * (at(0, 1) - at(0, 0)) + down * (at(1, 1) - at(1, 0)), bottom - top};
 }
 
 DetailPhoto detail_of(FinePhotograph photograph, double blur) {

@@ -204,7 +204,7 @@ void PoseSolver::weigh(const TrackWeights& weights) {
 }
 
 const PoseSolver::Residuals& PoseSolver::residuals_of(size_t at, const TrackWeights& weights, double sigma,
-                                              bool with_jacobian) {
+                                                      bool with_jacobian) {
   const TrackTarget& target = targets_[at];
   raster::forward(posed_, target.camera, options_, whole_, blended_.get());
   const int64_t pixels = whole_.tint.size();
@@ -443,7 +443,8 @@ double PoseSolver::cost(const TrackWeights& weights) {
   constexpr double sigma = 1;  // pixels
   weigh(weights);
   double sum = 0;
-  for (size_t at = 0; at < targets_.size(); ++at) sum += robust_cost(residuals_of(at, weights, sigma, false).value);
+  for (size_t at = 0; at < targets_.size(); ++at)
+    sum += robust_cost(residuals_of(at, weights, sigma, false).value);
   return sum;
 }
 

@@ -25,7 +25,7 @@ constexpr double wide_blur = 4;  // pixels
 
 // The largest part of the mask without other bodies than the lost one.
 struct FreePart {
-  double area = 0;         // pixels
+  double area = 0;           // pixels
   Vec2<double> centroid{0};  // pixels
   bool at_border = false;
 };

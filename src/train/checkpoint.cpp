@@ -12,8 +12,7 @@ namespace traceflow {
 
 namespace {
 
-// A count stored in the checkpoint's metadata. in_older: the value in older checkpoints,
-// which do not have it.
+// A count stored in the checkpoint's metadata. in_older: the count in older checkpoints that do not store it.
 int64_t count_in(const Safetensors& file, const std::string& key, std::optional<int64_t> in_older = {}) {
   if (in_older && !file.metadata.contains(key)) return *in_older;
   const double value = file.number(key);

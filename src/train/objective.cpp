@@ -129,8 +129,9 @@ void evaluate_objective(const LossInputs& inputs, const LossGradient& gradient, 
   const Shape none{0};
   gradient.frame.colour.place(device).reset(frame.colour.shape());
   gradient.frame.silhouette.place(device).reset(frame.raster.silhouette.shape());
-  for (Tensor<float>* unused : {&gradient.frame.pseudo_normal, &gradient.frame.alpha, &gradient.frame.distortion,
-                                &gradient.frame.main_position, &gradient.frame.environment_residuals})
+  for (Tensor<float>* unused :
+       {&gradient.frame.pseudo_normal, &gradient.frame.alpha, &gradient.frame.distortion,
+        &gradient.frame.main_position, &gradient.frame.environment_residuals})
     unused->place(device).reset(none);
   gradient.rest.place(device).reset(none);
   const bool has_normals = normal_weight(inputs) > 0 || normal_prior_weight(inputs) > 0;

@@ -45,7 +45,7 @@ inline constexpr int neighbours_per_surfel = 8;
 class TrainingState {
  public:
   // At the start of a run with this scene, which is on the run's device.
-  TrainingState(const TrainOptions& options, const Capture& capture, Scene scene);
+  TrainingState(const TrainOptions& options, const Capture& capture, Scene start);
 
   Scene scene;
   Optimiser optimiser;

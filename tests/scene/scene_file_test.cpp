@@ -95,7 +95,7 @@ std::vector<float> all_numbers(const Scene& scene) {
     scene.lighting->for_each(take);
     take("", scene.lighting->box);
     take("", scene.lighting->time);
-    take("", scene.lighting->middle);
+    take("", scene.lighting->centre);
     take("", scene.lighting->radius);
   }
   for (const int32_t body : scene.main.body.values()) all.push_back(static_cast<float>(body));
@@ -198,7 +198,7 @@ TEST(SceneFile, LightingWithoutASizeOrWithoutItsTimesIsRefused) {
 TEST(SceneFile, LightingMayHaveNoBodies) {
   Scene scene = full_scene();
   for (Tensor<float>* const part :
-       {&scene.lighting->middle, &scene.lighting->radius, &scene.lighting->body_brightness})
+       {&scene.lighting->centre, &scene.lighting->radius, &scene.lighting->body_brightness})
     *part = {};
   Safetensors file;
   put_scene(scene, file);

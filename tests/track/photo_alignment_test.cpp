@@ -97,7 +97,7 @@ TEST(PhotoAlignment, CroppedPhotosShowTheSame) {
     for (double y = -0.6; y < 0.6; y += 0.05) {
       const Vec3<double> in_camera = of_whole.point_in_camera(centre + Vec3<double>(x, y, -0.3));
       const Vec2<double> at = of_whole.project(in_camera), cut = of_part.project(in_camera);
-      const auto a = sample(whole, at.x, at.y), b = sample(part, cut.x, cut.y);
+      const auto a = sample_at(whole, at.x, at.y), b = sample_at(part, cut.x, cut.y);
       ASSERT_EQ(a.has_value(), b.has_value());
       if (!a) continue;
       ++seen;

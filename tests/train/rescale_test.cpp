@@ -285,8 +285,8 @@ TEST(Tracker, KeepsRigidBodiesAsLargeAsTheFirstPictureShowsThem) {
     EXPECT_GT(std::abs(by_points[0] - 1), 1e-3);
     for (size_t b = 0; b < ratios.size(); ++b) ratios[b] *= by_points[b];
     const auto lit = [&] {
-      const auto& middle = trainer.scene().lighting->middle.values();
-      return std::vector<float>(middle.begin(), middle.end());
+      const auto& centre = trainer.scene().lighting->centre.values();
+      return std::vector<float>(centre.begin(), centre.end());
     };
     std::vector<float> lit_before = lit();
     trainer.step();

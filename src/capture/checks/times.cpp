@@ -23,7 +23,7 @@ void check_gaps(const Capture& capture, Findings& findings) {
   for (const View& view : capture.train) views.push_back(&view);
   std::ranges::stable_sort(views, {}, &View::time);
   const auto same = [](const View* a, const View* b) { return a->time == b->time; };
-  views.erase(std::ranges::unique(views, same).begin(), views.end());
+  views.erase(std::unique(views.begin(), views.end(), same), views.end());
   if (views.size() < fewest_times) return;
   std::vector<double> steps;
   for (size_t i = 1; i < views.size(); ++i) steps.push_back(double{views[i]->time} - views[i - 1]->time);

@@ -27,8 +27,8 @@ double ssim(const Tensor<float>& image, const Tensor<float>& target, const Tenso
 
 // L_norm = mean (1 − (1 − α)² − n·N_d) over pixels where N_d is not zero (method §7.4). normal: the blended
 // normal, H×W×3, not normalised (its length contains alpha); alpha: H×W; pseudo: H×W×3 unit or zero.
-// Differentiable in all three. A pixel whose hits agree with N_d gains by becoming opaque above α = 0.5, and by
-// becoming empty below it. The mean divides by H·W, so that a half-empty frame weighs half.
+// Differentiable in all three. A pixel whose hits agree with N_d gains by becoming opaque above α = 0.5, and
+// by becoming empty below it. The mean divides by H·W, so that a half-empty frame weighs half.
 void normal_consistency(const Tensor<float>& normal, const Tensor<float>& alpha, const Tensor<float>& pseudo,
                         double weight, Tensor<float>& grad_normal, Tensor<float>& grad_alpha,
                         Tensor<float>& grad_pseudo, const MeanSlot& value);

@@ -136,8 +136,8 @@ struct NodeGradientOfSurfel {
     gradient.force = weight * load3<double>(grad_position + 3 * i);
     gradient.torque = cross(arm, gradient.force);
     gradient.turn = weight * Vec3<double>(turns[i]);
-    const double sum =
-        dot(gradient.force, gradient.force) + dot(gradient.torque, gradient.torque) + dot(gradient.turn, gradient.turn);
+    const double sum = dot(gradient.force, gradient.force) + dot(gradient.torque, gradient.torque) +
+                       dot(gradient.turn, gradient.turn);
     return sum * 0 == 0 ? gradient : NodeGradient();
   }
 };

@@ -23,7 +23,7 @@ Camera<float> looking(Camera<float> camera, const Vec3<double>& from, const Vec3
 
 // The common target of a set of cameras.
 struct Aim {
-  Vec3<double> centroid{0};         // mean position of the cameras
+  Vec3<double> centroid{0};       // mean position of the cameras
   Vec3<double> forward{0, 0, 1};  // unit; the cameras' mean
   Vec3<double> up{0, -1, 0};      // unit; the cameras' mean
   double spread = 1;              // largest distance of a camera from the mean position, at least 1

@@ -218,7 +218,7 @@ TEST_F(TrainerOnDevice, AnIterationIsFewKernelsAndFewerReads) {
   EXPECT_EQ(reads, 6);
   EXPECT_EQ(products,
             52);  // 8 layers and the heads, forward and twice backward, less 2 by the inputs; two sets
-  EXPECT_LE(others, 129);
+  EXPECT_LE(others, 130);
 }
 
 TEST_F(TrainerOnDevice, TheForecastCoversWhatARunTakes) {

@@ -123,7 +123,7 @@ HWY_INLINE void add_parts(const HitVec (&parts)[12], float* const* rows, size_t 
 
 // Adds the contributions of each hit's geometry to the row of its surfel.
 HWY_INLINE GradRay places_backward(const BackwardFrame* frames, const UnitRay& ray,
-                                       const HitGradients& hits) {
+                                   const HitGradients& hits) {
   const HitTag d;
   const HitVec3 direction = spread(ray.direction), zero = spread(Vec3<float>(0));
   HitVec3 origin_sum = zero, direction_sum = zero;
