@@ -34,7 +34,7 @@ void write_text(std::string_view text, const Pixel& at, const Ink& ink, Tensor<u
     for (const auto& [first, right, last, below] : std::span(boxes).first(static_cast<size_t>(count)))
       fill_box({left + std::lround(first.x), at.y + std::lround(first.y)},
                {std::lround(last.x - first.x), std::lround(last.y - first.y)}, ink, picture);
-    left += letter_width;
+    left += std::min<int64_t>(letter_width, stb_easy_font_width(one));
   }
 }
 

@@ -14,7 +14,7 @@ struct Ink {
 
 using Pixel = Vec2<int64_t>;  // x to the right, y down
 
-// Characters of ASCII; others are blank. Each takes letter_width pixels. at: the upper left corner.
+// Characters of ASCII; others are blank. Each takes at most letter_width pixels. at: the upper left corner.
 inline constexpr int64_t letter_width = 8, letter_height = 10;
 void write_text(std::string_view text, const Pixel& at, const Ink& ink, Tensor<uint8_t>& picture);
 

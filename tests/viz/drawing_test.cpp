@@ -55,6 +55,20 @@ TEST(Drawing, lines_join_their_ends_and_rings_keep_their_radii) {
   EXPECT_EQ(picture(10, 15, 0), 0);
 }
 
+TEST(Drawing, letters_take_their_own_width) {
+  const auto width = [](std::string_view text) {
+    Tensor<uint8_t> picture({letter_height, 100, 3});
+    write_text(text, {0, 0}, white, picture);
+    int64_t right = 0;
+    for (int64_t y = 0; y < picture.dim(0); ++y) {
+      for (int64_t x = 0; x < picture.dim(1); ++x) right = std::max(right, picture(y, x, 0) != 0 ? x + 1 : 0);
+    }
+    return right;
+  };
+  EXPECT_LT(width("iiiiiiii"), width("mmmmmmmm"));
+  EXPECT_LE(width("@@@@@@@@"), 8 * letter_width);
+}
+
 TEST(Drawing, every_letter_and_digit_looks_different) {
   std::vector<std::vector<uint8_t>> seen;
   for (const char c : std::string("abcdefghijklmnopqrstuvwxyz0123456789.,:-_+=/%() ")) {
