@@ -136,8 +136,8 @@ struct LightSurfel {
   }
 };
 
-// Turns surfel i's gradient into that before lighting, and writes the gradient of the logarithm there to
-// log_gradients.
+// Turns surfel i's gradient into that before lighting, and writes the gradient by the logarithm of the light
+// there to log_gradients.
 struct LightBack {
   Grid grid;
   Bodies bodies;

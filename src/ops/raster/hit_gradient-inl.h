@@ -19,10 +19,9 @@ namespace traceflow::raster::HWY_NAMESPACE {
 namespace traceflow::raster::scalar {
 #endif
 
-// Both functions take
-//   l      the arithmetic: mul, add, …, at(x) for a value of the pixels, and z(f, s), inverse_z(f, s) of a
-//   hit o      the options s      the splat f      its footprint at the pixels, with u = nu/w and v = nv/w g
-//   dL/d(output) of the pixels saved  what forward saved for them
+// In both functions, l is the arithmetic on lanes (mul, add, …; at(x) for a value of the pixels; z(f, s) and
+// inverse_z(f, s) of a hit), o the options, s the splat, f its footprint at the pixels with u = nu/w and v =
+// nv/w, g dL/d(output) of the pixels, and saved what forward saved for them.
 
 // dL/dw of a hit.
 template <Asked asked, class L, class Footprint, class Grad, class Kept>
