@@ -9,7 +9,7 @@
 #include "files/png.h"
 #include "render/samples.h"
 #include "serve/hello.h"
-#include "serve/look_camera.h"
+#include "serve/view_camera.h"
 #include "viz/cameras/camera_path.h"
 #include "viz/probe.h"
 
@@ -137,12 +137,13 @@ void FrameServer::answer(const Job& job, const SceneView& view) {
   std::erase_if(painters_, [&](const auto& entry) { return !clients_.is_connected(entry.first); });
 }
 
-FrameRequest FrameServer::request_for(const Look& look, const SceneView& view, double divisor) const {
+FrameRequest FrameServer::request_for(const ViewRequest& view_request, const SceneView& view,
+                                      double divisor) const {
   FrameRequest request = view.request;
-  request.camera = camera_of(look, info_, view.scene.normalisation, divisor);
-  request.time = look.time;
+  request.camera = camera_of(view_request, info_, view.scene.normalisation, divisor);
+  request.time = view_request.time;
   request.reuse_pose = posed_;
-  request.specular = view.request.specular && shows_reflections(look.layer);
+  request.specular = view.request.specular && shows_reflections(view_request.layer);
   return request;
 }
 
@@ -153,13 +154,14 @@ std::shared_ptr<const ViewImages> FrameServer::photograph(const PhotoRef& photo)
   return load_images(*info_.capture, views.at(static_cast<size_t>(photo.index)));
 }
 
-Tensor<uint8_t> FrameServer::picture(const Look& look, const FrameRequest& request, const SceneView& view,
-                                     viz::Painter& painter) {
-  painter.options() = {viz::parse_colour_map(look.map), look.exposure, look.moving ? follow : 1};
-  const bool difference = look.layer == "difference";
-  const auto* photo = std::get_if<PhotoRef>(&look.camera);
+Tensor<uint8_t> FrameServer::picture(const ViewRequest& view_request, const FrameRequest& request,
+                                     const SceneView& view, viz::Painter& painter) {
+  painter.options() = {viz::parse_colour_map(view_request.map), view_request.exposure,
+                       view_request.moving ? follow : 1};
+  const bool difference = view_request.layer == "difference";
+  const auto* photo = std::get_if<PhotoRef>(&view_request.camera);
   if (difference && photo == nullptr) throw InputError("message", "layer", "difference", "a captured camera");
-  const viz::Layer layer = difference ? viz::Layer::rgb : layer_named(look.layer);
+  const viz::Layer layer = difference ? viz::Layer::rgb : layer_named(view_request.layer);
 
   const Frame& frame = renderer(view).forward(view.scene, request);
   posed_ = true;
@@ -176,16 +178,16 @@ Tensor<uint8_t> FrameServer::picture(const Look& look, const FrameRequest& reque
 
 void FrameServer::answer(const Job& job, const FrameJob& frame, const SceneView& view) {
   const Clock::time_point start = Clock::now();
-  FrameRequest request = request_for(frame.look, view, frame.coarseness.divisor);
+  FrameRequest request = request_for(frame.view_request, view, frame.coarseness.divisor);
   if (!frame.coarseness.final) request.most_samples = 1;
   check_memory_for(request, view);
   const std::string bytes =
-      jpeg_bytes(picture(frame.look, request, view, painters_[job.client]), frame.coarseness.quality);
+      jpeg_bytes(picture(frame.view_request, request, view, painters_[job.client]), frame.coarseness.quality);
   const double seconds = seconds_since(start);
   const int width = request.camera.width, height = request.camera.height;
   clients_.show_frame(job,
                       {{"type", "frame"},
-                       {"look", frame.look.id},
+                       {"view", frame.view_request.id},
                        {"width", width},
                        {"height", height},
                        {"final", frame.coarseness.final},
@@ -196,14 +198,14 @@ void FrameServer::answer(const Job& job, const FrameJob& frame, const SceneView&
 }
 
 void FrameServer::answer(const Job& job, const StillJob& still, const SceneView& view) {
-  Look look = still.look;
-  look.width = still.still.width;
-  look.height = still.still.height;
-  const FrameRequest request = request_for(look, view, 1);
+  ViewRequest view_request = still.view_request;
+  view_request.width = still.still.width;
+  view_request.height = still.still.height;
+  const FrameRequest request = request_for(view_request, view, 1);
   check_memory_for(request, view);
   // A copy, so that the page's ranges do not change.
   viz::Painter painter = painters_[job.client];
-  const std::string bytes = png_bytes(picture(look, request, view, painter));
+  const std::string bytes = png_bytes(picture(view_request, request, view, painter));
   clients_.reply(job.client, picture_message({{"type", "still"},
                                               {"id", still.still.id},
                                               {"width", request.camera.width},
@@ -244,7 +246,7 @@ void FrameServer::answer(const Job& job, const Path& path, const SceneView& view
 }
 
 void FrameServer::answer(const Job& job, const ProbeJob& probe, const SceneView& view) {
-  FrameRequest request = request_for(probe.look, view, 1);
+  FrameRequest request = request_for(probe.view_request, view, 1);
   request.specular = view.request.specular;  // for all layers
   const double x = probe.probe.x * request.camera.width, y = probe.probe.y * request.camera.height;
   std::optional<viz::ProbeResult> found = viz::probe(renderer(view), view.scene, request, x, y);

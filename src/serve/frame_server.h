@@ -33,11 +33,11 @@ class FrameServer {
   void answer(const Job& job, const Photo& photo, const SceneView& view);
   void answer(const Job& job, const Path& path, const SceneView& view);
 
-  FrameRequest request_for(const Look& look, const SceneView& view, double divisor) const;
+  FrameRequest request_for(const ViewRequest& view_request, const SceneView& view, double divisor) const;
   // The capture's photograph, on the host. Throws InputError.
   std::shared_ptr<const ViewImages> photograph(const PhotoRef& photo) const;
-  // The picture of a Look as 8-bit colours.
-  Tensor<uint8_t> picture(const Look& look, const FrameRequest& request, const SceneView& view,
+  // The picture of a ViewRequest as 8-bit colours.
+  Tensor<uint8_t> picture(const ViewRequest& view_request, const FrameRequest& request, const SceneView& view,
                           viz::Painter& painter);
   Renderer& renderer(const SceneView& view);
   viz::Tracks tracks(const FrameRequest& request, const SceneView& view);

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/version.h"
-#include "serve/look_camera.h"
+#include "serve/view_camera.h"
 #include "viz/cameras/look_at.h"
 #include "viz/cameras/orbit.h"
 #include "viz/colour_map.h"

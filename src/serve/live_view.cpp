@@ -22,23 +22,23 @@ void ViewOptions::validate() const {
 
 LiveView::LiveView(const ViewOptions& options, SceneInfo info, TrainingHooks hooks)
     : hooks_(std::move(hooks)),
-      clients_([this](Do what) { command(what); }),
+      clients_([this](Action action) { command(action); }),
       frame_server_(clients_, std::move(info)),
       share_(options.share),
       returned_(Clock::now()) {}
 
-void LiveView::command(Do what) {
-  switch (what) {
-    case Do::pause:
+void LiveView::command(Action action) {
+  switch (action) {
+    case Action::pause:
       pause_ = true;
       break;
-    case Do::resume:
+    case Action::resume:
       pause_ = false;
       break;
-    case Do::save:
+    case Action::save:
       save_ = true;
       break;
-    case Do::stop:
+    case Action::stop:
       stop_ = true;
       hooks_.stop();
       break;

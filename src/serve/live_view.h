@@ -58,7 +58,7 @@ class LiveView {
   // Serves one job, if there is one.
   bool serve(const Allowed& allowed);
   void flush_events();
-  void command(Do what);
+  void command(Action action);
 
   TrainingHooks hooks_;
   Clients clients_;

@@ -68,7 +68,7 @@ void RunView::send_log() {
 void RunView::check_run() {
   if (!watch_ || Clients::Clock::now() - checked_ < between_checks_) return;
   const RunWatch::Change change = watch_->poll();
-  std::string trouble;
+  std::string warning;
   try {
     if (change.saved) {
       take(reread_());
@@ -77,18 +77,18 @@ void RunView::check_run() {
       move_to_device();
     }
     send_log();
-    trouble = shown_.note;
+    warning = shown_.note;
   } catch (const memory::OutOfMemory& error) {
-    trouble = std::string("No memory for what the run has saved. ") + error.what();
+    warning = std::string("No memory for what the run has saved. ") + error.what();
   } catch (const std::bad_alloc&) {
-    trouble = "No memory on this machine for what the run has saved.";
+    warning = "No memory on this machine for what the run has saved.";
   } catch (const std::exception& error) {
-    trouble = std::string("What the run has saved cannot be read. ") + error.what();
+    warning = std::string("What the run has saved cannot be read. ") + error.what();
   }
   if (change.vanished) {
-    trouble = "The run is gone from " + watch_->run().folder.string() + ". What is shown was read before.";
+    warning = "The run is gone from " + watch_->run().folder.string() + ". What is shown was read before.";
   }
-  clients_.set_warning(about_run, trouble);
+  clients_.set_warning(about_run, warning);
   checked_ = Clients::Clock::now();
 }
 

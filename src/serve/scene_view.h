@@ -13,7 +13,7 @@ namespace traceflow::serve {
 struct SceneView {
   const Scene& scene;
   RenderOptions render;
-  FrameRequest request;  // the parts of the scene to render; each Look has its own camera and time
+  FrameRequest request;  // the parts of the scene to render; each ViewRequest has its own camera and time
   int64_t iteration = 0;
 };
 

@@ -13,23 +13,23 @@ using fuzz::promise;
 
 namespace {
 
-void check(const serve::Look& look) {
-  promise(look.id >= 0, "a number is not negative");
-  promise(look.width >= 1 && look.width <= 4096 && look.height >= 1 && look.height <= 4096,
+void check(const serve::ViewRequest& view) {
+  promise(view.id >= 0, "a number is not negative");
+  promise(view.width >= 1 && view.width <= 4096 && view.height >= 1 && view.height <= 4096,
           "a size is in its range");
-  promise(look.time >= 0 && look.time <= 1, "a time is in its range");
-  promise(std::abs(look.exposure) <= 10, "an exposure is in its range");
-  promise(look.layer.size() <= 64 && look.map.size() <= 64, "a word is short");
-  const auto* free = std::get_if<Viewpoint>(&look.camera);
+  promise(view.time >= 0 && view.time <= 1, "a time is in its range");
+  promise(std::abs(view.exposure) <= 10, "an exposure is in its range");
+  promise(view.layer.size() <= 64 && view.map.size() <= 64, "a word is short");
+  const auto* free = std::get_if<Viewpoint>(&view.camera);
   if (free == nullptr)
-    return promise(std::get<serve::PhotoRef>(look.camera).index >= 0, "an index is not negative");
+    return promise(std::get<serve::PhotoRef>(view.camera).index >= 0, "an index is not negative");
   promise(free->fov_y > 0 && free->fov_y < 180, "an angle is in its range");
   promise(std::abs(determinant(free->world_from_camera) - 1) < 0.1, "a rotation is one");
   promise(length(free->position) < 1e17, "a position is finite");
 }
 
 void check(const serve::Request& request) {
-  std::visit(Overloaded{[](const serve::Look& look) { check(look); },
+  std::visit(Overloaded{[](const serve::ViewRequest& view) { check(view); },
                         [](const serve::Still& still) {
                           promise(still.width >= 1 && still.width <= 8192 && still.height >= 1 &&
                                       still.height <= 8192,
@@ -57,7 +57,7 @@ void check(const serve::Outgoing& message) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   std::string_view rest(reinterpret_cast<const char*>(data), size);
-  serve::Clients clients([](serve::Do) {});
+  serve::Clients clients([](serve::Action) {});
   clients.set_hello("{}");
   clients.on_connect(1, [](const serve::Outgoing& message) { check(message); });
   while (!rest.empty()) {

@@ -298,35 +298,36 @@ def models_of_colmap():
 def messages():
     camera = {"position": [1, 2, 3], "rotation": [[0, -1, 0], [0, 0, -1], [1, 0, 0]], "fov_y": 40}
     shape = {"time": 0, "width": 96, "height": 54, "layer": "rgb", "exposure": 0, "map": "viridis", "moving": True}
-    look = {"type": "look", "id": 1, "camera": camera, **shape}
+    view = {"type": "view", "id": 1, "camera": camera, **shape}
     key = {**camera, "time": 0, "seconds": 1}
     path = {"format": "traceflow camera path", "version": 1, "width": 96, "height": 54, "fps": 30, "closed": True,
             "keyframes": [key, {**key, "position": [0, 0, 0], "time": 1}]}
     layers = [("normal", "turbo"), ("depth", "viridis"), ("specular", ""), ("é", "\t"), ("x" * 64, "y" * 64)]
     talks = {
-        "moves": [look, {**look, "id": 2, "time": 0.5}, {**look, "id": 3, "moving": False},
-                  {"type": "seen", "frame": 1}, {"type": "seen", "frame": 3},
-                  {**look, "id": 4, "width": 4096, "height": 4096}],
-        "layers": [{**look, "id": i, "layer": layer, "map": colours, "exposure": 2 * i - 5, "moving": False}
+        "moves": [view, {**view, "id": 2, "time": 0.5}, {**view, "id": 3, "moving": False},
+                  {"type": "frame_shown", "frame": 1}, {"type": "frame_shown", "frame": 3},
+                  {**view, "id": 4, "width": 4096, "height": 4096}],
+        "layers": [{**view, "id": i, "layer": layer, "map": colours, "exposure": 2 * i - 5, "moving": False}
                    for i, (layer, colours) in enumerate(layers)],
-        "photos": [{"type": "look", "id": 1, "photo": {"split": "train", "index": 0}, **shape},
-                   {"type": "look", "id": 2, "photo": {"split": "test", "index": 1000000}, **shape},
+        "photos": [{"type": "view", "id": 1, "photo": {"split": "train", "index": 0}, **shape},
+                   {"type": "view", "id": 2, "photo": {"split": "test", "index": 1000000}, **shape},
                    {"type": "photo", "split": "test", "index": 2, "width": 4096},
                    {"type": "photo", "split": "all", "index": 0, "width": 50}],
-        "probes": [look, {"type": "probe", "id": 2, "x": 0, "y": 1}, {"type": "probe", "id": 3, "x": 1e-300, "y": 0.5},
+        "probes": [view, {"type": "probe", "id": 2, "x": 0, "y": 1}, {"type": "probe", "id": 3, "x": 1e-300, "y": 0.5},
                    {"type": "probe", "id": 4, "x": -0.1, "y": 2}],
-        "stills": [{"type": "still", "id": 1, "width": 8192, "height": 1}, look,
+        "stills": [{"type": "still", "id": 1, "width": 8192, "height": 1}, view,
                    {"type": "still", "id": 2, "width": 1, "height": 8192},
                    {"type": "still", "id": 2 ** 53, "width": 0, "height": 8193}],
         "paths": [{"type": "path", "id": 5, "path": path}, {"type": "path", "id": 6, "path": [None, {}, "text", -0.0]}],
         "commands": [{"type": "command", "do": word} for word in ("pause", "resume", "save", "stop", "start")],
-        "rests": [look, {"type": "sleep"}, {"type": "seen", "frame": 2 ** 53}, {**look, "id": 9}, {"type": "sleep"}],
-        "refused": [{"type": "look"}, {"type": 1}, {**look, "time": 2}, {**look, "id": 0.5}, {**look, "camera": {}},
+        "rests": [view, {"type": "sleep"}, {"type": "frame_shown", "frame": 2 ** 53}, {**view, "id": 9},
+                  {"type": "sleep"}],
+        "refused": [{"type": "view"}, {"type": 1}, {**view, "time": 2}, {**view, "id": 0.5}, {**view, "camera": {}},
                     [], None],
     }
     for name, talk in talks.items():
         put("message", name, "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in talk))
-    put("message", "broken", b'{"type":"look"\n\n{"type":"sleep"}}\n\xff\n' + b"[" * 300
+    put("message", "broken", b'{"type":"view"\n\n{"type":"sleep"}}\n\xff\n' + b"[" * 300
         + b'\n{"type":"\\ud800","id":1}\n1e400')
 
 

@@ -18,8 +18,8 @@ namespace {
 
 using nlohmann::json;
 using serve::testing::FakePage;
-using serve::testing::look;
 using serve::testing::Received;
+using serve::testing::view_request;
 
 // A page that looks at the scene that a training begins with.
 struct Screening {
@@ -37,7 +37,7 @@ struct Screening {
   void project() {
     while (const auto job = clients.next()) {
       frame_server.answer(*job, stage());
-      page.see_frames();
+      page.acknowledge_frames();
     }
   }
   // What comes of a message.
@@ -46,7 +46,7 @@ struct Screening {
     project();
     return page.of(type);
   }
-  // The last Look's pixels.
+  // The last ViewRequest's pixels.
   Tensor<uint8_t> still(int width, int height) {
     const std::string png =
         answer({{"type", "still"}, {"id", 1}, {"width", width}, {"height", height}}, "still").back().picture;
@@ -63,7 +63,7 @@ struct Screening {
 };
 
 json at_photo(int64_t id, const std::string& layer) {
-  json message = look(id);
+  json message = view_request(id);
   message["photo"] = {{"split", "train"}, {"index", 1}};
   message["layer"] = layer;
   return message;
@@ -95,10 +95,10 @@ TEST(FrameServer, GreetsWithWhatThereIsToSee) {
 
 TEST(FrameServer, SendsFramesOfTheSizesThatItNames) {
   Screening s("sizes");
-  const std::vector<Received> frames = s.answer(look(4), "frame");
+  const std::vector<Received> frames = s.answer(view_request(4), "frame");
   ASSERT_GE(frames.size(), 2U);
   const json& last = frames.back().json;
-  EXPECT_EQ(last["look"], 4);
+  EXPECT_EQ(last["view"], 4);
   EXPECT_EQ(last["width"], 96);
   EXPECT_EQ(last["height"], 64);
   EXPECT_EQ(last["final"], true);
@@ -136,7 +136,7 @@ TEST(FrameServer, AFreeCameraStandsWhereItIsPut) {
   s.frame_server.send_hello(s.stage());
   const Camera<float>& camera = s.trainer.capture().train[1].camera;
   const json told = s.page.of("hello").at(0).json["cameras"]["train"][1];
-  json message = look(1);
+  json message = view_request(1);
   message["camera"] = {
       {"position", told["position"]}, {"rotation", told["rotation"]}, {"fov_y", told["fov_y"]}};
   s.page.say(message);
@@ -182,7 +182,7 @@ TEST(FrameServer, DrawsThePathsOfWhatMoves) {
     s.page.say({{"type", "still"}, {"id", 1}, {"width", 40}, {"height", 24}});
     while (const auto job = s.clients.next()) {
       s.frame_server.answer(*job, stage);
-      s.page.see_frames();
+      s.page.acknowledge_frames();
     }
     return s.page.of("still").back().picture;
   };
@@ -254,17 +254,17 @@ TEST(FrameServer, SaysWhatARayMeets) {
 
 TEST(FrameServer, SaysInWordsWhatItCannotShow) {
   Screening s("refuses");
-  json no_layer = look(1);
+  json no_layer = view_request(1);
   no_layer["layer"] = "smell";
   EXPECT_THAT(s.answer(no_layer, "refused").back().json["text"].get<std::string>(),
               ::testing::HasSubstr("smell"));
-  json no_map = look(2);
+  json no_map = view_request(2);
   no_map["map"] = "rainbow";
   EXPECT_EQ(s.answer(no_map, "refused").size(), 2U);
-  json no_photo = look(3);
+  json no_photo = view_request(3);
   no_photo["layer"] = "difference";
   EXPECT_EQ(s.answer(no_photo, "refused").size(), 3U);
-  json no_view = look(4);
+  json no_view = view_request(4);
   no_view["photo"] = {{"split", "test"}, {"index", 999}};
   EXPECT_EQ(s.answer(no_view, "refused").size(), 4U);
   EXPECT_EQ(s.answer({{"type", "photo"}, {"split", "test"}, {"index", 999}, {"width", 9}}, "refused").size(),
@@ -277,7 +277,7 @@ TEST(FrameServer, SaysInWordsWhatItCannotShow) {
 TEST(FrameServer, DoesNotBeginAPictureForWhichThereIsNoMemory) {
   Screening s("memory");
   const int side = 100'000'000;
-  Look huge;
+  ViewRequest huge;
   huge.id = 1;
   huge.camera = Viewpoint{};
   huge.width = huge.height = side;
@@ -289,10 +289,10 @@ TEST(FrameServer, DoesNotBeginAPictureForWhichThereIsNoMemory) {
 
   s.frame_server.answer(Job{1, FrameJob{huge, Coarseness{}}}, s.stage());
   EXPECT_EQ(s.page.of("refused").size(), 1U) << "coarser frames come in its place";
-  EXPECT_THAT(s.page.of("trouble").at(0).json["text"].get<std::string>(), ::testing::StartsWith("No memory"));
+  EXPECT_THAT(s.page.of("warning").at(0).json["text"].get<std::string>(), ::testing::StartsWith("No memory"));
   EXPECT_TRUE(s.clients.any_lacks_memory());
 
-  // It is the frame's size that counts, not the Look's.
+  // It is the frame's size that counts, not the ViewRequest's.
   huge.layer = "rgb";
   s.frame_server.answer(Job{1, FrameJob{huge, Coarseness{side / 20.0, 75, false}}}, s.stage());
   EXPECT_EQ(s.page.of("frame").at(0).json["width"], 20);
@@ -304,7 +304,7 @@ TEST(FrameServer, RemembersNothingThatChangesAPicture) {
   s.page.say(at_photo(1, "rgb"));
   const Tensor<uint8_t> before = s.still(40, 24);
   FakePage other(s.clients, 2);
-  auto elsewhere = look(1);
+  auto elsewhere = view_request(1);
   elsewhere["time"] = 0.7;
   other.say(elsewhere);
   s.project();

@@ -13,7 +13,7 @@ namespace traceflow::serve {
 namespace {
 
 using serve::testing::FakePage;
-using serve::testing::look;
+using serve::testing::view_request;
 
 // A small training that is watched.
 struct WatchedRun {
@@ -46,10 +46,10 @@ class Wanderer {
   explicit Wanderer(FakePage& page)
       : thread_([this, &page] {
           for (int64_t id = 1; !over_; ++id) {
-            auto message = look(id, id % 3 != 0);
+            auto message = view_request(id, id % 3 != 0);
             message["camera"]["position"][0] = 0.1 * static_cast<double>(id % 10);
             page.say(message);
-            page.see_frames();
+            page.acknowledge_frames();
             std::this_thread::sleep_for(std::chrono::milliseconds(2));
           }
         }) {}
@@ -115,7 +115,7 @@ TEST(LiveView, APauseHoldsTheIterationAndGoesOnShowing) {
   ASSERT_TRUE(wait_for(true));
   const auto held_at = page.of("state").back().json["iteration"].get<int64_t>();
   EXPECT_EQ(held_at, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   ASSERT_TRUE(page.wait_for("frame", 1));
   EXPECT_EQ(page.of("frame")[0].json["iteration"], held_at);
   page.say({{"type", "command"}, {"do", "save"}});
@@ -143,7 +143,7 @@ TEST(LiveView, StaysUntilTheLastPageHasLeft) {
   FakePage page(watched.view.handler(), 1);
   watched.trainer.run(watched.stop);
   std::thread leaving([&] {
-    page.say(look(1));
+    page.say(view_request(1));
     EXPECT_TRUE(page.wait_for("frame", 1));
     page.leave();
   });
@@ -160,7 +160,7 @@ TEST(LiveView, ASaveThatFailsEndsNothing) {
   FakePage page(watched.view.handler(), 1);
   page.say({{"type", "command"}, {"do", "save"}});
   EXPECT_EQ(watched.trainer.run(watched.stop).ending, events::Ending::completed);
-  EXPECT_THAT(page.of("trouble").at(0).json["text"].get<std::string>(), ::testing::HasSubstr("full"));
+  EXPECT_THAT(page.of("warning").at(0).json["text"].get<std::string>(), ::testing::HasSubstr("full"));
 }
 
 TEST(LiveView, StaysForThePageThatStoppedItAndForNobodyElse) {

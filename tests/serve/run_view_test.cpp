@@ -15,11 +15,11 @@ namespace traceflow::serve {
 namespace {
 
 using serve::testing::FakePage;
-using serve::testing::look;
+using serve::testing::view_request;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// A run that is trained here and followed as by another process, by looks that the test makes.
+// A run that is trained here and followed as by another process; checked when a test says so.
 class FollowedRun {
  public:
   explicit FollowedRun(const std::string& name)
@@ -47,18 +47,18 @@ class FollowedRun {
   }
   void damage() const { fs::resize_file(run_.checkpoint(), 100); }
   void log(const std::string& text) const { std::ofstream(run_.log(), std::ios::app) << text; }
-  void look_after_run() { view_->turn({}); }
+  void check_run() { view_->turn({}); }
 
   // What the page knows.
   int64_t iteration() const { return page_->of("state").back().json["iteration"]; }
-  std::string trouble() const {
-    const auto all = page_->of("trouble");
+  std::string warning() const {
+    const auto all = page_->of("warning");
     return all.empty() ? "" : all.back().json["text"];
   }
-  // The iteration of the picture of a new look.
+  // The iteration of the picture of a new ViewRequest.
   int64_t pictured() {
-    page_->see_frames();
-    page_->say(look(++looks_));
+    page_->acknowledge_frames();
+    page_->say(view_request(++view_requests_));
     const size_t before = page_->of("frame").size();
     view_->turn({});
     const auto frames = page_->of("frame");
@@ -96,37 +96,37 @@ class FollowedRun {
   Trainer trainer_;
   std::optional<RunView> view_;
   std::optional<FakePage> page_;
-  int64_t looks_ = 0;
+  int64_t view_requests_ = 0;
   int reads_ = 0;
 };
 
 TEST(RunView, ShowsANewCheckpoint) {
   FollowedRun r("new_checkpoint");
   r.follow();
-  r.look_after_run();
+  r.check_run();
   EXPECT_EQ(r.reads(), 0);
   EXPECT_EQ(r.iteration(), 2);
   EXPECT_EQ(r.pictured(), 2);
   r.train_to(4);
-  r.look_after_run();
+  r.check_run();
   EXPECT_EQ(r.iteration(), 4);
   EXPECT_EQ(r.pictured(), 4);
-  r.look_after_run();
+  r.check_run();
   EXPECT_EQ(r.reads(), 1);
-  EXPECT_EQ(r.trouble(), "");
+  EXPECT_EQ(r.warning(), "");
 }
 
-TEST(RunView, ADamagedCheckpointIsTroubleUntilAGoodOneComes) {
+TEST(RunView, ADamagedCheckpointIsAWarningUntilAGoodOneComes) {
   FollowedRun r("damaged");
   r.follow();
   r.damage();
-  r.look_after_run();
-  EXPECT_THAT(r.trouble(), HasSubstr("cannot be read"));
+  r.check_run();
+  EXPECT_THAT(r.warning(), HasSubstr("cannot be read"));
   EXPECT_EQ(r.iteration(), 2);
   EXPECT_EQ(r.pictured(), 2);
   r.train_to(4);
-  r.look_after_run();
-  EXPECT_EQ(r.trouble(), "");
+  r.check_run();
+  EXPECT_EQ(r.warning(), "");
   EXPECT_EQ(r.iteration(), 4);
   EXPECT_EQ(r.pictured(), 4);
 }
@@ -140,14 +140,14 @@ TEST(RunView, WhatCouldNotBeReadIsReadAgain) {
       [] { throw fs::filesystem_error("no", std::make_error_code(std::errc::io_error)); }};
   for (const auto& failure : failures) {
     r.before_reading = failure;
-    EXPECT_NO_THROW(r.look_after_run());
-    EXPECT_NE(r.trouble(), "");
+    EXPECT_NO_THROW(r.check_run());
+    EXPECT_NE(r.warning(), "");
     EXPECT_EQ(r.iteration(), 2);
     EXPECT_EQ(r.pictured(), 2);
   }
   r.before_reading = [] {};
-  r.look_after_run();
-  EXPECT_EQ(r.trouble(), "");
+  r.check_run();
+  EXPECT_EQ(r.warning(), "");
   EXPECT_EQ(r.iteration(), 4);
 }
 
@@ -157,29 +157,29 @@ TEST(RunView, TellsWhenItIsTheCheckpointBefore) {
   r.train_to(4);
   r.train_to(6);
   r.damage();
-  r.look_after_run();
+  r.check_run();
   EXPECT_EQ(r.iteration(), 4);
-  EXPECT_THAT(r.trouble(), HasSubstr("using the checkpoint before it"));
-  r.look_after_run();
+  EXPECT_THAT(r.warning(), HasSubstr("using the checkpoint before it"));
+  r.check_run();
   EXPECT_EQ(r.reads(), 1) << "there is nothing else to read";
-  EXPECT_THAT(r.trouble(), HasSubstr("using the checkpoint before it"));
+  EXPECT_THAT(r.warning(), HasSubstr("using the checkpoint before it"));
   r.train_to(8);
-  r.look_after_run();
+  r.check_run();
   EXPECT_EQ(r.iteration(), 8);
-  EXPECT_EQ(r.trouble(), "");
+  EXPECT_EQ(r.warning(), "");
 }
 
-TEST(RunView, ARunThatIsGoneIsTroubleUntilItIsBack) {
+TEST(RunView, ARunThatIsGoneIsAWarningUntilItIsBack) {
   FollowedRun r("gone");
   r.follow();
   const fs::path away = r.run().folder.parent_path() / "away";
   fs::rename(r.run().folder, away);
-  r.look_after_run();
-  EXPECT_THAT(r.trouble(), HasSubstr("The run is gone from " + r.run().folder.string()));
+  r.check_run();
+  EXPECT_THAT(r.warning(), HasSubstr("The run is gone from " + r.run().folder.string()));
   EXPECT_EQ(r.pictured(), 2);
   fs::rename(away, r.run().folder);
-  r.look_after_run();
-  EXPECT_EQ(r.trouble(), "");
+  r.check_run();
+  EXPECT_EQ(r.warning(), "");
   EXPECT_EQ(r.reads(), 0);
 }
 
@@ -199,13 +199,13 @@ TEST(RunView, TellsTheLogAsItGrows) {
   r.follow();
   EXPECT_THAT(r.last_events(), ElementsAre("new", "started 0", "step 1"));
   r.log(step(2));
-  r.look_after_run();
+  r.check_run();
   EXPECT_THAT(r.last_events(), ElementsAre("step 2"));
   const size_t told = r.messages_of_events();
-  r.look_after_run();
+  r.check_run();
   EXPECT_EQ(r.messages_of_events(), told) << "nothing new";
   r.log(start(1) + step(2));
-  r.look_after_run();
+  r.check_run();
   EXPECT_THAT(r.last_events(), ElementsAre("new", "started 0", "step 1", "started 1", "step 2"));
 }
 

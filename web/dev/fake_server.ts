@@ -130,9 +130,9 @@ if (source === 'training') {
   }, 400);
 }
 
-// What goes wrong, on demand: a line on standard input becomes the trouble, an empty one ends it.
+// What goes wrong, on demand: a line on standard input becomes the warning, an empty one ends it.
 process.stdin.on('data', (text: Buffer) =>
-  guests.forEach((g) => g.tell({ type: 'trouble', text: String(text).trim() })),
+  guests.forEach((g) => g.tell({ type: 'warning', text: String(text).trim() })),
 );
 process.stdin.unref?.();
 

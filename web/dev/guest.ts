@@ -1,5 +1,14 @@
 import type { WebSocket } from 'ws';
-import type { Camera, CameraPath, Hello, Look, PathReply, PictureHeader, Reply, Request } from '../src/messages.ts';
+import type {
+  Camera,
+  CameraPath,
+  Hello,
+  PathReply,
+  PictureHeader,
+  Reply,
+  Request,
+  ViewRequest,
+} from '../src/messages.ts';
 import { between } from '../src/math/flight.ts';
 import { ray_through } from '../src/math/camera.ts';
 import { png } from './png.ts';
@@ -16,10 +25,10 @@ const steps = [8, 4, 2, 1]; // how many times coarser, one after the other
 
 // One page that is connected.
 export class Guest {
-  private look: Look | null = null;
+  private view: ViewRequest | null = null;
   private step = 0;
   private frame = 0;
-  private seen = 0;
+  private shown = 0;
   private busy = false;
   private readonly socket: WebSocket;
   private readonly host: Host;
@@ -36,7 +45,7 @@ export class Guest {
 
   // The scene has changed.
   refresh(): void {
-    this.step = this.look?.moving ? 0 : 2;
+    this.step = this.view?.moving ? 0 : 2;
     this.work();
   }
 
@@ -49,39 +58,40 @@ export class Guest {
 
   private hear(request: Request): void {
     switch (request.type) {
-      case 'look':
-        this.look = request;
+      case 'view':
+        this.view = request;
         this.step = 0;
         return this.work();
       case 'sleep':
-        this.look = null;
+        this.view = null;
         return;
-      case 'seen':
-        this.seen = Math.max(this.seen, request.frame);
+      case 'frame_shown':
+        this.shown = Math.max(this.shown, request.frame);
         return this.work();
       case 'command':
         return this.host.command(request.do);
       case 'photo': {
-        const view = this.host.hello.cameras[request.split][request.index];
-        if (!view) return this.tell({ type: 'refused', request: 'photo', id: 0, text: 'There is no such photograph.' });
-        const width = Math.min(request.width, view.width);
-        const height = Math.round((width * view.height) / view.width);
+        const captured = this.host.hello.cameras[request.split][request.index];
+        if (!captured)
+          return this.tell({ type: 'refused', request: 'photo', id: 0, text: 'There is no such photograph.' });
+        const width = Math.min(request.width, captured.width);
+        const height = Math.round((width * captured.height) / captured.width);
         const wanted = { layer: 'photograph', exposure: 0, map: '' };
         const { split, index } = request;
-        return void render(view, view.time, width, height, wanted).then((rows) => {
+        return void render(captured, captured.time, width, height, wanted).then((rows) => {
           if (rows)
             this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
         });
       }
       case 'probe': {
         const from = this.camera();
-        if (!this.look || !from) return;
-        const along = ray_through(from, this.look.width / this.look.height, request);
-        return this.tell(probe(from, this.look.time, along, request.id));
+        if (!this.view || !from) return;
+        const along = ray_through(from, this.view.width / this.view.height, request);
+        return this.tell(probe(from, this.view.time, along, request.id));
       }
       case 'still': {
         const from = this.camera();
-        if (!this.look || !from) return;
+        if (!this.view || !from) return;
         const { id, width, height } = request;
         if (width * height > 3e7)
           return this.tell({
@@ -90,7 +100,7 @@ export class Guest {
             id,
             text: 'A picture of this size would not fit into memory.',
           });
-        return void render(from, this.look.time, width, height, this.look).then((rows) => {
+        return void render(from, this.view.time, width, height, this.view).then((rows) => {
           if (rows) this.picture({ type: 'still', id, width, height, format: 'png' }, png(rows, width, height));
         });
       }
@@ -100,12 +110,12 @@ export class Guest {
   }
 
   private camera(): Camera | undefined {
-    const ref = this.look?.photo;
-    return ref ? this.host.hello.cameras[ref.split][ref.index] : this.look?.camera;
+    const ref = this.view?.photo;
+    return ref ? this.host.hello.cameras[ref.split][ref.index] : this.view?.camera;
   }
 
   private work(): void {
-    if (this.busy || !this.look || this.frame - this.seen >= 2 || this.step >= steps.length) return;
+    if (this.busy || !this.view || this.frame - this.shown >= 2 || this.step >= steps.length) return;
     this.busy = true;
     setTimeout(() => {
       void this.draw().then(() => {
@@ -116,24 +126,24 @@ export class Guest {
   }
 
   private async draw(): Promise<void> {
-    const { look } = this;
+    const { view } = this;
     const from = this.camera();
-    if (!look || !from) return;
-    const coarse = look.moving ? Math.max(2, Math.sqrt((look.width * look.height) / 30000)) : (steps[this.step] ?? 1);
-    const width = Math.max(1, Math.round(look.width / coarse));
-    const height = Math.max(1, Math.round(look.height / coarse));
+    if (!view || !from) return;
+    const coarse = view.moving ? Math.max(2, Math.sqrt((view.width * view.height) / 30000)) : (steps[this.step] ?? 1);
+    const width = Math.max(1, Math.round(view.width / coarse));
+    const height = Math.max(1, Math.round(view.height / coarse));
     const begin = performance.now();
-    const rows = await render(from, look.time, width, height, look, () => !look.moving && look !== this.look);
+    const rows = await render(from, view.time, width, height, view, () => !view.moving && view !== this.view);
     if (!rows) return;
     const bytes = png(rows, width, height);
-    this.step = look.moving ? steps.length : this.step + 1;
+    this.step = view.moving ? steps.length : this.step + 1;
     const header = {
       type: 'frame' as const,
       frame: ++this.frame,
-      look: look.id,
+      view: view.id,
       width,
       height,
-      final: !look.moving && this.step === steps.length,
+      final: !view.moving && this.step === steps.length,
       milliseconds: performance.now() - begin,
       iteration: this.host.iteration(),
       format: 'jpeg' as const,

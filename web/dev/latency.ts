@@ -1,23 +1,23 @@
 import { pause, percentile, Visitor } from './visitor.ts';
 
-// How soon a look is answered: node .build/dev/latency.js ADDRESS [WIDTH HEIGHT [LOOKS]]. First a camera that turns without end, a look
-// as soon as the last one is answered; then single looks at rest, until their last, full frame.
+// How soon a ViewRequest is answered: node .build/dev/latency.js ADDRESS [WIDTH HEIGHT [REQUESTS]]. First a camera that turns without end,
+// a request as soon as the last one is answered; then single requests at rest, until their last, full frame.
 
-const [address = '', width = '480', height = '270', looks = '150'] = process.argv.slice(2);
+const [address = '', width = '480', height = '270', requests = '150'] = process.argv.slice(2);
 const visitor = await Visitor.enter(address);
 const size = [Number(width), Number(height)] as const;
 const next_frame = (): Promise<void> => new Promise((come) => (visitor.onframe = () => come()));
 
 let sizes = 0;
 const start = performance.now();
-for (let turn = 0; turn < Number(looks); turn++) {
+for (let turn = 0; turn < Number(requests); turn++) {
   const come = next_frame();
-  visitor.look(0.05 * turn, ...size, true);
+  visitor.request_view(0.05 * turn, ...size, true);
   await come;
   if (turn === 20) visitor.latencies = [];
-  sizes += (visitor.last?.width ?? 0) / size[0] / Number(looks);
+  sizes += (visitor.last?.width ?? 0) / size[0] / Number(requests);
 }
-const rate = Number(looks) / ((performance.now() - start) / 1000);
+const rate = Number(requests) / ((performance.now() - start) / 1000);
 const tell = (what: string, values: readonly number[]): void =>
   console.log(`${what}: median ${percentile(values, 0.5).toFixed(0)} ms, 95 % within ${percentile(values, 0.95).toFixed(0)} ms`);
 tell(`turning, ${rate.toFixed(1)} frames/s, ${(100 * sizes).toFixed(0)} % of the width; input to frame`, visitor.latencies);
@@ -27,7 +27,7 @@ const whole: number[] = [];
 for (let turn = 0; turn < 20; turn++) {
   const asked = performance.now();
   visitor.latencies = [];
-  visitor.look(turn, ...size, false);
+  visitor.request_view(turn, ...size, false);
   do await next_frame();
   while (!visitor.last?.final);
   whole.push(performance.now() - asked);

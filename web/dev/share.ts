@@ -13,9 +13,9 @@ const totals = new Map(kinds.map((kind) => [kind, { iterations: 0, seconds: 0, f
 for (let round = 0; round < Number(rounds); round++) {
   for (const kind of kinds) {
     let turn = 0;
-    visitor.onframe = () => kind === 'moving' && visitor.look((turn += 0.1), ...size, true);
+    visitor.onframe = () => kind === 'moving' && visitor.request_view((turn += 0.1), ...size, true);
     if (kind === 'nobody') visitor.say({ type: 'sleep' });
-    else visitor.look(turn, ...size, kind === 'moving');
+    else visitor.request_view(turn, ...size, kind === 'moving');
     await pause(1000); // what was begun ends, and the state is told
     const total = totals.get(kind);
     if (!total) break;

@@ -22,7 +22,7 @@ async function visit(): Promise<void> {
   const layers = visitor.hello?.layers ?? [];
   for (let turn = 0; turn < between(5, 30); turn++) {
     const layer = layers[Math.floor(Math.random() * layers.length)]?.name ?? 'rgb';
-    visitor.look(turn, width, height, Math.random() < 0.7, { layer, time: Math.random(), ...(layer === 'difference' ? { photo: { split: 'test', index: 0 } } : {}) });
+    visitor.request_view(turn, width, height, Math.random() < 0.7, { layer, time: Math.random(), ...(layer === 'difference' ? { photo: { split: 'test', index: 0 } } : {}) });
     if (Math.random() < 0.1) visitor.say({ type: 'still', id: 1, width: 320, height: 180 });
     if (Math.random() < 0.1) visitor.say({ type: 'photo', split: 'train', index: 0, width: 480 });
     if (Math.random() < 0.2) visitor.say({ type: 'probe', id: 1, x: Math.random(), y: Math.random() });

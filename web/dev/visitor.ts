@@ -1,18 +1,18 @@
 import { WebSocket } from 'ws';
-import type { FrameHeader, Hello, Look, PictureHeader, Reply, Request, State } from '../src/messages.ts';
+import type { FrameHeader, Hello, PictureHeader, Reply, Request, State, ViewRequest } from '../src/messages.ts';
 
 // A page without a browser: it connects to the program as the page does, and counts what comes.
 export class Visitor {
   frames = 0;
   bytes = 0;
-  latencies: number[] = []; // ms from a look to the first frame of it
+  latencies: number[] = []; // ms from a ViewRequest to its first frame
   hello: Hello | undefined;
   state: State | undefined;
   last: FrameHeader | undefined;
   trained = 0; // seconds that went into the training, of its last step
   private readonly asked = new Map<number, number>();
   private readonly socket: WebSocket;
-  private look_id = 0;
+  private view_id = 0;
   onframe: (header: FrameHeader) => void = () => undefined;
 
   private constructor(socket: WebSocket) {
@@ -39,17 +39,17 @@ export class Visitor {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
   }
 
-  // Looks from beside the first camera, so far as `turn` says.
-  look(turn: number, width: number, height: number, moving: boolean, more: Partial<Look> = {}): void {
+  // Requests the view from beside the first camera, at the angle `turn`.
+  request_view(turn: number, width: number, height: number, moving: boolean, more: Partial<ViewRequest> = {}): void {
     if (!this.hello) return;
     const { start, extent } = this.hello;
     const position: [number, number, number] = [...start.position];
     position[0] += 0.05 * extent * Math.sin(turn);
     position[1] += 0.05 * extent * Math.cos(turn);
-    this.look_id += 1;
-    this.asked.set(this.look_id, performance.now());
-    const look: Look = { type: 'look', id: this.look_id, time: 0, width, height, layer: 'rgb', exposure: 0, map: 'viridis', moving, ...more };
-    this.say(look.photo ? look : { ...look, camera: { ...start, position } });
+    this.view_id += 1;
+    this.asked.set(this.view_id, performance.now());
+    const view: ViewRequest = { type: 'view', id: this.view_id, time: 0, width, height, layer: 'rgb', exposure: 0, map: 'viridis', moving, ...more };
+    this.say(view.photo ? view : { ...view, camera: { ...start, position } });
   }
 
   leave(): void {
@@ -76,10 +76,10 @@ export class Visitor {
     if (header.type !== 'frame') return;
     this.frames += 1;
     this.last = header;
-    const since = this.asked.get(header.look);
+    const since = this.asked.get(header.view);
     if (since !== undefined) this.latencies.push(performance.now() - since);
-    for (const id of this.asked.keys()) if (id <= header.look) this.asked.delete(id);
-    this.say({ type: 'seen', frame: header.frame });
+    for (const id of this.asked.keys()) if (id <= header.view) this.asked.delete(id);
+    this.say({ type: 'frame_shown', frame: header.frame });
     this.onframe(header);
   }
 }

@@ -1,7 +1,7 @@
 // What the page lets tests see, as window.traceflow.
 export interface ForTests {
   frames: number; // painted so far
-  lastFrame: { look: number; width: number; height: number; final: boolean } | null;
+  lastFrame: { view: number; width: number; height: number; final: boolean } | null;
   latencies: number[]; // ms from input to the first frame that shows it
   readonly connected: boolean;
 }

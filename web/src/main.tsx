@@ -2,7 +2,7 @@ import { computed, effect, untracked } from '@preact/signals';
 import { render } from 'preact';
 import { App } from './App.tsx';
 import { hide_token } from './net/token.ts';
-import { start_looking, looker } from './stage/looking.ts';
+import { start_requesting_views, view_requester } from './stage/view_requests.ts';
 import { forget_request, paint, request_photograph, show_frame, show_photograph } from './stage/pictures.ts';
 import { forget_probes, take_probe } from './state/rays.ts';
 import { refuse_path, take_path } from './state/path.ts';
@@ -24,7 +24,7 @@ start_connection({
   probe: take_probe,
   path: take_path,
   refused(reply) {
-    if (reply.request === 'look') looker.refused(reply.id);
+    if (reply.request === 'view') view_requester.refused(reply.id);
     if (reply.request === 'path') refuse_path(reply.id);
     // Without a request it is whatever was asked last: there were too many questions.
     if (reply.request === 'probe' || reply.request === '') forget_probes();
@@ -34,11 +34,11 @@ start_connection({
     forget_request();
     forget_probes();
     give_up_still();
-    looker.restart();
+    view_requester.restart();
   },
 });
 
-start_looking();
+start_requesting_views();
 effect(request_photograph);
 const angle = computed(() => camera.value?.fov_y);
 effect(() => {

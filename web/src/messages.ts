@@ -25,13 +25,13 @@ export interface PhotoRef {
 }
 
 // What the server takes at most; src/serve/clients/messages.cpp and src/serve/net/limits.h have these too.
-export const look_side = 4096; // pixels, width and height
+export const view_side = 4096; // pixels, width and height
 export const still_side = 8192;
 export const message_bytes = 64 * 1024; // a longer message ends the connection
 
 // What to show from now on; the newest one counts. Coarse while `moving`, then finer up to width × height.
-export interface Look {
-  type: 'look';
+export interface ViewRequest {
+  type: 'view';
   id: number; // rising; frames name it
   camera?: Camera; // this or photo
   photo?: PhotoRef; // exactly that view's camera; the picture has the photograph's aspect ratio
@@ -44,18 +44,18 @@ export interface Look {
   moving: boolean;
 }
 
-// Nobody looks (the page is hidden): nothing is rendered until the next Look.
+// The page is hidden: nothing is rendered until the next ViewRequest.
 export interface Sleep {
   type: 'sleep';
 }
 
 // A frame has been shown. The server sends no more than two frames ahead of these.
-export interface Seen {
-  type: 'seen';
+export interface FrameShown {
+  type: 'frame_shown';
   frame: number;
 }
 
-// What the ray through a point of the last Look's picture meets.
+// What the ray through a point of the last ViewRequest's picture meets.
 export interface Probe {
   type: 'probe';
   id: number;
@@ -63,7 +63,7 @@ export interface Probe {
   y: number; // 0 (top) to 1
 }
 
-// The last Look as a PNG of this size.
+// The last ViewRequest's picture as a PNG of this size.
 export interface Still {
   type: 'still';
   id: number;
@@ -90,7 +90,7 @@ export interface Command {
 }
 
 // What the page sends, as JSON text.
-export type Request = Look | Sleep | Seen | Probe | Still | PhotoRequest | PathRequest | Command;
+export type Request = ViewRequest | Sleep | FrameShown | Probe | Still | PhotoRequest | PathRequest | Command;
 
 // The file that `traceflow render --camera-path` takes.
 export interface CameraPath {
@@ -177,18 +177,18 @@ export interface Refused {
 }
 
 // Something is wrong on the server's side: the run's folder vanished, the device is out of memory. Empty text: it is over.
-export interface Trouble {
-  type: 'trouble';
+export interface Warning {
+  type: 'warning';
   text: string;
 }
 
 // What the server sends as JSON text.
-export type Reply = Hello | State | Events | ProbeReply | PathReply | Refused | Trouble;
+export type Reply = Hello | State | Events | ProbeReply | PathReply | Refused | Warning;
 
 export interface FrameHeader {
   type: 'frame';
-  frame: number; // for Seen
-  look: number; // id of the Look that it answers
+  frame: number; // for FrameShown
+  view: number; // id of the ViewRequest that it answers
   width: number;
   height: number;
   final: boolean; // it will not get finer

@@ -14,14 +14,14 @@ constexpr std::chrono::seconds coarse_for{30}, retry_after{1};
 
 }  // namespace
 
-void Client::look(const Look& look) {
-  look_ = look;
+void Client::request_view(const ViewRequest& view_request) {
+  view_request_ = view_request;
   asleep_ = false;
   shown_divisor_ = std::numeric_limits<double>::infinity();
   shown_final_ = false;
 }
 
-void Client::seen(int64_t frame, Clock::time_point now) {
+void Client::frame_shown(int64_t frame, Clock::time_point now) {
   while (!in_flight_.empty() && in_flight_.front().frame <= frame) {
     const Sent& sent = in_flight_.front();
     pacer_.displayed(sent.bytes, std::chrono::duration<double>(now - sent.when).count());
@@ -35,45 +35,48 @@ bool Client::ask(const Question& question) {
   return true;
 }
 
-void Client::drop_look(int64_t look) {
-  if (look_ && look_->id == look) look_.reset();
+void Client::drop_view(int64_t id) {
+  if (view_request_ && view_request_->id == id) view_request_.reset();
 }
 
 std::optional<Job> Client::next_question() {
   const Question question = std::move(questions_.front());
   questions_.pop_front();
-  const auto about_look = [&](const char* name, int64_t id, auto make) -> std::optional<Job> {
-    if (look_) return Job{number_, make(*look_)};
+  const auto about_view = [&](const char* name, int64_t id, auto make) -> std::optional<Job> {
+    if (view_request_) return Job{number_, make(*view_request_)};
     send_(refusal(name, id, "nothing has been looked at yet"));
     return std::nullopt;
   };
-  return std::visit(
-      Overloaded{[&](const Photo& photo) {
-                   return std::optional<Job>({number_, photo});
-                 },
-                 [&](const Path& path) {
-                   return std::optional<Job>({number_, path});
-                 },
-                 [&](const Probe& probe) {
-                   return about_look("probe", probe.id, [&](const Look& l) { return ProbeJob{l, probe}; });
-                 },
-                 [&](const Still& still) {
-                   return about_look("still", still.id, [&](const Look& l) { return StillJob{l, still}; });
-                 }},
-      question);
+  return std::visit(Overloaded{[&](const Photo& photo) {
+                                 return std::optional<Job>({number_, photo});
+                               },
+                               [&](const Path& path) {
+                                 return std::optional<Job>({number_, path});
+                               },
+                               [&](const Probe& probe) {
+                                 return about_view("probe", probe.id, [&](const ViewRequest& view) {
+                                   return ProbeJob{view, probe};
+                                 });
+                               },
+                               [&](const Still& still) {
+                                 return about_view("still", still.id, [&](const ViewRequest& view) {
+                                   return StillJob{view, still};
+                                 });
+                               }},
+                    question);
 }
 
 bool Client::wants_frame(const Allowed& allowed, const SceneState& scene, Clock::time_point now) const {
-  if (!look_ || asleep_ || in_flight_.size() >= max_in_flight) return false;
+  if (!view_request_ || asleep_ || in_flight_.size() >= max_in_flight) return false;
   if (now < not_before_) return false;
   if (sees_nothing()) return true;
-  if (look_->moving) return false;
+  if (view_request_->moving) return false;
   if (!shown_final_) return allowed.refining;
   return allowed.refreshing && shown_scene_ != scene.number && now - served_ >= scene.refresh;
 }
 
 Coarseness Client::coarseness(Clock::time_point now) const {
-  const double pixels = static_cast<double>(look_->width) * look_->height;
+  const double pixels = static_cast<double>(view_request_->width) * view_request_->height;
   Coarseness chosen = Pacer::full();
   if (sees_nothing()) {
     chosen = pacer_.moving(pixels);
@@ -82,12 +85,12 @@ Coarseness Client::coarseness(Clock::time_point now) const {
   }
   if (!lacks_memory(now) || chosen.divisor >= min_divisor_) return chosen;
   // The finest allowed.
-  return {min_divisor_, chosen.quality, !look_->moving};
+  return {min_divisor_, chosen.quality, !view_request_->moving};
 }
 
 Job Client::next_frame(Clock::time_point now) {
   served_ = now;
-  return {number_, FrameJob{*look_, coarseness(now)}};
+  return {number_, FrameJob{*view_request_, coarseness(now)}};
 }
 
 void Client::show(const FrameJob& job, const Outgoing& message, double pixels, double seconds,
@@ -97,8 +100,8 @@ void Client::show(const FrameJob& job, const Outgoing& message, double pixels, d
   served_ = Clock::now();
   in_flight_.push_back({++frames_, bytes, served_});
   send_(message);
-  // A newer Look may have arrived meanwhile.
-  if (!look_ || look_->id != job.look.id) return;
+  // A newer ViewRequest may have arrived meanwhile.
+  if (!view_request_ || view_request_->id != job.view_request.id) return;
   shown_divisor_ = job.coarseness.divisor;
   shown_final_ = job.coarseness.final;
   shown_scene_ = scene.number;

@@ -14,15 +14,15 @@ namespace traceflow::serve {
 
 // A picture or an answer that a page waits for.
 struct FrameJob {
-  Look look;
+  ViewRequest view_request;
   Coarseness coarseness;
 };
 struct ProbeJob {
-  Look look;
+  ViewRequest view_request;
   Probe probe;
 };
 struct StillJob {
-  Look look;
+  ViewRequest view_request;
   Still still;
 };
 struct Job {
@@ -33,7 +33,7 @@ struct Job {
 // A one-time request.
 using Question = std::variant<Probe, Still, Photo, Path>;
 
-// The frames that may be rendered now if time is short. The first frame of a Look is always allowed.
+// The frames that may be rendered now if time is short. The first frame of a ViewRequest is always allowed.
 struct Allowed {
   bool refining = true;    // finer frames of the shown picture
   bool refreshing = true;  // frames of a scene that has changed
@@ -54,17 +54,17 @@ class Client {
 
   void send(const Outgoing& message) const { send_(message); }
 
-  void look(const Look& look);
+  void request_view(const ViewRequest& view_request);
   void sleep() { asleep_ = true; }
-  void seen(int64_t frame, Clock::time_point now);
+  void frame_shown(int64_t frame, Clock::time_point now);
   // Returns false if too many are waiting.
   bool ask(const Question& question);
-  // A Look that cannot be rendered is not tried again.
-  void drop_look(int64_t look);
+  // A ViewRequest that cannot be rendered is not tried again.
+  void drop_view(int64_t id);
 
   bool is_awake() const { return !asleep_; }
   bool has_question() const { return !questions_.empty(); }
-  // Takes the oldest question. If it needs a Look and there is none, refuses it and returns nothing.
+  // Takes the oldest question. If it needs a ViewRequest and there is none, refuses it and returns nothing.
   std::optional<Job> next_question();
   bool wants_frame(const Allowed& allowed, const SceneState& scene, Clock::time_point now) const;
   Job next_frame(Clock::time_point now);
@@ -93,14 +93,14 @@ class Client {
 
   uint64_t number_;
   Send send_;
-  std::optional<Look> look_;
+  std::optional<ViewRequest> view_request_;
   bool asleep_ = true;
   std::deque<Question> questions_;
   Pacer pacer_;
   std::deque<Sent> in_flight_;
   int64_t frames_ = 0;
   Clock::time_point served_ = {};
-  // The finest frame sent of the present Look, and the version of its scene.
+  // The finest frame sent of the present ViewRequest, and the version of its scene.
   double shown_divisor_ = std::numeric_limits<double>::infinity();
   bool shown_final_ = false;
   int64_t shown_scene_ = -1;

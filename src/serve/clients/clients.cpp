@@ -24,7 +24,7 @@ std::pair<std::string, int64_t> label_of(std::string_view text) {
 // The type and number of the request that a job answers.
 std::pair<const char*, int64_t> label_of(const Job& job) {
   using Label = std::pair<const char*, int64_t>;
-  return std::visit(Overloaded{[](const FrameJob& frame) { return Label("look", frame.look.id); },
+  return std::visit(Overloaded{[](const FrameJob& frame) { return Label("view", frame.view_request.id); },
                                [](const ProbeJob& probe) { return Label("probe", probe.probe.id); },
                                [](const StillJob& still) { return Label("still", still.still.id); },
                                [](const Photo&) { return Label("photo", 0); },
@@ -57,7 +57,7 @@ Outgoing Clients::state_message() const {
 Outgoing Clients::warning_message() const {
   std::string all;
   for (const auto& [about, text] : warnings_) all += (all.empty() ? "" : " ") + text;
-  return json_message({{"type", "trouble"}, {"text", all}});
+  return json_message({{"type", "warning"}, {"text", all}});
 }
 
 void Clients::on_connect(uint64_t number, Send send) {
@@ -86,7 +86,7 @@ void Clients::on_message(uint64_t number, std::string_view text) {
   }
   if (const auto* command = std::get_if<Command>(&request)) {
     if (on_command_) {
-      on_command_(command->what);
+      on_command_(command->action);
     } else {
       reply(number, refusal("command", 0, "nothing is being trained here"));
     }
@@ -98,13 +98,14 @@ void Clients::on_message(uint64_t number, std::string_view text) {
 }
 
 void Clients::answer(Client& client, const Request& request) {
-  std::visit(
-      Overloaded{[&](const Look& look) { client.look(look); }, [&](const Sleep&) { client.sleep(); },
-                 [&](const Seen& seen) { client.seen(seen.frame, Clock::now()); }, [](const Command&) {},
-                 [&](const auto& question) {
-                   if (!client.ask(question)) client.send(refusal("", 0, "too many questions"));
-                 }},
-      request);
+  std::visit(Overloaded{[&](const ViewRequest& view) { client.request_view(view); },
+                        [&](const Sleep&) { client.sleep(); },
+                        [&](const FrameShown& shown) { client.frame_shown(shown.frame, Clock::now()); },
+                        [](const Command&) {},
+                        [&](const auto& question) {
+                          if (!client.ask(question)) client.send(refusal("", 0, "too many questions"));
+                        }},
+             request);
 }
 
 void Clients::set_hello(std::string hello) {
@@ -199,7 +200,7 @@ void Clients::refuse(const Job& job, const std::string& why) {
   const std::lock_guard lock(mutex_);
   Client* client = find(job.client);
   if (client == nullptr) return;
-  if (std::holds_alternative<FrameJob>(job.what)) client->drop_look(id);
+  if (std::holds_alternative<FrameJob>(job.what)) client->drop_view(id);
   client->send(refusal(type, id, why));
 }
 

@@ -34,7 +34,7 @@ class Clients : public MessageHandler {
   using Clock = std::chrono::steady_clock;
 
   // on_command: pause, resume, save, stop; called on the network thread. Without it, commands are refused.
-  explicit Clients(std::function<void(Do)> on_command = {}) : on_command_(std::move(on_command)) {}
+  explicit Clients(std::function<void(Action)> on_command = {}) : on_command_(std::move(on_command)) {}
 
   void on_connect(uint64_t number, Send send) override;
   void on_message(uint64_t number, std::string_view text) override;
@@ -80,7 +80,7 @@ class Clients : public MessageHandler {
   Outgoing warning_message() const;
   bool has_job(Clock::time_point now);
 
-  std::function<void(Do)> on_command_;
+  std::function<void(Action)> on_command_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<uint64_t, Client> clients_;

@@ -20,7 +20,7 @@ struct PhotoRef {
 };
 
 // The camera and settings of frames from now on.
-struct Look {
+struct ViewRequest {
   int64_t id = 0;
   std::variant<Viewpoint, PhotoRef> camera;
   float time = 0;             // 0 to 1
@@ -28,24 +28,24 @@ struct Look {
   std::string layer = "rgb";
   float exposure = 0;  // stops
   std::string map = "viridis";
-  bool moving = false;  // the camera moves: another Look follows soon
+  bool moving = false;  // the camera moves: another ViewRequest follows soon
 };
 
-// The page is hidden: nothing is rendered until the next Look.
+// The page is hidden: nothing is rendered until the next ViewRequest.
 struct Sleep {};
 
 // The page has displayed a frame.
-struct Seen {
+struct FrameShown {
   int64_t frame = 0;
 };
 
-// Asks what the ray through a point of the last Look's picture hits; x and y from 0 (left, top) to 1.
+// Asks what the ray through a point of the last ViewRequest's picture hits; x and y from 0 (left, top) to 1.
 struct Probe {
   int64_t id = 0;
   double x = 0, y = 0;
 };
 
-// Asks for the last Look as a PNG.
+// Asks for the picture of the last ViewRequest as a PNG.
 struct Still {
   int64_t id = 0;
   int width = 0, height = 0;
@@ -63,12 +63,12 @@ struct Path {
   std::string path;  // JSON text, as in the file for `render --camera-path`
 };
 
-enum class Do { pause, resume, save, stop };
+enum class Action { pause, resume, save, stop };
 struct Command {
-  Do what = Do::pause;
+  Action action = Action::pause;
 };
 
-using Request = std::variant<Look, Sleep, Seen, Probe, Still, Photo, Path, Command>;
+using Request = std::variant<ViewRequest, Sleep, FrameShown, Probe, Still, Photo, Path, Command>;
 
 // Throws InputError with the field for text that is not JSON, has no known type, lacks a field, or has values
 // out of range.

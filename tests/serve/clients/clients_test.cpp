@@ -10,14 +10,15 @@ namespace {
 
 using nlohmann::json;
 using serve::testing::FakePage;
-using serve::testing::look;
 using serve::testing::Received;
+using serve::testing::view_request;
 
 // What a renderer would do with a frame's job.
 void make_frame(Clients& clients, const Job& job) {
   const FrameJob& frame = std::get<FrameJob>(job.what);
   const double divisor = frame.coarseness.divisor;
-  clients.show_frame(job, {{"type", "frame"}, {"look", frame.look.id}, {"final", frame.coarseness.final}},
+  clients.show_frame(job,
+                     {{"type", "frame"}, {"view", frame.view_request.id}, {"final", frame.coarseness.final}},
                      "picture", 96 * 64 / (divisor * divisor), 1e-4);
 }
 
@@ -27,7 +28,7 @@ std::vector<Coarseness> serve_all(Clients& clients, FakePage& page) {
   while (const auto job = clients.next()) {
     made.push_back(std::get<FrameJob>(job->what).coarseness);
     make_frame(clients, *job);
-    page.see_frames();
+    page.acknowledge_frames();
   }
   return made;
 }
@@ -45,11 +46,11 @@ TEST(Clients, TellsANewcomerWhatThereIs) {
   clients.set_warning("disk", "It is full.");
   clients.set_state({false, false, 4, 10, 100, 20});
   const FakePage page(clients, 1);
-  EXPECT_THAT(types(page), ::testing::ElementsAre("hello", "events", "trouble", "state"));
+  EXPECT_THAT(types(page), ::testing::ElementsAre("hello", "events", "warning", "state"));
   EXPECT_EQ(page.of("events")[0].json,
             json::parse(R"({"type":"events","events":[{"event":"saved","iteration":4}],
       "reset":true})"));
-  EXPECT_EQ(page.of("trouble")[0].json["text"], "It is full.");
+  EXPECT_EQ(page.of("warning")[0].json["text"], "It is full.");
   EXPECT_EQ(page.of("state")[0].json,
             json::parse(R"({"type":"state","paused":false,"over":false,"iteration":4,
       "iterations":10,"surfels":{"main":100,"environment":20},"viewers":1})"));
@@ -70,20 +71,20 @@ TEST(Clients, TellsEverybodyWhatChanges) {
   EXPECT_EQ(clients.viewers(), 1);
 }
 
-TEST(Clients, TroublesEndOneByOne) {
+TEST(Clients, WarningsEndOneByOne) {
   Clients clients;
   const FakePage page(clients, 1);
   clients.set_warning("memory", "");
-  EXPECT_TRUE(page.of("trouble").empty());
+  EXPECT_TRUE(page.of("warning").empty());
   clients.set_warning("memory", "No memory.");
   clients.set_warning("run", "No run.");
   clients.set_warning("run", "No run.");
-  EXPECT_EQ(page.of("trouble").back().json["text"], "No memory. No run.");
+  EXPECT_EQ(page.of("warning").back().json["text"], "No memory. No run.");
   clients.set_warning("memory", "");
-  EXPECT_EQ(page.of("trouble").back().json["text"], "No run.");
+  EXPECT_EQ(page.of("warning").back().json["text"], "No run.");
   clients.set_warning("run", "");
-  EXPECT_EQ(page.of("trouble").back().json["text"], "");
-  EXPECT_EQ(page.of("trouble").size(), 4U);
+  EXPECT_EQ(page.of("warning").back().json["text"], "");
+  EXPECT_EQ(page.of("warning").size(), 4U);
 }
 
 TEST(Clients, HasNothingToDoWhileNobodyLooks) {
@@ -92,20 +93,20 @@ TEST(Clients, HasNothingToDoWhileNobodyLooks) {
   FakePage page(clients, 1);
   EXPECT_FALSE(clients.next());
   EXPECT_FALSE(clients.wait({}));
-  page.say(look(1));
+  page.say(view_request(1));
   EXPECT_TRUE(clients.wait({}));
   page.say({{"type", "sleep"}});
   EXPECT_FALSE(clients.next());
-  page.say(look(2));
+  page.say(view_request(2));
   EXPECT_TRUE(clients.next());
   page.leave();
   EXPECT_FALSE(clients.next());
 }
 
-TEST(Clients, ShowsARestingLookFinerAndFinerUntilItIsFinal) {
+TEST(Clients, ShowsARestingViewFinerAndFinerUntilItIsFinal) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   const std::vector<Coarseness> made = serve_all(clients, page);
   ASSERT_GE(made.size(), 2U);
   EXPECT_GT(made.front().divisor, 1);
@@ -114,39 +115,39 @@ TEST(Clients, ShowsARestingLookFinerAndFinerUntilItIsFinal) {
   EXPECT_EQ(page.of("frame").size(), made.size());
 }
 
-TEST(Clients, ShowsAMovingLookOnce) {
+TEST(Clients, ShowsAMovingViewOnce) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1, true));
+  page.say(view_request(1, true));
   EXPECT_EQ(serve_all(clients, page).size(), 1U);
 }
 
-TEST(Clients, TheNewestLookCounts) {
+TEST(Clients, TheNewestViewRequestCounts) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1, true));
-  page.say(look(2, true));
+  page.say(view_request(1, true));
+  page.say(view_request(2, true));
   const auto job = clients.next();
   ASSERT_TRUE(job);
-  EXPECT_EQ(std::get<FrameJob>(job->what).look.id, 2);
+  EXPECT_EQ(std::get<FrameJob>(job->what).view_request.id, 2);
   // Another one comes while this one is rendered: the frame goes out, and the new one is still wanted.
-  page.say(look(3, true));
+  page.say(view_request(3, true));
   make_frame(clients, *job);
   const auto next = clients.next();
   ASSERT_TRUE(next);
-  EXPECT_EQ(std::get<FrameJob>(next->what).look.id, 3);
+  EXPECT_EQ(std::get<FrameJob>(next->what).view_request.id, 3);
 }
 
 TEST(Clients, RunsNoMoreThanTwoFramesAhead) {
   Clients clients;
   FakePage page(clients, 1);
   for (int64_t id = 1; id <= 2; ++id) {
-    page.say(look(id, true));
+    page.say(view_request(id, true));
     make_frame(clients, *clients.next());
   }
-  page.say(look(3, true));
+  page.say(view_request(3, true));
   EXPECT_FALSE(clients.next());
-  page.say({{"type", "seen"}, {"frame", 1}});
+  page.say({{"type", "frame_shown"}, {"frame", 1}});
   EXPECT_TRUE(clients.next());
   EXPECT_EQ(page.of("frame")[0].json["frame"], 1);
   EXPECT_EQ(page.of("frame")[1].json["frame"], 2);
@@ -155,13 +156,13 @@ TEST(Clients, RunsNoMoreThanTwoFramesAhead) {
 TEST(Clients, AnswersQuestionsBeforeItMakesFrames) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   page.say({{"type", "probe"}, {"id", 5}, {"x", 0.5}, {"y", 0.5}});
   page.say({{"type", "photo"}, {"split", "test"}, {"index", 0}, {"width", 50}});
   page.say({{"type", "still"}, {"id", 6}, {"width", 20}, {"height", 10}});
   EXPECT_EQ(std::get<ProbeJob>(clients.next()->what).probe.id, 5);
   EXPECT_TRUE(std::get<Photo>(clients.next()->what).photo.test);
-  EXPECT_EQ(std::get<StillJob>(clients.next()->what).look.id, 1);
+  EXPECT_EQ(std::get<StillJob>(clients.next()->what).view_request.id, 1);
   EXPECT_TRUE(std::holds_alternative<FrameJob>(clients.next()->what));
 }
 
@@ -176,7 +177,7 @@ TEST(Clients, RefusesAQuestionAboutNothing) {
 TEST(Clients, RefusesQuestionsWithoutEnd) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   for (int i = 0; i < 1000; ++i) page.say({{"type", "still"}, {"id", i}, {"width", 8192}, {"height", 8192}});
   EXPECT_GT(page.of("refused").size(), 900U);
   int asked = 0;
@@ -189,14 +190,14 @@ TEST(Clients, TakesPagesInTurns) {
   FakePage one(clients, 1), two(clients, 2), three(clients, 3);
   std::vector<uint64_t> served;
   for (int64_t round = 1; round <= 4; ++round) {
-    for (FakePage* page : {&one, &two, &three}) page->say(look(round, true));
+    for (FakePage* page : {&one, &two, &three}) page->say(view_request(round, true));
     for (int i = 0; i < 3; ++i) {
       const auto job = clients.next();
       ASSERT_TRUE(job);
       served.push_back(job->client);
       make_frame(clients, *job);
     }
-    for (FakePage* page : {&one, &two, &three}) page->see_frames();
+    for (FakePage* page : {&one, &two, &three}) page->acknowledge_frames();
   }
   for (size_t i = 0; i < served.size(); i += 3) {
     EXPECT_THAT(std::vector<uint64_t>(served.begin() + static_cast<std::ptrdiff_t>(i),
@@ -208,12 +209,12 @@ TEST(Clients, TakesPagesInTurns) {
 TEST(Clients, ShowsAChangedSceneToWhomeverRests) {
   Clients clients;
   FakePage resting(clients, 1), moving(clients, 2);
-  resting.say(look(1));
-  moving.say(look(1, true));
+  resting.say(view_request(1));
+  moving.say(view_request(1, true));
   while (const auto job = clients.next()) {
     make_frame(clients, *job);
-    resting.see_frames();
-    moving.see_frames();
+    resting.acknowledge_frames();
+    moving.acknowledge_frames();
   }
   clients.scene_changed({});
   const auto job = clients.next();
@@ -223,7 +224,7 @@ TEST(Clients, ShowsAChangedSceneToWhomeverRests) {
   EXPECT_TRUE(coarseness.final);
   EXPECT_EQ(coarseness.divisor, 1) << "what is shown stays as fine as it was";
   make_frame(clients, *job);
-  resting.see_frames();
+  resting.acknowledge_frames();
   EXPECT_FALSE(clients.next());
   // Not again until its time has come.
   clients.scene_changed(std::chrono::hours(1));
@@ -233,36 +234,36 @@ TEST(Clients, ShowsAChangedSceneToWhomeverRests) {
 TEST(Clients, SaysWhyAMessageCannotBeUnderstood) {
   Clients clients;
   FakePage page(clients, 1);
-  json broken = look(9);
+  json broken = view_request(9);
   broken["time"] = 2;
   page.say(broken);
   page.say_text("nonsense");
   const std::vector<Received> refused = page.of("refused");
   ASSERT_EQ(refused.size(), 2U);
-  EXPECT_EQ(refused[0].json["request"], "look");
+  EXPECT_EQ(refused[0].json["request"], "view");
   EXPECT_EQ(refused[0].json["id"], 9);
   EXPECT_THAT(refused[0].json["text"].get<std::string>(), ::testing::HasSubstr("time"));
   EXPECT_EQ(refused[1].json["request"], "");
   EXPECT_FALSE(clients.next());
 }
 
-TEST(Clients, ALookThatCannotBeShownIsNotTriedAgain) {
+TEST(Clients, AViewThatCannotBeShownIsNotTriedAgain) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   clients.refuse(*clients.next(), "no such layer");
-  EXPECT_EQ(page.of("refused").at(0).json["request"], "look");
+  EXPECT_EQ(page.of("refused").at(0).json["request"], "view");
   EXPECT_FALSE(clients.next());
 }
 
 TEST(Clients, AFrameWithoutMemoryComesCoarserAndNotAtOnce) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   serve_all(clients, page);
-  page.say(look(2));
+  page.say(view_request(2));
   make_frame(clients, *clients.next());
-  page.see_frames();
+  page.acknowledge_frames();
   const auto job = clients.next();
   ASSERT_TRUE(job);
   clients.no_memory_for(*job);
@@ -275,16 +276,16 @@ TEST(Clients, AFrameWithoutMemoryComesCoarserAndNotAtOnce) {
 TEST(Clients, MakesWhatIsAllowedAndAlwaysAFirstFrame) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   const auto first = clients.next({false, false});
   ASSERT_TRUE(first);
   make_frame(clients, *first);
-  page.see_frames();
+  page.acknowledge_frames();
   EXPECT_FALSE(clients.next({false, false}));
   EXPECT_FALSE(clients.next({false, true}));
   while (const auto job = clients.next({true, false})) {
     make_frame(clients, *job);
-    page.see_frames();
+    page.acknowledge_frames();
   }
   clients.scene_changed({});
   EXPECT_FALSE(clients.next({true, false}));
@@ -292,11 +293,11 @@ TEST(Clients, MakesWhatIsAllowedAndAlwaysAFirstFrame) {
 }
 
 TEST(Clients, PassesCommandsOnWhereSomethingIsTrained) {
-  std::vector<Do> done;
-  Clients training([&](Do what) { done.push_back(what); });
+  std::vector<Action> done;
+  Clients training([&](Action action) { done.push_back(action); });
   FakePage page(training, 1);
   for (const char* word : {"pause", "resume", "save", "stop"}) page.say({{"type", "command"}, {"do", word}});
-  EXPECT_THAT(done, ::testing::ElementsAre(Do::pause, Do::resume, Do::save, Do::stop));
+  EXPECT_THAT(done, ::testing::ElementsAre(Action::pause, Action::resume, Action::save, Action::stop));
 
   Clients viewing;
   FakePage other(viewing, 1);
@@ -307,12 +308,12 @@ TEST(Clients, PassesCommandsOnWhereSomethingIsTrained) {
 TEST(Clients, WhatIsForAPageThatHasLeftGoesNowhere) {
   Clients clients;
   FakePage page(clients, 1);
-  page.say(look(1));
+  page.say(view_request(1));
   const auto job = clients.next();
   page.leave();
   make_frame(clients, *job);
   clients.refuse(*job, "late");
-  page.say(look(2));
+  page.say(view_request(2));
   EXPECT_FALSE(clients.next());
   EXPECT_TRUE(page.of("frame").empty());
 }

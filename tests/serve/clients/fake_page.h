@@ -53,10 +53,10 @@ class FakePage {
     });
   }
   // Says that all frames so far have been shown.
-  void see_frames() {
+  void acknowledge_frames() {
     int64_t last = 0;
     for (const Received& frame : of("frame")) last = frame.json["frame"].get<int64_t>();
-    say({{"type", "seen"}, {"frame", last}});
+    say({{"type", "frame_shown"}, {"frame", last}});
   }
 
  private:
@@ -85,9 +85,9 @@ class FakePage {
   std::vector<Received> received_;
 };
 
-inline nlohmann::json look(int64_t id, bool moving = false) {
+inline nlohmann::json view_request(int64_t id, bool moving = false) {
   return {
-      {"type", "look"},
+      {"type", "view"},
       {"id", id},
       {"camera", {{"position", {0, 0, -3}}, {"rotation", {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}, {"fov_y", 45}}},
       {"time", 0},

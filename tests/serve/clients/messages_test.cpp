@@ -13,8 +13,8 @@ namespace {
 using nlohmann::json;
 using ::testing::HasSubstr;
 
-json good_look() {
-  return json::parse(R"({"type":"look","id":7,"camera":{"position":[1,2,3],
+json good_view_request() {
+  return json::parse(R"({"type":"view","id":7,"camera":{"position":[1,2,3],
       "rotation":[[0,-1,0],[1,0,0],[0,0,1]],"fov_y":40},"time":0.25,"width":960,"height":540,"layer":"depth",
       "exposure":-1.5,"map":"turbo","moving":true})");
 }
@@ -23,32 +23,33 @@ std::string complaint(const std::string& text) {
   return refusal_of([&] { parse_request(text); });
 }
 
-TEST(Messages, ALookIsRead) {
-  const Look look = std::get<Look>(parse_request(good_look().dump()));
-  EXPECT_EQ(look.id, 7);
-  const Viewpoint& camera = std::get<Viewpoint>(look.camera);
+TEST(Messages, AViewRequestIsRead) {
+  const ViewRequest view = std::get<ViewRequest>(parse_request(good_view_request().dump()));
+  EXPECT_EQ(view.id, 7);
+  const Viewpoint& camera = std::get<Viewpoint>(view.camera);
   EXPECT_EQ(camera.position, Vec3<double>(1, 2, 3));
   // Rows are world_from_camera's: the camera's x axis is the world's y.
   EXPECT_EQ(camera.world_from_camera * Vec3<double>(1, 0, 0), Vec3<double>(0, 1, 0));
   EXPECT_EQ(camera.fov_y, 40);
-  EXPECT_EQ(look.time, 0.25F);
-  EXPECT_EQ(look.width, 960);
-  EXPECT_EQ(look.height, 540);
-  EXPECT_EQ(look.layer, "depth");
-  EXPECT_EQ(look.exposure, -1.5F);
-  EXPECT_EQ(look.map, "turbo");
-  EXPECT_TRUE(look.moving);
+  EXPECT_EQ(view.time, 0.25F);
+  EXPECT_EQ(view.width, 960);
+  EXPECT_EQ(view.height, 540);
+  EXPECT_EQ(view.layer, "depth");
+  EXPECT_EQ(view.exposure, -1.5F);
+  EXPECT_EQ(view.map, "turbo");
+  EXPECT_TRUE(view.moving);
 }
 
 TEST(Messages, APhotographTakesThePlaceOfACamera) {
-  json look = good_look();
-  look["photo"] = {{"split", "test"}, {"index", 3}};
-  EXPECT_EQ(std::get<PhotoRef>(std::get<Look>(parse_request(look.dump())).camera), (PhotoRef{true, 3}));
+  json view = good_view_request();
+  view["photo"] = {{"split", "test"}, {"index", 3}};
+  EXPECT_EQ(std::get<PhotoRef>(std::get<ViewRequest>(parse_request(view.dump())).camera),
+            (PhotoRef{true, 3}));
 }
 
 TEST(Messages, EveryOtherKindIsRead) {
   EXPECT_TRUE(std::holds_alternative<Sleep>(parse_request(R"({"type":"sleep"})")));
-  EXPECT_EQ(std::get<Seen>(parse_request(R"({"type":"seen","frame":12})")).frame, 12);
+  EXPECT_EQ(std::get<FrameShown>(parse_request(R"({"type":"frame_shown","frame":12})")).frame, 12);
   const Probe probe = std::get<Probe>(parse_request(R"({"type":"probe","id":3,"x":0.5,"y":1})"));
   EXPECT_EQ(probe.x, 0.5);
   EXPECT_EQ(probe.y, 1);
@@ -57,15 +58,15 @@ TEST(Messages, EveryOtherKindIsRead) {
             (PhotoRef{false, 2}));
   EXPECT_EQ(json::parse(std::get<Path>(parse_request(R"({"type":"path","id":1,"path":{"a":[1]}})")).path),
             json::parse(R"({"a":[1]})"));
-  const std::vector<std::pair<std::string, Do>> words = {
-      {"pause", Do::pause}, {"resume", Do::resume}, {"save", Do::save}, {"stop", Do::stop}};
-  for (const auto& [word, what] : words) {
-    EXPECT_EQ(std::get<Command>(parse_request(R"({"type":"command","do":")" + word + "\"}")).what, what);
+  const std::vector<std::pair<std::string, Action>> words = {
+      {"pause", Action::pause}, {"resume", Action::resume}, {"save", Action::save}, {"stop", Action::stop}};
+  for (const auto& [word, action] : words) {
+    EXPECT_EQ(std::get<Command>(parse_request(R"({"type":"command","do":")" + word + "\"}")).action, action);
   }
 }
 
-// What each broken Look is refused for names the field.
-TEST(Messages, WhatIsWrongWithALookIsNamed) {
+// What each broken ViewRequest is refused for names the field.
+TEST(Messages, WhatIsWrongWithAViewRequestIsNamed) {
   const std::vector<std::pair<json, std::string>> wrongs = {
       {R"([{"op":"replace","path":"/id","value":-1}])"_json, "id"},
       {R"([{"op":"replace","path":"/id","value":1.5}])"_json, "id"},
@@ -85,7 +86,7 @@ TEST(Messages, WhatIsWrongWithALookIsNamed) {
       {R"([{"op":"add","path":"/photo","value":{"split":"test","index":-1}}])"_json, "photo.index"},
   };
   for (const auto& [patch, field] : wrongs) {
-    EXPECT_THAT(complaint(good_look().patch(patch).dump()), HasSubstr(field)) << patch.dump();
+    EXPECT_THAT(complaint(good_view_request().patch(patch).dump()), HasSubstr(field)) << patch.dump();
   }
 }
 

@@ -11,7 +11,7 @@ import {
   take_still,
   type StillSize,
 } from '../state/still.ts';
-import { moving } from '../stage/looking.ts';
+import { moving } from '../stage/view_requests.ts';
 
 export function ViewTab() {
   return (

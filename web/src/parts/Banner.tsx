@@ -1,8 +1,8 @@
 import { useSignal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
-import { link, notices, trouble } from '../state/store.ts';
+import { link, notices, warning } from '../state/store.ts';
 import { retry_now } from '../state/server.ts';
-import { looker } from '../stage/looking.ts';
+import { view_requester } from '../stage/view_requests.ts';
 
 // What is wrong, in words, over the stage; and passing notices.
 export function Banner() {
@@ -11,7 +11,7 @@ export function Banner() {
   useEffect(() => {
     const timer = setInterval(() => {
       now.value = Date.now();
-      slow.value = looker.waiting() > 4000;
+      slow.value = view_requester.waiting() > 4000;
     }, 250);
     return () => clearInterval(timer);
   }, []);
@@ -41,12 +41,12 @@ export function Banner() {
           </span>
         </p>
       )}
-      {trouble.value && (
-        <p class="banner wrong" data-testid="banner-trouble">
-          <span>{trouble.value}</span>
+      {warning.value && (
+        <p class="banner wrong" data-testid="banner-warning">
+          <span>{warning.value}</span>
         </p>
       )}
-      {state.kind === 'open' && !trouble.value && slow.value && (
+      {state.kind === 'open' && !warning.value && slow.value && (
         <p class="banner" data-testid="banner-slow">
           <span>The server is taking its time over the next picture.</span>
         </p>

@@ -2,7 +2,7 @@ import { signal } from '@preact/signals';
 import type { FrameHeader } from '../messages.ts';
 import '../for_tests.ts';
 import { link } from '../state/store.ts';
-import type { SentLook } from './looker.ts';
+import type { SentView } from './view_requester.ts';
 
 // How the pictures come: what the status line shows and what tests read.
 
@@ -30,12 +30,12 @@ window.traceflow = {
   },
 };
 
-// A frame has been painted; `answered` if it is the first that shows this look.
-export function count_frame(header: FrameHeader, answered: SentLook | undefined): void {
+// A frame has been painted; `answered` if it is the first that shows this view.
+export function count_frame(header: FrameHeader, answered: SentView | undefined): void {
   const now = performance.now();
-  const { look, width, height, final, milliseconds } = header;
+  const { view, width, height, final, milliseconds } = header;
   window.traceflow.frames++;
-  window.traceflow.lastFrame = { look, width, height, final };
+  window.traceflow.lastFrame = { view, width, height, final };
   if (answered) {
     keep(window.traceflow.latencies, now - answered.input, kept);
     keep(recent, now - answered.input, 9);

@@ -1,4 +1,4 @@
-import type { Camera, FrameHeader, PhotoHeader, PhotoRef } from '../messages.ts';
+import type { Camera, FrameHeader, PhotoHeader, PhotoRef, ViewRequest } from '../messages.ts';
 import { radians } from '../math/camera.ts';
 import { fit, type Rectangle } from '../math/fit.ts';
 import { picture_blob, type Picture } from '../net/wire.ts';
@@ -6,15 +6,14 @@ import { camera, captured, comparing, photo, pixel_ratio, shown, split_at, stage
 import { send } from '../state/server.ts';
 import { widened } from '../math/camera.ts';
 import { count_frame } from './measures.ts';
-import { looker } from './looking.ts';
-import type { SentLook } from './looker.ts';
+import { view_requester } from './view_requests.ts';
 
 // Frames and photographs as they come, and the canvas that they are painted on.
 
 interface Frame {
   bitmap: ImageBitmap;
   header: FrameHeader;
-  look: SentLook['look'];
+  view: ViewRequest;
 }
 
 interface Photograph {
@@ -34,13 +33,13 @@ export function use_canvas(element: HTMLCanvasElement): void {
 
 export async function show_frame(picture: Picture & { header: FrameHeader }): Promise<void> {
   const { header } = picture;
-  const first = looker.answer(header);
-  const sent = looker.find(header.look);
+  const first = view_requester.answer(header);
+  const sent = view_requester.find(header.view);
   const bitmap = await decoded(picture);
-  send({ type: 'seen', frame: header.frame });
-  if (!bitmap || !sent || (frame && header.frame < frame.header.frame && header.look <= frame.look.id)) return;
+  send({ type: 'frame_shown', frame: header.frame });
+  if (!bitmap || !sent || (frame && header.frame < frame.header.frame && header.view <= frame.view.id)) return;
   frame?.bitmap.close();
-  frame = { bitmap, header, look: sent.look };
+  frame = { bitmap, header, view: sent.view };
   paint();
   count_frame(header, first);
 }
@@ -83,7 +82,7 @@ const same = (a: PhotoRef | null | undefined, b: PhotoRef | null | undefined): b
 // stage's.
 function place_of(drawn: Frame): Rectangle {
   const aspect = drawn.header.width / drawn.header.height;
-  const sent = drawn.look.camera;
+  const sent = drawn.view.camera;
   const now = camera.value;
   if (!sent || !now) return fit(aspect, stage.value);
   const wanted = widened(now, stage.value.width / stage.value.height);
@@ -111,7 +110,7 @@ export function paint(): void {
   const h = Math.round((place.top + place.height) * ratio) - y;
   context.imageSmoothingQuality = 'high';
   context.drawImage(frame.bitmap, x, y, w, h);
-  if (photograph && same(photograph.ref, photo.value) && same(photograph.ref, frame.look.photo)) {
+  if (photograph && same(photograph.ref, photo.value) && same(photograph.ref, frame.view.photo)) {
     const share = comparing.value === 'photo' ? 1 : comparing.value === 'split' ? split_at.value : 0;
     const { bitmap } = photograph;
     const cut = Math.round(w * share);
@@ -121,9 +120,9 @@ export function paint(): void {
 }
 
 function show_place(drawn: Frame, place: Rectangle): void {
-  const ref = drawn.look.photo ?? null;
-  const from = drawn.look.camera ?? captured(ref);
+  const ref = drawn.view.photo ?? null;
+  const from = drawn.view.camera ?? captured(ref);
   if (!from) return;
   const aspect = drawn.header.width / drawn.header.height;
-  shown.value = { camera: from, photo: ref, aspect, place, time: drawn.look.time, frame: drawn.header.frame };
+  shown.value = { camera: from, photo: ref, aspect, place, time: drawn.view.time, frame: drawn.header.frame };
 }

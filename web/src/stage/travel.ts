@@ -4,7 +4,7 @@ import { between, eased, flight_time } from '../math/flight.ts';
 import { centred, type Viewpoint } from '../math/navigate.ts';
 import { camera, captured, hello, photo, pivot, previewing, time } from '../state/store.ts';
 import { look_from_start } from '../state/server.ts';
-import { moving } from './looking.ts';
+import { moving } from './view_requests.ts';
 
 // Ways of the camera: by hand at once, and to named places by a flight.
 

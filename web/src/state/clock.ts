@@ -1,5 +1,5 @@
 import { computed, effect } from '@preact/signals';
-import { moving } from '../stage/looking.ts';
+import { moving } from '../stage/view_requests.ts';
 import { hello, looping, playing, speed, time } from './store.ts';
 
 // Time going on while the scene plays.

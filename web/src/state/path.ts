@@ -2,7 +2,7 @@ import { effect, signal, untracked } from '@preact/signals';
 import type { CameraPath, PathReply } from '../messages.ts';
 import { empty_path, parse_path, rounded_path, with_keyframe } from '../math/keyframes.ts';
 import { file_name } from '../parts/format.ts';
-import { moving } from '../stage/looking.ts';
+import { moving } from '../stage/view_requests.ts';
 import { stop_flight } from '../stage/travel.ts';
 import { send } from './server.ts';
 import { save_file } from './still.ts';

@@ -3,7 +3,7 @@ import type { Hello, PathReply, ProbeReply, Refused, Reply, Request } from '../m
 import { Connection } from '../net/connection.ts';
 import type { Picture } from '../net/wire.ts';
 import { History } from './history.ts';
-import { asleep, camera, events, hello, layer, link, map, notify, photo, pivot, server, time, trouble } from './store.ts';
+import { asleep, camera, events, hello, layer, link, map, notify, photo, pivot, server, time, warning } from './store.ts';
 
 // The one connection of the page, and who is told what comes over it.
 
@@ -54,8 +54,8 @@ function take(reply: Reply, handlers: Handlers): void {
       for (const event of reply.events) history.add(event);
       told.value++;
       return;
-    case 'trouble':
-      trouble.value = reply.text;
+    case 'warning':
+      warning.value = reply.text;
       return;
     case 'refused':
       notify(reply.text);
@@ -71,7 +71,7 @@ function take(reply: Reply, handlers: Handlers): void {
 function greet(next: Hello): void {
   const before = hello.value;
   hello.value = next;
-  trouble.value = '';
+  warning.value = '';
   const same = before?.name === next.name && before.source === next.source && camera.value !== null;
   if (!same) look_from_start();
   if (!next.layers.some((l) => l.name === layer.value)) layer.value = next.layers[0]?.name ?? 'rgb';

@@ -2,7 +2,7 @@ import { still_side } from '../messages.ts';
 import type { Picture } from '../net/wire.ts';
 import { picture_blob } from '../net/wire.ts';
 import { captured_view, hello, notify, pixel_ratio, server, stage, time } from './store.ts';
-import { shown_layer } from '../stage/looking.ts';
+import { shown_layer } from '../stage/view_requests.ts';
 import { fit, whole, type Size } from '../math/fit.ts';
 import { file_name } from '../parts/format.ts';
 import { computed, signal } from '@preact/signals';

@@ -10,7 +10,7 @@ import type { Link } from '../net/connection.ts';
 export const link = signal<Link>({ kind: 'connecting', again: false });
 export const hello = signal<Hello | null>(null);
 export const server = signal<State | null>(null);
-export const trouble = signal('');
+export const warning = signal('');
 export const notices = signal<{ key: number; text: string }[]>([]);
 export const events = signal<TrainingEvent[]>([]);
 

@@ -28,17 +28,17 @@ export async function open(browser: Browser, address: string, width = 900, heigh
 
 export const at_rest = async (page: Page, after = 0): Promise<void> => {
   await page.waitForFunction(
-    (look) => (window.traceflow?.lastFrame?.final ?? false) && (window.traceflow.lastFrame?.look ?? 0) > look,
+    (id) => (window.traceflow?.lastFrame?.final ?? false) && (window.traceflow.lastFrame?.view ?? 0) > id,
     after,
     { timeout: patience },
   );
 };
 
-export const newest_look = (page: Page): Promise<number> => page.evaluate(() => window.traceflow.lastFrame?.look ?? 0);
+export const newest_view = (page: Page): Promise<number> => page.evaluate(() => window.traceflow.lastFrame?.view ?? 0);
 
 // Does something that changes what is looked at, and waits for its picture at rest.
 export async function then_rest(page: Page, act: () => Promise<unknown>): Promise<void> {
-  const before = await newest_look(page);
+  const before = await newest_view(page);
   await act();
   await at_rest(page, before);
 }

@@ -19,6 +19,7 @@ export interface Served {
   address: string; // with its token
   cut(): void; // breaks every connection and lets none come
   restore(): void;
+  warn(text: string): void; // makes the stand-in send a warning, an empty one ends it
   restart(): Promise<void>; // as another server, with another token, at the same address
   stop(): Promise<void>;
 }
@@ -32,6 +33,7 @@ export async function serve(kind: Kind): Promise<Served> {
     address: `http://127.0.0.1:${line.port}/?token=${program.token}`,
     cut: () => line.cut(),
     restore: () => line.restore(),
+    warn: (text) => void program.process.stdin?.write(`${text}\n`),
     async restart() {
       await end(program.process);
       program = await start(kind, line.port, 'second');
@@ -58,7 +60,7 @@ function start(kind: Kind, seen_port: number, token: string): Promise<Program> {
         shell: true,
         stdio: ['ignore', 'pipe', 'pipe'],
       })
-    : spawn(process.execPath, [fake], { env: environment, stdio: ['ignore', 'pipe', 'pipe'] });
+    : spawn(process.execPath, [fake], { env: environment, stdio: ['pipe', 'pipe', 'pipe'] });
   return new Promise((found, failed) => {
     let said = '';
     // The program says its address among its other remarks.

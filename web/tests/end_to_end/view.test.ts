@@ -4,7 +4,7 @@ import { after, before, describe, test } from 'node:test';
 import type { Browser } from 'playwright-core';
 import { open_browser } from '../../dev/browser.ts';
 import { parse_path } from '../../src/math/keyframes.ts';
-import { at_rest, difference, faults, glimpse, newest_look, open, patience, press, slide, then_rest } from './page.ts';
+import { at_rest, difference, faults, glimpse, newest_view, open, patience, press, slide, then_rest } from './page.ts';
 import { available, real, serve, type Served } from './served.ts';
 
 // What the page does with a finished run.
@@ -24,11 +24,11 @@ describe('looking at a run', { skip: !available('view') }, () => {
   test('the first picture comes without being asked for', async () => {
     const page = await browser.newPage({ viewport: { width: 900, height: 560 } });
     await page.addInitScript(() => {
-      const look = (): void => {
-        if ((window.traceflow?.frames ?? 0) === 0) requestAnimationFrame(look);
+      const check = (): void => {
+        if ((window.traceflow?.frames ?? 0) === 0) requestAnimationFrame(check);
         else performance.mark('first picture');
       };
-      requestAnimationFrame(look);
+      requestAnimationFrame(check);
     });
     await page.goto(served.address);
     await page.waitForFunction(() => performance.getEntriesByName('first picture').length > 0, undefined, {
@@ -106,7 +106,7 @@ describe('looking at a run', { skip: !available('view') }, () => {
     assert.ok((await page.evaluate(() => window.traceflow.latencies.length)) > known);
     await press(page, 'reset');
     await page.waitForTimeout(1200);
-    await at_rest(page, (await newest_look(page)) - 1);
+    await at_rest(page, (await newest_view(page)) - 1);
     assert.ok(difference(start, await glimpse(page)) < 1);
     await page.context().close();
   });
@@ -144,7 +144,7 @@ describe('looking at a run', { skip: !available('view') }, () => {
     await press(page, 'camera-0');
     const handle = page.getByTestId('split');
     await handle.waitFor({ timeout: patience });
-    await at_rest(page, (await newest_look(page)) - 1);
+    await at_rest(page, (await newest_view(page)) - 1);
     await page.waitForTimeout(1500);
     const area = await handle.locator('..').boundingBox();
     assert.ok(area);
@@ -245,22 +245,22 @@ describe('looking at a run', { skip: !available('view') }, () => {
       }, hidden);
     await hide(true);
     await page.waitForTimeout(500); // for what was under way
-    const look = await newest_look(page);
+    const hidden = await newest_view(page);
     await press(page, 'layer-normal');
     await page.waitForTimeout(700);
-    assert.equal(await newest_look(page), look);
+    assert.equal(await newest_view(page), hidden);
     await then_rest(page, () => hide(false));
 
-    const playing = await newest_look(page);
+    const playing = await newest_view(page);
     await press(page, 'play');
-    await page.waitForFunction((known) => (window.traceflow.lastFrame?.look ?? 0) > known + 1, playing, {
+    await page.waitForFunction((known) => (window.traceflow.lastFrame?.view ?? 0) > known + 1, playing, {
       timeout: patience,
     });
     await hide(true);
     await page.waitForTimeout(500); // for what was under way
-    const last = await newest_look(page);
+    const last = await newest_view(page);
     await page.waitForTimeout(1000);
-    assert.equal(await newest_look(page), last);
+    assert.equal(await newest_view(page), last);
     await press(page, 'play');
     await then_rest(page, () => hide(false));
     await page.context().close();
@@ -286,6 +286,15 @@ describe('looking at a run', { skip: !available('view') }, () => {
     await at_rest(page);
     assert.equal(await page.getByTestId('banner-lost').count(), 0);
     assert.ok(difference(before_cut, await glimpse(page)) < 1);
+    await page.context().close();
+  });
+
+  test('a warning of the server is shown until it ends', { skip: real }, async () => {
+    const { page } = await open(browser, served.address);
+    served.warn('The disk is full.');
+    await page.getByTestId('banner-warning').getByText('The disk is full.').waitFor({ timeout: 5000 });
+    served.warn('');
+    await page.getByTestId('banner-warning').waitFor({ state: 'detached', timeout: 5000 });
     await page.context().close();
   });
 

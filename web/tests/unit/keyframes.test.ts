@@ -1,6 +1,6 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import type { Look } from '../../src/messages.ts';
+import type { ViewRequest } from '../../src/messages.ts';
 import { look_at } from '../../src/math/camera.ts';
 import {
   empty_path,
@@ -66,9 +66,9 @@ test('a path of two hundred keyframes can be sent, one of a thousand cannot', ()
 });
 
 test('the length of a message counts in bytes', () => {
-  const look = (map: string): unknown => encoded({ ...({ type: 'look' } as Look), map });
-  assert.notEqual(look('x'.repeat(65000)), null);
-  assert.equal(look('€'.repeat(22000)), null);
+  const view_request = (map: string): unknown => encoded({ ...({ type: 'view' } as ViewRequest), map });
+  assert.notEqual(view_request('x'.repeat(65000)), null);
+  assert.equal(view_request('€'.repeat(22000)), null);
 });
 
 test('a file that is none is refused in words', () => {

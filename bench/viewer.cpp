@@ -52,7 +52,7 @@ struct SeenScene {
   }
 };
 
-void look(benchmark::State& state) {
+void moving_camera(benchmark::State& state) {
   SeenScene s(20000, 8000, state.range(0));
   Renderer renderer(s.options.render);
   renderer.forward(s.scene, s.request);
@@ -63,7 +63,7 @@ void look(benchmark::State& state) {
     benchmark::DoNotOptimize(renderer.forward(s.scene, s.request).colour.data());
   }
 }
-BENCHMARK(look)
+BENCHMARK(moving_camera)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime()
     ->ArgNames({"width", "reuse", "specular"})

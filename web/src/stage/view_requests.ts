@@ -1,5 +1,5 @@
 import { batch, effect } from '@preact/signals';
-import { look_side, type Look } from '../messages.ts';
+import { view_side, type ViewRequest } from '../messages.ts';
 import { fit, whole } from '../math/fit.ts';
 import { widened } from '../math/camera.ts';
 import {
@@ -17,9 +17,9 @@ import {
   time,
 } from '../state/store.ts';
 import { send } from '../state/server.ts';
-import { Looker, type Wish } from './looker.ts';
+import { ViewRequester, type WantedView } from './view_requester.ts';
 
-export const looker = new Looker((look: Look) => send(look), {
+export const view_requester = new ViewRequester((view: ViewRequest) => send(view), {
   now: () => performance.now(),
   after: (milliseconds, f) => void setTimeout(f, milliseconds),
 });
@@ -29,8 +29,8 @@ const pixels = () => ({ width: stage.value.width * pixel_ratio.value, height: st
 
 export const shown_layer = (): string => (comparing.value === 'difference' ? 'difference' : layer.value);
 
-// What the signals of the store ask to see; null before there is anything to see.
-export function current_wish(): Wish | null {
+// The view that the signals of the store ask for; null before there is anything to see.
+export function wanted_view(): WantedView | null {
   const there = hello.value;
   const free = camera.value;
   if (!there || !free || stage.value.width < 2 || stage.value.height < 2) return null;
@@ -38,15 +38,15 @@ export function current_wish(): Wish | null {
   const box = pixels();
   const common = { time: time.value, layer: shown_layer(), exposure: exposure.value, map: map.value };
   if (view && photo.value)
-    return { photo: photo.value, ...whole(fit(view.width / view.height, box), look_side), ...common };
-  return { camera: widened(free, box.width / box.height), ...whole(box, look_side), ...common };
+    return { photo: photo.value, ...whole(fit(view.width / view.height, box), view_side), ...common };
+  return { camera: widened(free, box.width / box.height), ...whole(box, view_side), ...common };
 }
 
-export function start_looking(): void {
+export function start_requesting_views(): void {
   effect(() => {
-    const wish = current_wish();
-    looker.sleep(asleep.value);
-    if (wish && !asleep.value) looker.want(wish);
+    const view = wanted_view();
+    view_requester.sleep(asleep.value);
+    if (view && !asleep.value) view_requester.want(view);
   });
   effect(() => {
     if (asleep.value) send({ type: 'sleep' });
@@ -56,6 +56,6 @@ export function start_looking(): void {
 
 // Changes what is looked at by input that goes on, such as a drag.
 export function moving(change: () => void): void {
-  looker.motion();
+  view_requester.motion();
   batch(change);
 }

@@ -1,21 +1,21 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import type { FrameHeader, Look } from '../../src/messages.ts';
-import { Looker, type Wish } from '../../src/stage/looker.ts';
+import type { FrameHeader, ViewRequest } from '../../src/messages.ts';
+import { ViewRequester, type WantedView } from '../../src/stage/view_requester.ts';
 
 // A clock that the test turns, and a server that answers when it is told to.
 function bench() {
   let now = 0;
   let frame = 0;
   const timers: { at: number; f: () => void }[] = [];
-  const sent: Look[] = [];
+  const sent: ViewRequest[] = [];
   let connected = true;
-  const looker = new Looker((look) => connected && sent.push(look) > 0, {
+  const requester = new ViewRequester((view) => connected && sent.push(view) > 0, {
     now: () => now,
     after: (wait, f) => void timers.push({ at: now + wait, f }),
   });
   return {
-    looker,
+    requester,
     sent,
     set connected(value: boolean) {
       connected = value;
@@ -32,11 +32,11 @@ function bench() {
       }
       now = end;
     },
-    answer(look: number, milliseconds = 10) {
+    answer(view: number, milliseconds = 10) {
       const header: FrameHeader = {
         type: 'frame',
         frame: ++frame,
-        look,
+        view,
         width: 1,
         height: 1,
         final: false,
@@ -44,42 +44,42 @@ function bench() {
         iteration: 0,
         format: 'jpeg',
       };
-      return looker.answer(header);
+      return requester.answer(header);
     },
   };
 }
 
-const wish = (time: number): Wish => ({ time, width: 8, height: 8, layer: 'rgb', exposure: 0, map: '' });
+const view = (time: number): WantedView => ({ time, width: 8, height: 8, layer: 'rgb', exposure: 0, map: '' });
 
-test('the first wish is sent at once and at rest', () => {
+test('the first view is requested at once and at rest', () => {
   const b = bench();
-  b.looker.want(wish(0));
+  b.requester.want(view(0));
   assert.equal(b.sent.length, 1);
   assert.equal(b.sent[0]?.moving, false);
 });
 
 test('while one is unanswered only the newest waits', () => {
   const b = bench();
-  b.looker.want(wish(0));
-  b.looker.want(wish(0.1));
-  b.looker.want(wish(0.2));
+  b.requester.want(view(0));
+  b.requester.want(view(0.1));
+  b.requester.want(view(0.2));
   assert.equal(b.sent.length, 1);
   b.pass(10);
   b.answer(1);
   assert.deepEqual(
-    b.sent.map((l) => l.time),
+    b.sent.map((v) => v.time),
     [0, 0.2],
   );
   assert.deepEqual(
-    b.sent.map((l) => l.id),
+    b.sent.map((v) => v.id),
     [1, 2],
   );
 });
 
-test('motion ends with a look at rest', () => {
+test('motion ends with a request at rest', () => {
   const b = bench();
-  b.looker.motion();
-  b.looker.want(wish(0.5));
+  b.requester.motion();
+  b.requester.want(view(0.5));
   assert.equal(b.sent[0]?.moving, true);
   b.pass(20);
   b.answer(1);
@@ -94,111 +94,111 @@ test('motion ends with a look at rest', () => {
 
 test('the rest is not forgotten when the last of the motion is still unanswered', () => {
   const b = bench();
-  b.looker.motion();
-  b.looker.want(wish(0.5));
+  b.requester.motion();
+  b.requester.want(view(0.5));
   b.pass(400);
   assert.equal(b.sent.length, 1);
   b.answer(1);
   assert.deepEqual([b.sent.length, b.sent[1]?.moving], [2, false]);
 });
 
-test('latency counts from the earliest input in the look', () => {
+test('latency counts from the earliest input in the request', () => {
   const b = bench();
-  b.looker.want(wish(0));
+  b.requester.want(view(0));
   b.pass(5);
-  b.looker.want(wish(0.1));
+  b.requester.want(view(0.1));
   b.pass(20);
-  b.looker.want(wish(0.2));
+  b.requester.want(view(0.2));
   b.answer(1);
   b.pass(10);
   assert.equal(b.answer(2)?.input, 5);
 });
 
-test('finer frames of an answered look answer nothing', () => {
+test('finer frames of an answered request answer nothing', () => {
   const b = bench();
-  b.looker.want(wish(0));
-  assert.equal(b.answer(1)?.look.id, 1);
+  b.requester.want(view(0));
+  assert.equal(b.answer(1)?.view.id, 1);
   assert.equal(b.answer(1), undefined);
 });
 
-test('a slow line carries two looks at once, a fast one does not', () => {
+test('a slow line carries two requests at once, a fast one does not', () => {
   const b = bench();
   for (let i = 1; i <= 12; i++) {
-    b.looker.want(wish(i / 100));
+    b.requester.want(view(i / 100));
     b.pass(200);
     b.answer(b.sent.length, 5);
   }
   const before = b.sent.length;
-  b.looker.want(wish(0.5));
-  b.looker.want(wish(0.6));
-  b.looker.want(wish(0.7));
+  b.requester.want(view(0.5));
+  b.requester.want(view(0.6));
+  b.requester.want(view(0.7));
   assert.equal(b.sent.length, before + 2);
 });
 
 test('an answer that never comes does not hold up the page', () => {
   const b = bench();
-  b.looker.want(wish(0));
-  b.looker.want(wish(0.1));
+  b.requester.want(view(0));
+  b.requester.want(view(0.1));
   b.pass(2100);
   assert.equal(b.sent.length, 2);
-  assert.ok(b.looker.waiting() >= 2000);
+  assert.ok(b.requester.waiting() >= 2000);
 });
 
 test('asleep, nothing is sent: neither the rest of a motion nor what an answer or patience held back', () => {
   const b = bench();
-  b.looker.motion();
-  b.looker.want(wish(0.1));
-  b.looker.want(wish(0.2));
-  b.looker.sleep(true);
-  b.looker.motion();
+  b.requester.motion();
+  b.requester.want(view(0.1));
+  b.requester.want(view(0.2));
+  b.requester.sleep(true);
+  b.requester.motion();
   b.pass(200);
   b.answer(1);
   b.pass(5000);
   assert.equal(b.sent.length, 1);
-  b.looker.sleep(false);
-  b.looker.want(wish(0.3));
+  b.requester.sleep(false);
+  b.requester.want(view(0.3));
   assert.deepEqual([b.sent.length, b.sent[1]?.time, b.sent[1]?.moving], [2, 0.3, false]);
 });
 
-test('a look that sleep cut off holds nothing up', () => {
+test('a request that sleep cut off holds nothing up', () => {
   const b = bench();
-  b.looker.want(wish(0.1));
-  b.looker.sleep(true);
-  assert.equal(b.looker.waiting(), 0);
+  b.requester.want(view(0.1));
+  b.requester.sleep(true);
+  assert.equal(b.requester.waiting(), 0);
   b.pass(10);
-  b.looker.sleep(false);
-  b.looker.want(wish(0.2));
+  b.requester.sleep(false);
+  b.requester.want(view(0.2));
   assert.equal(b.sent.length, 2);
   assert.equal(b.answer(2)?.input, 10);
 });
 
-test('a refused look is answered: it is not waited for, and the next is sent', () => {
+test('a refused request is answered: it is not waited for, and the next is sent', () => {
   const b = bench();
-  b.looker.want(wish(0));
-  b.looker.want(wish(0.1));
+  b.requester.want(view(0));
+  b.requester.want(view(0.1));
   b.pass(10);
-  b.looker.refused(1);
+  b.requester.refused(1);
   assert.deepEqual(
-    b.sent.map((l) => l.time),
+    b.sent.map((v) => v.time),
     [0, 0.1],
   );
-  b.looker.refused(2);
+  b.requester.refused(2);
   b.pass(5000);
-  assert.equal(b.looker.waiting(), 0);
+  assert.equal(b.requester.waiting(), 0);
   assert.equal(b.sent.length, 2);
 });
 
-test('after a reconnection the wish is sent again', () => {
+test('after a reconnection the view is requested again', () => {
   const b = bench();
-  b.looker.want(wish(0));
+  b.requester.want(view(0));
   b.connected = false;
-  b.looker.want(wish(0.3));
+  b.requester.want(view(0.3));
   b.connected = true;
-  b.looker.restart();
-  b.looker.want(wish(0.3));
+  b.requester.restart();
+  b.requester.want(view(0.3));
   assert.deepEqual(
-    b.sent.map((l) => l.time),
+    b.sent.map((v) => v.time),
     [0, 0.3],
   );
-  assert.equal(b.looker.waiting(), 0);
+  assert.equal(b.requester.waiting(), 0);
 });

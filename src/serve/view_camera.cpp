@@ -1,4 +1,4 @@
-#include "serve/look_camera.h"
+#include "serve/view_camera.h"
 
 #include <algorithm>
 #include <cmath>
@@ -32,15 +32,15 @@ Camera<float> resized(Camera<float> camera, int width, int height) {
   return camera;
 }
 
-Camera<float> camera_of(const Look& look, const SceneInfo& info, const SceneNormalisation& normalisation,
-                        double divisor) {
-  if (const auto* free = std::get_if<Viewpoint>(&look.camera))
-    return camera_at(*free, side(look.width / divisor), side(look.height / divisor), normalisation);
-  const Camera<float>& camera = captured(std::get<PhotoRef>(look.camera), info).camera;
-  double fit = std::min(look.width / static_cast<double>(camera.width),
-                        look.height / static_cast<double>(camera.height));
+Camera<float> camera_of(const ViewRequest& request, const SceneInfo& info,
+                        const SceneNormalisation& normalisation, double divisor) {
+  if (const auto* free = std::get_if<Viewpoint>(&request.camera))
+    return camera_at(*free, side(request.width / divisor), side(request.height / divisor), normalisation);
+  const Camera<float>& camera = captured(std::get<PhotoRef>(request.camera), info).camera;
+  double fit = std::min(request.width / static_cast<double>(camera.width),
+                        request.height / static_cast<double>(camera.height));
   // A difference is never larger than the photograph, since the added pixels would be interpolated.
-  if (look.layer == "difference") fit = std::min(fit, 1.0);
+  if (request.layer == "difference") fit = std::min(fit, 1.0);
   fit /= divisor;
   return resized(camera, side(camera.width * fit), side(camera.height * fit));
 }
