@@ -44,23 +44,23 @@ std::string iteration_of(const Safetensors& file) {
 // The current checkpoint, or the previous one and the reason. A checkpoint that cannot be read at the moment
 // may be intact, so it is no reason to fall back.
 Safetensors newest_sound(const RunFolder& run, std::string& note) {
-  std::string trouble;
+  std::string problem;
   try {
     return read_sound(run.checkpoint());
   } catch (const UnreadableFile&) {
     throw;
   } catch (const InputError& error) {
-    trouble = error.what();
+    problem = error.what();
   }
   if (!stands(run.previous_checkpoint())) {
-    throw InputError(trouble, "", "", "", "there is no checkpoint before it to go back to");
+    throw InputError(problem, "", "", "", "there is no checkpoint before it to go back to");
   }
   try {
     Safetensors before = read_sound(run.previous_checkpoint());
-    note = trouble + "; using the checkpoint before it" + iteration_of(before);
+    note = problem + "; using the checkpoint before it" + iteration_of(before);
     return before;
   } catch (const InputError& error) {
-    throw InputError(trouble, "", "", "", std::string("nor can the one before it be used: ") + error.what());
+    throw InputError(problem, "", "", "", std::string("nor can the one before it be used: ") + error.what());
   }
 }
 

@@ -307,8 +307,8 @@ Trainer::End Trainer::iterate(const std::atomic<bool>& stop) {
   try {
     emit_start();
     while (state_.iteration < options_.iterations && !stop && !stop_soon_) {
-      const std::string trouble = emit_iteration();
-      if (!trouble.empty()) return {events::Ending::diverged, trouble + collapse_advice()};
+      const std::string problem = emit_iteration();
+      if (!problem.empty()) return {events::Ending::diverged, problem + collapse_advice()};
       if (state_.iteration % options_.save_every == 0 && state_.iteration < options_.iterations &&
           state_.divergence.sound())
         save_or_warn();
@@ -339,12 +339,12 @@ std::string Trainer::emit_iteration() {
     const StepMeter::Iteration measured(meter_, iteration);
     terms = step();
   }
-  std::string trouble = state_.divergence.check(terms, non_finite_);
+  std::string problem = state_.divergence.check(terms, non_finite_);
   const double step_seconds = seconds_since(start);
   state_.seconds += step_seconds;
   emit_density();
   emit_step(terms, step_seconds);
-  return trouble;
+  return problem;
 }
 
 void Trainer::roll_back() {
