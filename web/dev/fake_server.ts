@@ -3,8 +3,8 @@ import { createServer, type IncomingMessage, type ServerResponse } from 'node:ht
 import { WebSocketServer } from 'ws';
 import type { Hello, State } from '../src/messages.ts';
 import { look_at } from '../src/math/camera.ts';
-import { Guest } from './guest.ts';
 import { captured_cameras, start } from './scene.ts';
+import { Session } from './session.ts';
 import { Training } from './training.ts';
 
 // Stands in for `traceflow train --view` and `traceflow view` while the page is worked on: the same messages, drawn
@@ -47,11 +47,11 @@ const state = (): State => ({
   iteration: training.iteration,
   iterations: source === 'ply' ? 0 : 8000,
   surfels: source === 'ply' ? { main: 184203, environment: 0 } : training.surfels(),
-  viewers: guests.size,
+  viewers: sessions.size,
 });
 
-const guests = new Set<Guest>();
-const tell_state = (): void => guests.forEach((guest) => guest.tell(state()));
+const sessions = new Set<Session>();
+const tell_state = (): void => sessions.forEach((session) => session.send(state()));
 
 const policy =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; base-uri 'none'";
@@ -91,7 +91,7 @@ const sockets = new WebSocketServer({
 });
 
 sockets.on('connection', (socket) => {
-  const guest: Guest = new Guest(socket, {
+  const session: Session = new Session(socket, {
     hello,
     slow: Number(SLOW),
     iteration: () => training.iteration,
@@ -104,20 +104,20 @@ sockets.on('connection', (socket) => {
       tell_state();
     },
   });
-  guests.add(guest);
+  sessions.add(session);
   socket.on('close', () => {
-    guests.delete(guest);
+    sessions.delete(session);
     tell_state();
   });
-  guest.tell(hello);
-  guest.tell({ type: 'events', events: log, reset: true });
+  session.send(hello);
+  session.send({ type: 'events', events: log, reset: true });
   tell_state();
 });
 
 function publish(made: typeof log): void {
   if (made.length === 0) return;
   log = [...log, ...made];
-  guests.forEach((guest) => guest.tell({ type: 'events', events: made, reset: false }));
+  sessions.forEach((session) => session.send({ type: 'events', events: made, reset: false }));
 }
 
 if (source === 'training') {
@@ -126,13 +126,13 @@ if (source === 'training') {
     publish(training.advance());
     if (training.iteration === before) return;
     tell_state();
-    if (training.iteration % 100 === 0) guests.forEach((guest) => guest.refresh());
+    if (training.iteration % 100 === 0) sessions.forEach((session) => session.refresh());
   }, 400);
 }
 
 // What goes wrong, on demand: a line on standard input becomes the warning, an empty one ends it.
 process.stdin.on('data', (text: Buffer) =>
-  guests.forEach((g) => g.tell({ type: 'warning', text: String(text).trim() })),
+  sessions.forEach((session) => session.send({ type: 'warning', text: String(text).trim() })),
 );
 process.stdin.unref?.();
 

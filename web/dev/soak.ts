@@ -1,8 +1,8 @@
 import { readFileSync } from 'node:fs';
-import { pause, Visitor } from './visitor.ts';
+import { Client, pause } from './client.ts';
 
-// Eight visitors that come and go: node .build/dev/soak.js ADDRESS PID [MINUTES]. Each looks around, rests, asks for a still, a photograph
-// and a ray, and leaves: most politely, some as a broken network does. Prints the program's memory as it goes.
+// Eight clients that connect and disconnect: node .build/dev/soak.js ADDRESS PID [MINUTES]. Each looks around, rests, asks for a still, a
+// photograph and a ray, and disconnects: most properly, some as when the network fails. Prints the program's memory as it goes.
 
 const [address = '', process_id = '', minutes = '10'] = process.argv.slice(2);
 const end = performance.now() + 60_000 * Number(minutes);
@@ -16,23 +16,23 @@ function resident_mebibytes(): number {
 }
 
 async function visit(): Promise<void> {
-  const visitor = await Visitor.enter(address);
+  const client = await Client.connect(address);
   count.visits += 1;
   const [width, height] = [Math.round(between(160, 960)), Math.round(between(90, 540))];
-  const layers = visitor.hello?.layers ?? [];
+  const layers = client.hello?.layers ?? [];
   for (let turn = 0; turn < between(5, 30); turn++) {
     const layer = layers[Math.floor(Math.random() * layers.length)]?.name ?? 'rgb';
-    visitor.request_view(turn, width, height, Math.random() < 0.7, { layer, time: Math.random(), ...(layer === 'difference' ? { photo: { split: 'test', index: 0 } } : {}) });
-    if (Math.random() < 0.1) visitor.say({ type: 'still', id: 1, width: 320, height: 180 });
-    if (Math.random() < 0.1) visitor.say({ type: 'photo', split: 'train', index: 0, width: 480 });
-    if (Math.random() < 0.2) visitor.say({ type: 'probe', id: 1, x: Math.random(), y: Math.random() });
-    if (Math.random() < 0.05) visitor.say({ type: 'sleep' });
+    client.request_view(turn, width, height, Math.random() < 0.7, { layer, time: Math.random(), ...(layer === 'difference' ? { photo: { split: 'test', index: 0 } } : {}) });
+    if (Math.random() < 0.1) client.send({ type: 'still', id: 1, width: 320, height: 180 });
+    if (Math.random() < 0.1) client.send({ type: 'photo', split: 'train', index: 0, width: 480 });
+    if (Math.random() < 0.2) client.send({ type: 'probe', id: 1, x: Math.random(), y: Math.random() });
+    if (Math.random() < 0.05) client.send({ type: 'sleep' });
     await pause(between(20, 300));
   }
-  count.frames += visitor.frames;
-  count.bytes += visitor.bytes;
-  if (Math.random() < 0.3) visitor.vanish();
-  else visitor.leave();
+  count.frames += client.frames;
+  count.bytes += client.bytes;
+  if (Math.random() < 0.3) client.terminate();
+  else client.close();
 }
 
 async function visits(): Promise<void> {

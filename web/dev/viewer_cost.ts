@@ -1,11 +1,11 @@
-import { pause, Visitor } from './visitor.ts';
+import { Client, pause } from './client.ts';
 
-// What a viewer costs a training: node .build/dev/share.js ADDRESS [SECONDS [ROUNDS]]. Turn about, nobody looks, somebody looks at a
-// picture at rest, and somebody turns the camera without end; prints the iterations a second of each, the share of the time that went
+// What a viewer costs a training: node .build/dev/viewer_cost.js ADDRESS [SECONDS [ROUNDS]]. Turn about, nobody looks, somebody looks at
+// a picture at rest, and somebody turns the camera without end; prints the iterations a second of each, the share of the time that went
 // into pictures, and by how much the training slowed down in its own time.
 
 const [address = '', seconds = '15', rounds = '4'] = process.argv.slice(2);
-const visitor = await Visitor.enter(address);
+const client = await Client.connect(address);
 const size = [480, 270] as const;
 
 const kinds = ['nobody', 'at rest', 'moving'] as const;
@@ -13,18 +13,18 @@ const totals = new Map(kinds.map((kind) => [kind, { iterations: 0, seconds: 0, f
 for (let round = 0; round < Number(rounds); round++) {
   for (const kind of kinds) {
     let turn = 0;
-    visitor.onframe = () => kind === 'moving' && visitor.request_view((turn += 0.1), ...size, true);
-    if (kind === 'nobody') visitor.say({ type: 'sleep' });
-    else visitor.request_view(turn, ...size, kind === 'moving');
+    client.onframe = () => kind === 'moving' && client.request_view((turn += 0.1), ...size, true);
+    if (kind === 'nobody') client.send({ type: 'sleep' });
+    else client.request_view(turn, ...size, kind === 'moving');
     await pause(1000); // what was begun ends, and the state is told
     const total = totals.get(kind);
     if (!total) break;
-    const [iteration, frames, start, trained] = [visitor.state?.iteration ?? 0, visitor.frames, performance.now(), visitor.trained];
+    const [iteration, frames, start, trained] = [client.state?.iteration ?? 0, client.frames, performance.now(), client.trained];
     await pause(1000 * Number(seconds));
-    total.iterations += (visitor.state?.iteration ?? 0) - iteration;
-    total.frames += visitor.frames - frames;
+    total.iterations += (client.state?.iteration ?? 0) - iteration;
+    total.frames += client.frames - frames;
     total.seconds += (performance.now() - start) / 1000;
-    total.trained += visitor.trained - trained;
+    total.trained += client.trained - trained;
   }
 }
 const percent = (part: number): string => `${(100 * part).toFixed(1)} %`;
@@ -41,4 +41,4 @@ for (const [kind, total] of totals) {
       `the training ${percent(slower)} slower in its own`,
   );
 }
-visitor.leave();
+client.close();

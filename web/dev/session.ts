@@ -23,8 +23,8 @@ interface Host {
 
 const steps = [8, 4, 2, 1]; // how many times coarser, one after the other
 
-// One page that is connected.
-export class Guest {
+// The fake server's end of one page's connection.
+export class Session {
   private view: ViewRequest | null = null;
   private step = 0;
   private frame = 0;
@@ -36,10 +36,10 @@ export class Guest {
   constructor(socket: WebSocket, host: Host) {
     this.socket = socket;
     this.host = host;
-    socket.on('message', (data: Buffer) => this.hear(JSON.parse(String(data)) as Request));
+    socket.on('message', (data: Buffer) => this.receive(JSON.parse(String(data)) as Request));
   }
 
-  tell(reply: Reply): void {
+  send(reply: Reply): void {
     this.socket.send(JSON.stringify(reply));
   }
 
@@ -49,14 +49,14 @@ export class Guest {
     this.work();
   }
 
-  private picture(header: PictureHeader, bytes: Buffer): void {
+  private send_picture(header: PictureHeader, bytes: Buffer): void {
     const text = Buffer.from(JSON.stringify(header));
     const size = Buffer.alloc(4);
     size.writeUInt32LE(text.length);
     this.socket.send(Buffer.concat([size, text, bytes]));
   }
 
-  private hear(request: Request): void {
+  private receive(request: Request): void {
     switch (request.type) {
       case 'view':
         this.view = request;
@@ -73,39 +73,39 @@ export class Guest {
       case 'photo': {
         const captured = this.host.hello.cameras[request.split][request.index];
         if (!captured)
-          return this.tell({ type: 'refused', request: 'photo', id: 0, text: 'There is no such photograph.' });
+          return this.send({ type: 'refused', request: 'photo', id: 0, text: 'There is no such photograph.' });
         const width = Math.min(request.width, captured.width);
         const height = Math.round((width * captured.height) / captured.width);
         const wanted = { layer: 'photograph', exposure: 0, map: '' };
         const { split, index } = request;
         return void render(captured, captured.time, width, height, wanted).then((rows) => {
           if (rows)
-            this.picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
+            this.send_picture({ type: 'photo', split, index, width, height, format: 'jpeg' }, png(rows, width, height));
         });
       }
       case 'probe': {
         const from = this.camera();
         if (!this.view || !from) return;
         const along = ray_through(from, this.view.width / this.view.height, request);
-        return this.tell(probe(from, this.view.time, along, request.id));
+        return this.send(probe(from, this.view.time, along, request.id));
       }
       case 'still': {
         const from = this.camera();
         if (!this.view || !from) return;
         const { id, width, height } = request;
         if (width * height > 3e7)
-          return this.tell({
+          return this.send({
             type: 'refused',
             request: 'still',
             id,
             text: 'A picture of this size would not fit into memory.',
           });
         return void render(from, this.view.time, width, height, this.view).then((rows) => {
-          if (rows) this.picture({ type: 'still', id, width, height, format: 'png' }, png(rows, width, height));
+          if (rows) this.send_picture({ type: 'still', id, width, height, format: 'png' }, png(rows, width, height));
         });
       }
       case 'path':
-        return this.tell({ type: 'path', id: request.id, shots: shots(request.path, this.host.hello) });
+        return this.send({ type: 'path', id: request.id, shots: shots(request.path, this.host.hello) });
     }
   }
 
@@ -148,7 +148,7 @@ export class Guest {
       iteration: this.host.iteration(),
       format: 'jpeg' as const,
     };
-    this.picture(header, bytes);
+    this.send_picture(header, bytes);
   }
 }
 

@@ -1,8 +1,8 @@
 import { WebSocket } from 'ws';
 import type { FrameHeader, Hello, PictureHeader, Reply, Request, State, ViewRequest } from '../src/messages.ts';
 
-// A page without a browser: it connects to the program as the page does, and counts what comes.
-export class Visitor {
+// A client without a browser: it connects to the program as the page does, and counts what comes.
+export class Client {
   frames = 0;
   bytes = 0;
   latencies: number[] = []; // ms from a ViewRequest to its first frame
@@ -17,25 +17,25 @@ export class Visitor {
 
   private constructor(socket: WebSocket) {
     this.socket = socket;
-    socket.on('message', (data: Buffer, binary: boolean) => this.hear(data, binary));
+    socket.on('message', (data: Buffer, binary: boolean) => this.receive(data, binary));
     socket.on('error', () => undefined);
   }
 
   // address: as the program prints it, token included.
-  static async enter(address: string): Promise<Visitor> {
+  static async connect(address: string): Promise<Client> {
     const { origin } = new URL(address);
     const cookie = ((await fetch(address)).headers.get('set-cookie') ?? '').split(';')[0] ?? '';
     const socket = new WebSocket(`${origin.replace('http', 'ws')}/ws`, { headers: { Cookie: cookie }, origin });
-    const visitor = new Visitor(socket);
+    const client = new Client(socket);
     await new Promise((open, failed) => {
       socket.once('open', open);
       socket.once('error', failed);
     });
-    while (!visitor.hello) await new Promise((wait) => setTimeout(wait, 5));
-    return visitor;
+    while (!client.hello) await new Promise((wait) => setTimeout(wait, 5));
+    return client;
   }
 
-  say(request: Request): void {
+  send(request: Request): void {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(request));
   }
 
@@ -49,19 +49,19 @@ export class Visitor {
     this.view_id += 1;
     this.asked.set(this.view_id, performance.now());
     const view: ViewRequest = { type: 'view', id: this.view_id, time: 0, width, height, layer: 'rgb', exposure: 0, map: 'viridis', moving, ...more };
-    this.say(view.photo ? view : { ...view, camera: { ...start, position } });
+    this.send(view.photo ? view : { ...view, camera: { ...start, position } });
   }
 
-  leave(): void {
+  close(): void {
     this.socket.close();
   }
 
   // As when the network fails.
-  vanish(): void {
+  terminate(): void {
     this.socket.terminate();
   }
 
-  private hear(data: Buffer, binary: boolean): void {
+  private receive(data: Buffer, binary: boolean): void {
     this.bytes += data.length;
     if (!binary) {
       const reply = JSON.parse(String(data)) as Reply;
@@ -79,7 +79,7 @@ export class Visitor {
     const since = this.asked.get(header.view);
     if (since !== undefined) this.latencies.push(performance.now() - since);
     for (const id of this.asked.keys()) if (id <= header.view) this.asked.delete(id);
-    this.say({ type: 'frame_shown', frame: header.frame });
+    this.send({ type: 'frame_shown', frame: header.frame });
     this.onframe(header);
   }
 }
