@@ -136,7 +136,8 @@ export class Session {
     const rows = await render(from, view.time, width, height, view, () => !view.moving && view !== this.view);
     if (!rows) return;
     const bytes = png(rows, width, height);
-    this.step = view.moving ? steps.length : this.step + 1;
+    // A newer request has its own steps to go.
+    if (view === this.view) this.step = view.moving ? steps.length : this.step + 1;
     const header = {
       type: 'frame' as const,
       frame: ++this.frame,
