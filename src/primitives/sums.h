@@ -29,6 +29,13 @@ void ordered_sum(Device device, const char* description, int64_t n, const F& f, 
   sum(description, n, f, finish);
 }
 
+// A `finish` that stores the sum.
+template <class T>
+struct StoreSum {
+  T* to;
+  TRACEFLOW_HD void operator()(const T& sum) const { *to = sum; }
+};
+
 // A sum and the number of its terms.
 struct CountedSum {
   double sum = 0;

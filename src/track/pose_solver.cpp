@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <utility>
 
 #include "base/parallel.h"
@@ -28,21 +30,14 @@ constexpr double pi = 3.141592653589793;
 constexpr int tries = 3;
 constexpr double shorter = 0.4;
 
-// Solves a x = b for a symmetric positive definite a (n×n), by Gaussian elimination.
-std::vector<double> solve_symmetric(std::vector<double> a, std::vector<double> b) {
-  const size_t n = b.size();
-  for (size_t i = 0; i < n; ++i) {
-    for (size_t j = i + 1; j < n; ++j) {
-      const double factor = a[j * n + i] / a[i * n + i];
-      for (size_t k = i; k < n; ++k) a[j * n + k] -= factor * a[i * n + k];
-      b[j] -= factor * b[i];
-    }
-  }
-  for (size_t i = n; i-- > 0;) {
-    for (size_t k = i + 1; k < n; ++k) b[i] -= a[i * n + k] * b[k];
-    b[i] /= a[i * n + i];
-  }
-  return b;
+// Solves a x = b for a symmetric positive definite a (n×n).
+std::vector<double> solve_symmetric(const std::vector<double>& a, const std::vector<double>& b) {
+  const auto n = static_cast<Eigen::Index>(b.size());
+  std::vector<double> x(b.size());
+  const Eigen::Map<const Eigen::MatrixXd> matrix(a.data(), n, n);
+  Eigen::Map<Eigen::VectorXd>(x.data(), n) =
+      matrix.ldlt().solve(Eigen::Map<const Eigen::VectorXd>(b.data(), n));
+  return x;
 }
 
 // Corrects priors by the bias of those outside the mask.

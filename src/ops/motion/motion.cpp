@@ -67,7 +67,7 @@ void backward(const Motion& motion, const Tensor<int32_t>& body, float time, con
           device, "motion: pose gradient", moved.count(),
           PoseGradientOfSurfel{carrier, static_cast<int32_t>(b), bodies, generators.data(), view_of(moved),
                                view_of(static_cast<const PosedSurfels&>(grad_posed))},
-          StorePoseGradient{gradients.data() + b}, 1024);
+          StoreSum<PoseGradient>{gradients.data() + b}, 1024);
     }
     parallel_for(device, "motion: add to keys", motion.bodies(),
                  AddToKeys{gradients.data(), motion.time.data(), motion.rotation.data(), motion.keys(),

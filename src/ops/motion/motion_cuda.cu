@@ -13,6 +13,6 @@ template void cuda::for_each_index(const char*, int64_t, const motion::HoldOpaci
 template void cuda::for_each_index(const char*, int64_t, const motion::SpreadOverKeys&);
 template void cuda::sum_each_index<motion::PoseGradient>(const char*, int64_t,
                                                          const motion::PoseGradientOfSurfel&,
-                                                         const motion::StorePoseGradient&);
+                                                         const StoreSum<motion::PoseGradient>&);
 
 }  // namespace traceflow

@@ -100,11 +100,6 @@ struct PoseGradientOfSurfel {
   }
 };
 
-struct StorePoseGradient {
-  PoseGradient* to;
-  TRACEFLOW_HD void operator()(const PoseGradient& sum) const { *to = sum; }
-};
-
 // i: a body.
 struct AddToKeys {
   const PoseGradient* gradients;

@@ -65,7 +65,7 @@ void backward(const Nodes& nodes, const Tensor<int32_t>& body, float time, const
           device, "nodes: node gradient", count,
           NodeGradientOfSurfel{saved.nodes.data() + n, saved.weights.data() + n * count, saved.rest.data(),
                                saved.turns.data(), grad_posed.position.data()},
-          StoreNodeGradient{saved.gradients.data() + n}, 4096);
+          StoreSum<NodeGradient>{saved.gradients.data() + n}, 4096);
     }
     parallel_for(device, "nodes: add to keys", nodes.count(),
                  AddToKeys{saved.gradients.data(), saved.nodes.data(), nodes.time.data(), nodes.times(),

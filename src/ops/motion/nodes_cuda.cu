@@ -13,6 +13,6 @@ template void cuda::for_each_index(const char*, int64_t, const nodes::Resistance
 template void cuda::for_each_index(const char*, int64_t, const nodes::HoldFirst&);
 template void cuda::sum_each_index<nodes::NodeGradient>(const char*, int64_t,
                                                         const nodes::NodeGradientOfSurfel&,
-                                                        const nodes::StoreNodeGradient&);
+                                                        const StoreSum<nodes::NodeGradient>&);
 
 }  // namespace traceflow

@@ -142,11 +142,6 @@ struct NodeGradientOfSurfel {
   }
 };
 
-struct StoreNodeGradient {
-  NodeGradient* to;
-  TRACEFLOW_HD void operator()(const NodeGradient& sum) const { *to = sum; }
-};
-
 struct AddToKeys {
   const NodeGradient* gradients;
   const PosedNode* nodes;

@@ -35,7 +35,7 @@ CameraShare run_on_device(const ProjectBackward& op, int64_t n, bool wants_camer
   CameraShare total;
   if (wants_camera) {
     ordered_sum<CameraShare>(Device::cuda, "raster: camera", n, CameraShareOf{shares.data()},
-                             KeepCamera{shares.data() + n}, 1);
+                             StoreSum<CameraGradient<double>>{shares.data() + n}, 1);
     // The host waits for this copy because poses are stored on the host.
     memory::copy(Device::cpu, &total, Device::cuda, shares.data() + n, sizeof(total));
   }

@@ -163,9 +163,5 @@ struct CameraShareOf {
   const CameraGradient<double>* camera;
   TRACEFLOW_HD CameraGradient<double> operator()(int64_t i) const { return camera[i]; }
 };
-struct KeepCamera {
-  CameraGradient<double>* total;
-  TRACEFLOW_HD void operator()(const CameraGradient<double>& sum) const { *total = sum; }
-};
 
 }  // namespace traceflow::raster

@@ -17,7 +17,7 @@ void backward_on_device(const char* description, int64_t n, const Step& step,
   }
   static thread_local Tensor<CameraSum<T>> kept;
   kept.place(Device::cuda).resize({1});
-  ordered_sum<CameraSum<T>>(Device::cuda, description, n, step, KeepCamera<T>{kept.data()}, 0);
+  ordered_sum<CameraSum<T>>(Device::cuda, description, n, step, StoreSum<CameraSum<T>>{kept.data()}, 0);
   std::vector<CameraSum<T>> total(1);
   memory::copy(Device::cpu, total.data(), Device::cuda, kept.data(), sizeof(total[0]));
   add_in_order(total, *grad_camera);

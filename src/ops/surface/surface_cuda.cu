@@ -6,18 +6,17 @@
 namespace traceflow {
 
 using surface::CameraSum;
-using surface::KeepCamera;
 
 template void cuda::for_each_index(const char*, int64_t, const surface::PseudoNormals<float>&);
 template void cuda::for_each_index(const char*, int64_t, const surface::PseudoNormalsBackward<float>&);
 template void cuda::sum_each_index<CameraSum<float>>(const char*, int64_t,
                                                      const surface::PseudoNormalsBackward<float>&,
-                                                     const KeepCamera<float>&);
+                                                     const StoreSum<CameraSum<float>>&);
 template void cuda::for_each_index(const char*, int64_t, const surface::ReflectionRays<float>&);
 template void cuda::for_each_index(const char*, int64_t, const surface::ReflectionRaysBackward<float>&);
 template void cuda::sum_each_index<CameraSum<float>>(const char*, int64_t,
                                                      const surface::ReflectionRaysBackward<float>&,
-                                                     const KeepCamera<float>&);
+                                                     const StoreSum<CameraSum<float>>&);
 template void cuda::for_each_index(const char*, int64_t, const FlagWhere<surface::IsTraced>&);
 template void cuda::for_each_index(const char*, int64_t, const surface::ListedWeight&);
 

@@ -249,11 +249,4 @@ struct ListedWeight {
   TRACEFLOW_HD void operator()(int64_t k) const { listed[k] = weight(pixel[k]); }
 };
 
-// Stores a camera's gradient for the host to read.
-template <class T>
-struct KeepCamera {
-  CameraSum<T>* kept;
-  TRACEFLOW_HD void operator()(const CameraSum<T>& sum) const { *kept = sum; }
-};
-
 }  // namespace traceflow::surface

@@ -259,8 +259,8 @@ void distance(const Network& network, const Tensor<float>& image, const Tensor<f
   const Four* const grad = fours(backward(network, {image.dim(0), image.dim(1)}, memory).data());
   const int64_t pixels = image.dim(0) * image.dim(1);
   double* const check = sized(memory.check, {1});
-  ordered_sum<double>(Device::cuda, "lpips: check gradient", pixels, CheckGradient{grad}, Keep{check},
-                      sum_grain);
+  ordered_sum<double>(Device::cuda, "lpips: check gradient", pixels, CheckGradient{grad},
+                      StoreSum<double>{check}, sum_grain);
   parallel_for(Device::cuda, "lpips: add gradient", pixels,
                AddGradient{grad, value, check, input, grad_image.data()});
 }

@@ -15,6 +15,7 @@ template void cuda::for_each_index(const char*, int64_t, const AddPatches&);
 template void cuda::for_each_index(const char*, int64_t, const AddGradient&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const ScaleImages&, const BeginDistance&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const Load&, const AddToDistance&);
-template void cuda::sum_each_index<double>(const char*, int64_t, const CheckGradient&, const Keep&);
+template void cuda::sum_each_index<double>(const char*, int64_t, const CheckGradient&,
+                                           const StoreSum<double>&);
 
 }  // namespace traceflow

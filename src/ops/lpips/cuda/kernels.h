@@ -243,10 +243,6 @@ struct AddToDistance {
   double share;
   TRACEFLOW_HD void operator()(double sum) const { distance->value += share * sum; }
 };
-struct Keep {
-  double* to;
-  TRACEFLOW_HD void operator()(double sum) const { *to = sum; }
-};
 
 // 0, or NaN if a pixel's gradient is not finite. i: pixel.
 struct CheckGradient {

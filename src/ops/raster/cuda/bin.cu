@@ -17,7 +17,7 @@ namespace traceflow {
 template void cuda::for_each_index(const char*, int64_t, const raster::ProjectSurfel&);
 template void cuda::for_each_index(const char*, int64_t, const raster::ProjectBackwardStep&);
 template void cuda::sum_each_index<CameraGradient<double>>(const char*, int64_t, const raster::CameraShareOf&,
-                                                           const raster::KeepCamera&);
+                                                           const StoreSum<CameraGradient<double>>&);
 
 namespace raster::cuda_stage {
 
