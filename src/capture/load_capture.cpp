@@ -92,7 +92,7 @@ class Assembly {
                          "none, and " + std::to_string(found_.test.size()) + " test views", "at least one",
                          "--test-every 0 trains on all views where the capture does not split them");
       }
-      throw InputError(capture_.folder.string(), "training views", "none that is whole",
+      throw InputError(capture_.folder.string(), "training views", "no complete view",
                        "an image, a camera and a time each", "see what is missing: " + missing->text);
     }
     stretch_times();

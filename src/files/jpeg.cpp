@@ -205,7 +205,7 @@ class JpegReader {
 
   void check(const JpegSize& size) {
     const J_COLOR_SPACE colours = jpeg_.jpeg_color_space;
-    if (colours == JCS_CMYK || colours == JCS_YCCK) fail("the colours of print (CMYK)");
+    if (colours == JCS_CMYK || colours == JCS_YCCK) fail("CMYK colours");
     if (colours != JCS_GRAYSCALE && colours != JCS_YCbCr && colours != JCS_RGB)
       fail(std::to_string(jpeg_.num_components) + " colour components");
     // Its codes have no minimum number of bytes.

@@ -130,7 +130,7 @@ ZipMember find_member(const InputFile& file, const std::string& name) {
     names += (names.empty() ? "" : ", ") + member.name;
   }
   if (!name.empty()) fail(file.path(), "", "arrays " + names, "an array named " + name);
-  if (members.empty()) fail(file.path(), "", "an archive of nothing", "one array");
+  if (members.empty()) fail(file.path(), "", "an archive without arrays", "one array");
   if (members.size() != 1)
     fail(file.path(), "", std::to_string(members.size()) + " arrays (" + names + ")", "one array");
   return members.front();
@@ -154,7 +154,7 @@ void NpyFile::read_header(int64_t begin, int64_t end) {
   const int64_t available = std::min(fixed, end - begin);
   file_.read_at(begin, std::as_writable_bytes(std::span(prefix).first(static_cast<size_t>(available))));
   if (available < 10 || std::memcmp(prefix, magic.data(), magic.size()) != 0) {
-    fail(path(), "", "a file that does not start as one", "a .npy array");
+    fail(path(), "", "a file without the .npy signature", "a .npy array");
   }
   const int version = prefix[6];
   if (version < 1 || version > 3)

@@ -87,7 +87,7 @@ Directory find_directory(const InputFile& file) {
     return {end64.u64(48), end64.u64(40)};
   }
   const bool begins_as_one = bytes.size() >= 4 && Bytes(file, 0, 4).u32(0) == local_signature;
-  fail(file, begins_as_one ? "a zip archive whose end is missing" : "a file that is no zip archive");
+  fail(file, begins_as_one ? "a zip archive whose end is missing" : "a file that is not a zip archive");
 }
 
 // Sizes of 4 GiB and more are in an extra field, in a fixed order; it has only those that did not fit.
@@ -112,7 +112,7 @@ void refuse_overlaps(const InputFile& file, std::vector<ZipMember> members) {
   for (size_t i = 1; i < members.size(); ++i) {
     const ZipMember& before = members[i - 1];
     if (members[i].offset < before.offset + std::max<int64_t>(before.stored_size, 1))
-      fail(file, "zip members on top of one another");
+      fail(file, "overlapping zip members");
   }
 }
 
@@ -213,7 +213,7 @@ InputFile inflate_to_scratch(const InputFile& file, const ZipMember& member) {
     checksum = crc32(checksum, reinterpret_cast<const Bytef*>(output.data()), static_cast<uInt>(made));
   }
   if (scratch.size() != member.size || checksum != member.checksum)
-    fail(file, "a zip member that is not what its checksum says");
+    fail(file, "a zip member with a wrong checksum");
   return scratch;
 }
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-// Input that cannot be used, kind by kind, and what is said of it: the cases of docs/malformed.md.
+// Kinds of malformed input with the expected messages: the cases of docs/malformed.md.
 namespace traceflow::cli {
 
 // Bytes by path, below the folder that the program is run in.

@@ -70,28 +70,28 @@ MalformedKind malformed_images() {
   return {"Images",
           {{"an empty photograph", inspect_capture, put(photograph, ""),
             "capture/rgb/1x/a.png: found an empty file, expected a PNG or JPEG image; convert it"},
-           {"text in the place of a photograph", inspect_capture, put(photograph, "<html>"),
+           {"text for a photograph", inspect_capture, put(photograph, "<html>"),
             "capture/rgb/1x/a.png: found a file that begins with \"<html>\", expected a PNG or JPEG image; "
             "convert it"},
-           {"a photograph of a kind that is not read", inspect_capture, put(photograph, "GIF89a\1\1"),
+           {"a photograph in an unsupported format", inspect_capture, put(photograph, "GIF89a\1\1"),
             "capture/rgb/1x/a.png: found a GIF image, expected a PNG or JPEG image; convert it"},
            {"a photograph cut short in its header", inspect_capture, cut(photograph, 20),
             "capture/rgb/1x/a.png: found the file is cut short, expected a PNG image of at most 32,768 "
             "pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a photograph of no width", inspect_capture, put(photograph, png_of_size(0, 16)),
+           {"a photograph of zero width", inspect_capture, put(photograph, png_of_size(0, 16)),
             "capture/rgb/1x/a.png: width: found 0, expected 1 to 32768 pixels; write or copy the file again"},
-           {"a photograph wider than is read", inspect_capture, put(photograph, png_of_size(40000, 16)),
+           {"a photograph over the width limit", inspect_capture, put(photograph, png_of_size(40000, 16)),
             "capture/rgb/1x/a.png: width: found 40000, expected 1 to 32768 pixels; scale the image down"},
-           {"a photograph of more pixels than is read", inspect_capture,
+           {"a photograph over the pixel limit", inspect_capture,
             put(photograph, png_of_size(32768, 32768)),
             "capture/rgb/1x/a.png: found 32768×32768, expected a PNG image of at most 32,768 pixels a side "
             "and 2²⁸ in all; write or copy the file again"},
-           {"a photograph smaller than it is to be",
+           {"a photograph smaller than its camera says",
             {"inspect", "-d", "capture", "--set", "capture.downscale=32"},
             [](Files&) {},
             "capture/rgb/1x/a.png: size: found 24×16, expected at least 32 pixels a side; use a smaller "
             "--downscale"},
-           {"a PNG that promises more than it holds", inspect_capture, put(prior, png_of_size(16384, 16384)),
+           {"a PNG shorter than its header says", inspect_capture, put(prior, png_of_size(16384, 16384)),
             "capture/normal/1x/a.png: found a file too short for an image of 16384×16384, expected a PNG "
             "image of at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
            {"a PNG cut short", inspect_capture, cut(prior, 300),
@@ -100,16 +100,16 @@ MalformedKind malformed_images() {
            {"a PNG with a byte changed", inspect_capture, [](Files& files) { files.at(prior)[100] ^= 1; },
             "capture/normal/1x/a.png: found IDAT: incorrect data check, expected a PNG image of at most "
             "32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a PNG of grey in the place of normals", inspect_capture,
+           {"a grey PNG for normals", inspect_capture,
             [](Files& files) { files.at(prior) = jpeg(JCS_GRAYSCALE, 1); },
             "capture/normal/1x/a.png: channels: found 1, expected 3 (normals as 2v - 1)"},
            {"a JPEG cut short", inspect_capture, jpeg_prior(whole.substr(0, whole.size() - 40)),
             "capture/normal/1x/a.png: found a file that is cut short, expected a JPEG image, grey or RGB, of "
             "at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a JPEG in the colours of print", inspect_capture, jpeg_prior(cmyk),
-            "capture/normal/1x/a.png: found the colours of print (CMYK), expected a JPEG image, grey or RGB, "
+           {"a CMYK JPEG", inspect_capture, jpeg_prior(cmyk),
+            "capture/normal/1x/a.png: found CMYK colours, expected a JPEG image, grey or RGB, "
             "of at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"},
-           {"a JPEG with its picture missing", inspect_capture, jpeg_prior(whole.substr(0, 30)),
+           {"a JPEG without image data", inspect_capture, jpeg_prior(whole.substr(0, 30)),
             "capture/normal/1x/a.png: found a file that is cut short, expected a JPEG image, grey or RGB, of "
             "at most 32,768 pixels a side and 2²⁸ in all; write or copy the file again"}}};
 }
@@ -117,18 +117,18 @@ MalformedKind malformed_images() {
 MalformedKind malformed_archives() {
   return {
       "Archives: .zip",
-      {{"another kind of file", inspect_zip, put(archive, "Rar!\x1a\7"),
-        "capture.zip: found a file that is no zip archive, expected a whole zip archive, stored or deflated; "
+      {{"another file type", inspect_zip, put(archive, "Rar!\x1a\7"),
+        "capture.zip: found a file that is not a zip archive, expected a whole zip archive, stored or deflated; "
         "pack or save "
         "it again"},
        {"cut short", inspect_zip, packed([](std::string& zip) { zip.resize(zip.size() / 2); }),
         "capture.zip: found a zip archive whose end is missing, expected a whole zip archive, stored or "
         "deflated; pack or save "
         "it again"},
-       {"a member with a password", inspect_zip, packed(in_directory(8, std::string("\1\0", 2))),
+       {"an encrypted member", inspect_zip, packed(in_directory(8, std::string("\1\0", 2))),
         "capture.zip: found an encrypted zip member, expected a whole zip archive, stored or deflated; pack "
         "or save it again"},
-       {"another way of compressing", inspect_zip, packed(in_directory(10, std::string("\x0e\0", 2))),
+       {"an unsupported compression method", inspect_zip, packed(in_directory(10, std::string("\x0e\0", 2))),
         "capture.zip: found zip compression method 14, expected a whole zip archive, stored or deflated; "
         "pack or save it again"},
        {"a member outside the archive", inspect_zip, packed(in_directory(42, "\xff\xff\xff\x7f")),
@@ -137,26 +137,26 @@ MalformedKind malformed_archives() {
        {"a path that leads out", inspect_zip, members({{"../dataset.json", "{}"}}),
         "capture.zip: found a member \"../dataset.json\", expected members inside the archive's own folder; "
         "pack the archive again"},
-       {"a path from the root", inspect_zip, members({{"/etc/passwd", "{}"}}),
+       {"an absolute path", inspect_zip, members({{"/etc/passwd", "{}"}}),
         "capture.zip: found a member \"/etc/passwd\", expected members inside the archive's own folder; pack "
         "the archive again"},
-       {"a path of Windows", inspect_zip, members({{"..\\dataset.json", "{}"}}),
+       {"a Windows path", inspect_zip, members({{"..\\dataset.json", "{}"}}),
         "capture.zip: found a member \"..\\dataset.json\", expected members inside the archive's own folder; "
         "pack the archive again"},
        {"a name with a zero byte", inspect_zip, members({{std::string("a\0b", 3), "{}"}}),
         "capture.zip: found a member \"a?b\", expected members inside the archive's own folder; pack the "
         "archive again"},
-       {"two members of one name", inspect_zip, members({{"dataset.json", "{}"}, {"./dataset.json", "[]"}}),
+       {"two members with one name", inspect_zip, members({{"dataset.json", "{}"}, {"./dataset.json", "[]"}}),
         "capture.zip: found two members dataset.json, expected each name once; pack the archive again"},
-       {"members on top of one another", inspect_zip,
+       {"overlapping members", inspect_zip,
         [](Files& files) {
           std::string& zip = files[archive] = zip_archive({{"a", "12"}, {"b", "3"}}, false);
           const size_t second = zip.rfind("PK\1\2");
           zip.replace(second + 42, 4, std::string(4, '\0'));
         },
-        "capture.zip: found zip members on top of one another, expected a whole zip archive, stored or "
+        "capture.zip: found overlapping zip members, expected a whole zip archive, stored or "
         "deflated; pack or save it again"},
-       {"a member that unpacks to more than it can", inspect_zip,
+       {"a member with an impossible size", inspect_zip,
         packed(in_directory(24, "\xff\xff\xff\x7f")),
         "capture.zip: found a zip member of 100 bytes that unpacks to 2147483647, expected a whole zip "
         "archive, stored or deflated; pack or save it again"},
@@ -164,7 +164,7 @@ MalformedKind malformed_archives() {
           const std::string name = "capture/dataset.json";
           zip[zip.find(name) + name.size() + 12] ^= 1;
         }),
-        "capture.zip: found a zip member that is not what its checksum says, expected a whole zip archive, "
+        "capture.zip: found a zip member with a wrong checksum, expected a whole zip archive, "
         "stored or deflated; pack or save it again"}}};
 }
 

@@ -49,42 +49,42 @@ MalformedKind malformed_arrays() {
   const std::string points = "capture/points.npy", pictures = npy("'<f4'", "(2, 1, 1, 3)", 24);
   return {
       "Arrays: .npy and .npz",
-      {{"objects of Python", trace, put(rays, npy("'|O'", "(1, 6)", 24)),
+      {{"pickled Python objects", trace, put(rays, npy("'|O'", "(1, 6)", 24)),
         "rays.npy: descr: found an array of Python objects, expected numbers of one type; save the array "
         "again"},
-       {"records", trace, put(rays, npy("[('x', '<f4')]", "(1, 6)", 24)),
+       {"a structured dtype", trace, put(rays, npy("[('x', '<f4')]", "(1, 6)", 24)),
         "rays.npy: descr: found a structured array, expected numbers of one type; save the array again"},
-       {"the other byte order", trace, put(rays, npy("'>f4'", "(1, 6)", 24)),
+       {"big-endian data", trace, put(rays, npy("'>f4'", "(1, 6)", 24)),
         "rays.npy: descr: found big-endian >f4, expected little-endian numbers; save the array again"},
        {"complex numbers", trace, put(rays, npy("'<c8'", "(1, 6)", 48)),
         "rays.npy: descr: found <c8, expected float16/32/64, a whole number of 8 to 64 bits, or bool; save "
         "the array again"},
-       {"more numbers than the file has", trace, put(rays, npy("'<f4'", "(1000, 6)", 24)),
+       {"more numbers than the file holds", trace, put(rays, npy("'<f4'", "(1000, 6)", 24)),
         "rays.npy: shape: found 1000x6, expected an array that the file holds; the file is cut short or "
         "broken"},
        {"more numbers than any file has", trace, put(rays, npy("'<f4'", "(4294967296, 4294967296, 6)", 24)),
         "rays.npy: shape: found 4294967296x4294967296x6, expected an array that the file holds; the file is "
         "cut short or broken"},
-       {"a size that no number holds, times nothing", trace,
+       {"a shape whose product overflows", trace,
         put(rays, npy("'<f4'", "(4294967296, 4294967296, 0)", 0)),
         "rays.npy: shape: found 4294967296x4294967296x0, expected an array that the file holds; the file is "
         "cut short or broken"},
        {"five dimensions", trace, put(rays, npy("'<f4'", "(1, 1, 1, 1, 6)", 24)),
         "rays.npy: shape: found 5 dimensions, expected 4 at most; reshape the array"},
-       {"a shape in words", trace, put(rays, npy("'<f4'", "(many,)", 24)),
+       {"a string in the shape", trace, put(rays, npy("'<f4'", "(many,)", 24)),
         "rays.npy: shape: found (many,), expected a tuple of whole numbers; save the array again"},
-       {"a type that would clear the terminal", trace, put(rays, npy("'\x1b[2J'", "(1, 6)", 24)),
+       {"a dtype with a terminal escape sequence", trace, put(rays, npy("'\x1b[2J'", "(1, 6)", 24)),
         "rays.npy: descr: found ?[2J, expected float16/32/64, a whole number of 8 to 64 bits, or bool; save "
         "the array again"},
        {"cut short", trace, cut(rays, 40),
         "rays.npy: header: found 118 bytes, expected a header within the file, of 64 KiB at most; save the "
         "array again"},
-       {"another kind of file", trace, put(rays, "ply\n"),
-        "rays.npy: found a file that does not start as one, expected a .npy array; save the array again"},
+       {"another file type", trace, put(rays, "ply\n"),
+        "rays.npy: found a file without the .npy signature, expected a .npy array; save the array again"},
        {"rays of three numbers", trace, put(rays, npy("'<f4'", "(2, 3)", 24)),
         "rays.npy: shape: found 2x3, expected Nx6: origin and direction of each ray; or Nx7: the width of "
         "its cone too"},
-       {"points in the plane", inspect_capture, put(points, npy("'<f4'", "(3, 2)", 24)),
+       {"2D points", inspect_capture, put(points, npy("'<f4'", "(3, 2)", 24)),
         "capture/points.npy: shape: found 3x2, expected P×3"},
        {"priors for another number of views", inspect_capture,
         [=](Files& files) {
@@ -97,20 +97,20 @@ MalformedKind malformed_arrays() {
         [=](Files& files) { files["capture/tracks.npy"] = npy("'<f4'", "(7, 1, 3)", 84); },
         "capture/tracks.npy: shape: found 7x1x3, expected T×N×3 with T the training views (1) or all (2); "
         "attach the tracks again or take the file away"},
-       {"an archive of no arrays", inspect_capture, put_normals({}),
-        "capture/normal.npz: found an archive of nothing, expected one array; save the array again"},
-       {"an archive of two arrays", inspect_capture,
+       {"an archive without arrays", inspect_capture, put_normals({}),
+        "capture/normal.npz: found an archive without arrays, expected one array; save the array again"},
+       {"an archive with two arrays", inspect_capture,
         put_normals({{"normal.npy", pictures}, {"depth.npy", pictures}}),
         "capture/normal.npz: found 2 arrays (normal.npy, depth.npy), expected one array; save the array "
         "again"},
-       {"objects of Python in an archive", inspect_capture,
+       {"pickled Python objects in an archive", inspect_capture,
         put_normals({{"normal.npy", npy("'|O'", "(2, 1, 1, 3)", 24)}}),
         "capture/normal.npz: descr: found an array of Python objects, expected numbers of one type; save the "
         "array again"},
-       {"text in an archive", inspect_capture, put_normals({{"normal.npy", "normals of all views"}}),
-        "capture/normal.npz: found a file that does not start as one, expected a .npy array; save the array "
+       {"text for an array in an archive", inspect_capture, put_normals({{"normal.npy", "normals of all views"}}),
+        "capture/normal.npz: found a file without the .npy signature, expected a .npy array; save the array "
         "again"},
-       {"more numbers than an archive's array has", inspect_capture,
+       {"an archive: more numbers than the array holds", inspect_capture,
         put_normals({{"normal.npy", npy("'<f4'", "(2, 100, 100, 3)", 24)}}),
         "capture/normal.npz: shape: found 2x100x100x3, expected an array that the file holds; the file is "
         "cut short or broken"},
@@ -118,12 +118,12 @@ MalformedKind malformed_arrays() {
         put_normals({{"normal.npy", pictures}}, [](std::string& zip) { zip.resize(zip.size() / 2); }),
         "capture/normal.npz: found a zip archive whose end is missing, expected a whole zip archive, stored "
         "or deflated; pack or save it again"},
-       {"an array in the place of its archive", inspect_capture,
+       {"an array for an archive", inspect_capture,
         [=](Files& files) {
           put_normals({})(files);
           files["capture/normal.npz"] = pictures;
         },
-        "capture/normal.npz: found a file that is no zip archive, expected a whole zip archive, stored or "
+        "capture/normal.npz: found a file that is not a zip archive, expected a whole zip archive, stored or "
         "deflated; pack or save it again"},
        {"priors in an archive for another number of views", inspect_capture,
         put_normals({{"normal.npy", npy("'<f4'", "(7, 1, 1, 3)", 84)}}),
@@ -134,35 +134,35 @@ MalformedKind malformed_arrays() {
 MalformedKind malformed_plys() {
   return {
       "Surfels: .ply",
-      {{"another kind of file", trace, put(ply, "PK\3\4"),
+      {{"another file type", trace, put(ply, "PK\3\4"),
         "scene.ply: first line: found \"PK??\", expected \"ply\"; write it with 2DGS or `traceflow export`"},
-       {"no end of the header", trace, cut(ply, 60),
+       {"a header without an end", trace, cut(ply, 60),
         "scene.ply: header: found no end_header line, expected one within the first 65536 bytes; write it "
         "with 2DGS or `traceflow export`"},
-       {"text in the place of bytes", trace, replace(ply, "binary_little_endian", "ascii"),
+       {"an ASCII file for a binary one", trace, replace(ply, "binary_little_endian", "ascii"),
         "scene.ply: format: found \"format ascii 1.0\", expected binary_little_endian 1.0; write it with "
         "2DGS or `traceflow export`"},
-       {"the other byte order", trace, replace(ply, "binary_little_endian", "binary_big_endian"),
+       {"big-endian data", trace, replace(ply, "binary_little_endian", "binary_big_endian"),
         "scene.ply: format: found \"format binary_big_endian 1.0\", expected binary_little_endian 1.0; write "
         "it with 2DGS or `traceflow export`"},
        {"a list among the properties", trace, replace(ply, "float nx", "list uchar int nx"),
         "scene.ply: property: found \"property list uchar int nx\", expected a scalar type and a name; write "
         "it with 2DGS or `traceflow export`"},
-       {"the ellipsoids of 3DGS", trace, replace(ply, "float nx", "float scale_2"),
+       {"3D Gaussians of 3DGS", trace, replace(ply, "float nx", "float scale_2"),
         "scene.ply: property scale_2: found three scales, a 3DGS scene of ellipsoids, expected two, the "
         "surfels of 2DGS; retrain with 2DGS or `traceflow train`"},
-       {"an attribute that is missing", trace, replace(ply, "float opacity", "float transparency"),
+       {"a missing attribute", trace, replace(ply, "float opacity", "float transparency"),
         "scene.ply: property opacity: found none, expected every attribute of 2DGS; write it with 2DGS or "
         "`traceflow export`"},
-       {"an attribute that comes twice", trace, replace(ply, "float y", "float x"),
+       {"an attribute listed twice", trace, replace(ply, "float y", "float x"),
         "scene.ply: property \"x\": found two of it, expected one; write it with 2DGS or `traceflow export`"},
-       {"harmonics of no degree", trace, replace(ply, "float nx", "float f_rest_0"),
+       {"harmonics of no whole degree", trace, replace(ply, "float nx", "float f_rest_0"),
         "scene.ply: f_rest_*: found 1 of them, expected 0, 9, 24 or 45 (degree 0 to 3); write it with 2DGS "
         "or `traceflow export`"},
-       {"more surfels than the file has", trace, replace(ply, "vertex 1", "vertex 2147483647"),
+       {"more surfels than the file holds", trace, replace(ply, "vertex 1", "vertex 2147483647"),
         "scene.ply: element vertex: found 2147483647 vertices of 64 bytes in a body of 64 bytes, expected as "
         "many bytes as the header promises; write it with 2DGS or `traceflow export`"},
-       {"fewer than no surfels", trace, replace(ply, "vertex 1", "vertex -1"),
+       {"a negative number of surfels", trace, replace(ply, "vertex 1", "vertex -1"),
         "scene.ply: first element: found \"element vertex -1\", expected element vertex COUNT; write it with "
         "2DGS or `traceflow export`"}}};
 }
@@ -188,7 +188,7 @@ MalformedKind malformed_checkpoints() {
           {{"cut short", export_run, promised(23000, std::string(92, ' ')),
             "run/checkpoint.safetensors: header length: found 23000, expected at most 92; the file is cut "
             "short or is not a safetensors file; there is no checkpoint before it to go back to"},
-           {"another kind of file", export_run, put(checkpoint, "ply\nformat"),
+           {"another file type", export_run, put(checkpoint, "ply\nformat"),
             "run/checkpoint.safetensors: header length: found 7886488381532236912, expected at most 2; the "
             "file is cut short or is not a safetensors file; there is no checkpoint before it to go back to"},
            {"a header that is not JSON", export_run, header("{\"a\": "),
@@ -202,11 +202,11 @@ MalformedKind malformed_checkpoints() {
             header(R"({"a":{"dtype":"F32","shape":[9223372036854775807,9],"data_offsets":[0,0]}})"),
             "run/checkpoint.safetensors: tensor a shape: found [9223372036854775807,9], expected a size that "
             "fits 63 bits; there is no checkpoint before it to go back to"},
-           {"a type that is not known", export_run,
+           {"an unknown dtype", export_run,
             header(R"({"a":{"dtype":"F8","shape":[0],"data_offsets":[0,0]}})"),
             "run/checkpoint.safetensors: tensor a dtype: found \"F8\", expected F32, F64, I32, I64, U8, F16 "
             "or BF16; there is no checkpoint before it to go back to"},
-           {"a tensor that comes twice", export_run,
+           {"a tensor listed twice", export_run,
             header(R"({"a":{"dtype":"U8","shape":[0],"data_offsets":[0,0]},"a":{}})"),
             "run/checkpoint.safetensors: header: found the name \"a\" twice, expected every tensor once; "
             "there is no checkpoint before it to go back to"},
@@ -215,12 +215,12 @@ MalformedKind malformed_checkpoints() {
             "traceflow train"},
            {"a scene that is not JSON", export_run, metadata("scene", "{"),
             "run/checkpoint.safetensors: scene: byte 2: found text that is not JSON, expected JSON"},
-           {"reflections of an unknown kind", export_run, scene("specular", "mirrors"),
+           {"an unknown reflection model", export_run, scene("specular", "mirrors"),
             "run/checkpoint.safetensors: scene: specular: found \"mirrors\", expected none, "
             "environment-gaussians or environment-map"},
-           {"an extent of no length", export_run, scene("extent", -1),
+           {"a negative extent", export_run, scene("extent", -1),
             "run/checkpoint.safetensors: scene: extent: found -1, expected 1e-12 to 1000000000000"},
-           {"a field too large for any memory", export_run,
+           {"a field larger than any memory", export_run,
             scene("main_field", {{"depth", 2},
                                  {"width", 1024},
                                  {"skip", 0},
@@ -232,14 +232,14 @@ MalformedKind malformed_checkpoints() {
               file.add("scene/main/rotation", Tensor<float>({7, 4}));
             }),
             "run/checkpoint.safetensors: scene/main/rotation: found shape 7x4, expected 2x4"},
-           {"surfels on a line", export_run,
+           {"a position tensor of one dimension", export_run,
             edit([](Safetensors& file) { file.add("scene/main/position", Tensor<float>({7})); }),
             "run/checkpoint.safetensors: scene/main/: found shapes 7 and 2x9x3, expected N×3 positions and "
             "N×K×3 harmonics, K of 1, 4, 9 or 16"},
-           {"an option of another version", export_run, metadata("options", R"({"iterationz": 5})"),
+           {"an unknown option", export_run, metadata("options", R"({"iterationz": 5})"),
             "run/checkpoint.safetensors: options: iterationz: found no option of this name, expected one "
             "that `traceflow --help-options` lists; did you mean iterations?"},
-           {"an iteration in words", export_run, metadata("iteration", "the last"),
+           {"a string for an iteration", export_run, metadata("iteration", "the last"),
             "run/checkpoint.safetensors: iteration: found the last, expected a number"}}};
 }
 

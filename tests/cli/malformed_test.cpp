@@ -101,18 +101,17 @@ std::string page() {
   size_t count = 0;
   std::string tables;
   for (const MalformedKind& kind : all_kinds()) {
-    tables += "\n## " + kind.title + "\n\n| what is wrong | what is said |\n|---|---|\n";
+    tables += "\n## " + kind.title + "\n\n| input | message |\n|---|---|\n";
     for (const MalformedCase& wrong : kind.cases)
       tables += "| " + wrong.what + " | `" + cell(wrong.line) + "` |\n";
     count += kind.cases.size();
   }
   return "# Input that cannot be used\n\nWritten by `tests/cli/malformed_test.cpp`; do not edit.\n\n"
-         "Input that cannot be used is one line, after `traceflow: `, that names the file, the place in it, "
-         "what was "
-         "found there and\nwhat was expected. The program ends with 2 and has written nothing. These " +
+         "Bad input ends the program with exit code 2 and one line after `traceflow: `. The line names the "
+         "file and the\nfield, what was found and what was expected. Nothing has been written. The tests compare "
+         "these " +
          std::to_string(count) +
-         " cases are tested, each line by its letters. What readers\ndo with bytes that nobody "
-         "thought of: [testing](testing.md#fuzzing).\n" +
+         " lines\nexactly. [Fuzzing](testing.md#fuzzing) covers arbitrary bytes.\n" +
          tables;
 }
 

@@ -105,7 +105,7 @@ TEST(OptionToml, RefusesWhatItsParserCannotBear) {
   EXPECT_EQ(toml_refusal("output = \"\\\xc3\xa9\"\n"),
             "FILE:1: found a letter beyond ASCII, expected such letters in double quotes");
   EXPECT_EQ(toml_refusal("iterations = 1\n# \xc3\n"),
-            "FILE:2: found bytes that are no UTF-8, expected text in UTF-8");
+            "FILE:2: found bytes that are not UTF-8, expected text in UTF-8");
   EXPECT_THAT(toml_refusal("specular = \"\xc3\xa9\"\n"), HasSubstr("specular: found \xc3\xa9, expected"));
   // Looking for the end of what is no value, it would meet the letter outside a string.
   EXPECT_THAT(toml_refusal("a = +b\"\xcf\x92\"\n"), HasSubstr("FILE:1: found Error"));

@@ -36,7 +36,7 @@ class Guard {
       if (text.starts_with("\"\"\"") || text.starts_with("'''"))
         fail("three quotes", "strings that end in their line");
       const auto character = first_utf8_character(text);
-      if (!character) fail("bytes that are no UTF-8", "text in UTF-8");
+      if (!character) fail("bytes that are not UTF-8", "text in UTF-8");
       if (character->bytes == 1) take(text[0]);
       result += character->bytes == 1 ? std::string(1, text[0]) : escape(character->code);
       text.remove_prefix(character->bytes);

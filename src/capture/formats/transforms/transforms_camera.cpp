@@ -32,7 +32,7 @@ void take_angle(const JsonField& field, const char* key, double half_turn, std::
   radians = *angle * (pi / half_turn);
 }
 
-constexpr const char* known_models = "OPENCV, OPENCV_FISHEYE, PINHOLE or their simpler kin";
+constexpr const char* known_models = "OPENCV, OPENCV_FISHEYE, PINHOLE or a simpler model of these";
 constexpr const char* undistort_remedy = "undistort the images with the program that made them";
 
 // The names of nerfstudio, and COLMAP's names of models with the same k1 to k4, p1 and p2.
