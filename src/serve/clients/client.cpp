@@ -44,7 +44,7 @@ std::optional<Job> Client::next_question() {
   questions_.pop_front();
   const auto about_view = [&](const char* name, int64_t id, auto make) -> std::optional<Job> {
     if (view_request_) return Job{number_, make(*view_request_)};
-    send_(refusal(name, id, "nothing has been looked at yet"));
+    send_(refusal(name, id, "no view has been requested"));
     return std::nullopt;
   };
   return std::visit(Overloaded{[&](const Photo& photo) {
