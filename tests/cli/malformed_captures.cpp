@@ -20,8 +20,7 @@ MalformedKind malformed_json() {
         "capture/dataset.json: byte 21: found text that is not JSON, expected JSON"},
        {"text that is not UTF-8", inspect_capture, put(scene, "{\"scale\": \"\xff\"}"),
         "capture/scene.json: byte 12: found text that is not JSON, expected JSON"},
-       {"brackets nested 100,000 deep", inspect_capture,
-        put(dataset, std::string(100000, '[')),
+       {"brackets nested 100,000 deep", inspect_capture, put(dataset, std::string(100000, '[')),
         "capture/dataset.json: found brackets more than 64 deep, expected JSON of common depth"},
        {"a number beyond double precision", inspect_capture, put(scene, R"({"scale": 1e400})"),
         "capture/scene.json: found a number beyond double precision, expected numbers up to 1.8e308"},
@@ -40,8 +39,7 @@ MalformedKind malformed_json() {
         "file"},
        {"an id with a terminal escape sequence", inspect_capture, set(dataset, "/train_ids/0", "a\x1b[2J"),
         "capture/dataset.json: train_ids: found the id \"a?[2J\", expected ids that can name a file"},
-       {"an id longer than a file name", inspect_capture,
-        set(dataset, "/train_ids/0", std::string(300, 'x')),
+       {"an id longer than a file name", inspect_capture, set(dataset, "/train_ids/0", std::string(300, 'x')),
         "capture/dataset.json: train_ids: found the id "
         "\"xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx…\", expected ids that can name a "
         "file"},
@@ -68,15 +66,13 @@ MalformedKind malformed_json() {
         "capture/camera/a.json: position[0]: found 1e+30, expected -1000000000000000 to 1000000000000000"},
        {"a focal length of zero", inspect_capture, set(camera, "/focal_length", 0),
         "capture/camera/a.json: focal_length: found 0, expected a number above zero"},
-       {"a focal length beyond single precision", inspect_capture,
-        set(camera, "/focal_length", 1e300),
+       {"a focal length beyond single precision", inspect_capture, set(camera, "/focal_length", 1e300),
         "capture/camera/a.json: focal_length: found 1e+300, expected 1e-06 to 1000000000"},
        {"a missing principal point", inspect_capture, unset(camera, "/principal_point"),
         "capture/camera/a.json: principal_point: found nothing, expected a value"},
        {"an image size of one number", inspect_capture, set(camera, "/image_size", Json::array({24})),
         "capture/camera/a.json: image_size: found [24], expected a list of 2"},
-       {"a distortion that folds the image", inspect_capture,
-        set(camera, "/radial_distortion", {-50, 0, 0}),
+       {"a distortion that folds the image", inspect_capture, set(camera, "/radial_distortion", {-50, 0, 0}),
         "capture/camera/a.json: distortion: found a lens whose straightened image has no pixels, expected "
         "distortion that moves pixels by less than half the image"}}};
 }

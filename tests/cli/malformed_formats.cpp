@@ -24,8 +24,7 @@ MalformedKind malformed_colmap() {
   const std::string many = replaced(binary, 0, std::string(8, '\x7f'));
   return {
       "COLMAP",
-      {{"an unsupported camera model", inspect_colmap,
-        put(cameras + ".txt", "1 EUCM 24 16 20 20 12 8 1 1\n"),
+      {{"an unsupported camera model", inspect_colmap, put(cameras + ".txt", "1 EUCM 24 16 20 20 12 8 1 1\n"),
         "colmap/sparse/0/cameras.txt: cameras[0].model: found EUCM, expected a perspective or equidistant "
         "fisheye camera; undistort the images with colmap image_undistorter"},
        {"an unknown camera model", inspect_colmap, put(cameras + ".txt", "1 PINHOLE_2 24 16 20\n"),

@@ -82,8 +82,7 @@ MalformedKind malformed_images() {
             "capture/rgb/1x/a.png: width: found 0, expected 1 to 32768 pixels; write or copy the file again"},
            {"a photograph over the width limit", inspect_capture, put(photograph, png_of_size(40000, 16)),
             "capture/rgb/1x/a.png: width: found 40000, expected 1 to 32768 pixels; scale the image down"},
-           {"a photograph over the pixel limit", inspect_capture,
-            put(photograph, png_of_size(32768, 32768)),
+           {"a photograph over the pixel limit", inspect_capture, put(photograph, png_of_size(32768, 32768)),
             "capture/rgb/1x/a.png: found 32768×32768, expected a PNG image of at most 32,768 pixels a side "
             "and 2²⁸ in all; write or copy the file again"},
            {"a photograph smaller than its camera says",
@@ -118,7 +117,8 @@ MalformedKind malformed_archives() {
   return {
       "Archives: .zip",
       {{"another file type", inspect_zip, put(archive, "Rar!\x1a\7"),
-        "capture.zip: found a file that is not a zip archive, expected a whole zip archive, stored or deflated; "
+        "capture.zip: found a file that is not a zip archive, expected a whole zip archive, stored or "
+        "deflated; "
         "pack or save "
         "it again"},
        {"cut short", inspect_zip, packed([](std::string& zip) { zip.resize(zip.size() / 2); }),
@@ -156,8 +156,7 @@ MalformedKind malformed_archives() {
         },
         "capture.zip: found overlapping zip members, expected a whole zip archive, stored or "
         "deflated; pack or save it again"},
-       {"a member with an impossible size", inspect_zip,
-        packed(in_directory(24, "\xff\xff\xff\x7f")),
+       {"a member with an impossible size", inspect_zip, packed(in_directory(24, "\xff\xff\xff\x7f")),
         "capture.zip: found a zip member of 100 bytes that unpacks to 2147483647, expected a whole zip "
         "archive, stored or deflated; pack or save it again"},
        {"a member with a byte changed", inspect_zip, packed([](std::string& zip) {

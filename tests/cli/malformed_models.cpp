@@ -65,8 +65,7 @@ MalformedKind malformed_arrays() {
        {"more numbers than any file has", trace, put(rays, npy("'<f4'", "(4294967296, 4294967296, 6)", 24)),
         "rays.npy: shape: found 4294967296x4294967296x6, expected an array that the file holds; the file is "
         "cut short or broken"},
-       {"a shape whose product overflows", trace,
-        put(rays, npy("'<f4'", "(4294967296, 4294967296, 0)", 0)),
+       {"a shape whose product overflows", trace, put(rays, npy("'<f4'", "(4294967296, 4294967296, 0)", 0)),
         "rays.npy: shape: found 4294967296x4294967296x0, expected an array that the file holds; the file is "
         "cut short or broken"},
        {"five dimensions", trace, put(rays, npy("'<f4'", "(1, 1, 1, 1, 6)", 24)),
@@ -107,7 +106,8 @@ MalformedKind malformed_arrays() {
         put_normals({{"normal.npy", npy("'|O'", "(2, 1, 1, 3)", 24)}}),
         "capture/normal.npz: descr: found an array of Python objects, expected numbers of one type; save the "
         "array again"},
-       {"text for an array in an archive", inspect_capture, put_normals({{"normal.npy", "normals of all views"}}),
+       {"text for an array in an archive", inspect_capture,
+        put_normals({{"normal.npy", "normals of all views"}}),
         "capture/normal.npz: found a file without the .npy signature, expected a .npy array; save the array "
         "again"},
        {"an archive: more numbers than the array holds", inspect_capture,
@@ -184,63 +184,63 @@ MalformedKind malformed_checkpoints() {
     return put(checkpoint, bytes + text);
   };
   const auto header = [=](const std::string& text) { return promised(text.size(), text); };
-  return {"Checkpoints: .safetensors",
-          {{"cut short", export_run, promised(23000, std::string(92, ' ')),
-            "run/checkpoint.safetensors: header length: found 23000, expected at most 92; the file is cut "
-            "short or is not a safetensors file; there is no checkpoint before it to go back to"},
-           {"another file type", export_run, put(checkpoint, "ply\nformat"),
-            "run/checkpoint.safetensors: header length: found 7886488381532236912, expected at most 2; the "
-            "file is cut short or is not a safetensors file; there is no checkpoint before it to go back to"},
-           {"a header that is not JSON", export_run, header("{\"a\": "),
-            "run/checkpoint.safetensors: header: found text that is not JSON, expected a JSON object; there "
-            "is no checkpoint before it to go back to"},
-           {"a tensor outside the file", export_run,
-            header(R"({"a":{"dtype":"F32","shape":[9],"data_offsets":[0,36]}})"),
-            "run/checkpoint.safetensors: tensor a data_offsets: found [0,36], expected a range within 0 "
-            "bytes of data; there is no checkpoint before it to go back to"},
-           {"a tensor of another size than its shape", export_run,
-            header(R"({"a":{"dtype":"F32","shape":[9223372036854775807,9],"data_offsets":[0,0]}})"),
-            "run/checkpoint.safetensors: tensor a shape: found [9223372036854775807,9], expected a size that "
-            "fits 63 bits; there is no checkpoint before it to go back to"},
-           {"an unknown dtype", export_run,
-            header(R"({"a":{"dtype":"F8","shape":[0],"data_offsets":[0,0]}})"),
-            "run/checkpoint.safetensors: tensor a dtype: found \"F8\", expected F32, F64, I32, I64, U8, F16 "
-            "or BF16; there is no checkpoint before it to go back to"},
-           {"a tensor listed twice", export_run,
-            header(R"({"a":{"dtype":"U8","shape":[0],"data_offsets":[0,0]},"a":{}})"),
-            "run/checkpoint.safetensors: header: found the name \"a\" twice, expected every tensor once; "
-            "there is no checkpoint before it to go back to"},
-           {"no scene", export_run, edit([](Safetensors& file) { file.metadata.erase("scene"); }),
-            "run/checkpoint.safetensors: scene: found no such metadata, expected a checkpoint written by "
-            "traceflow train"},
-           {"a scene that is not JSON", export_run, metadata("scene", "{"),
-            "run/checkpoint.safetensors: scene: byte 2: found text that is not JSON, expected JSON"},
-           {"an unknown reflection model", export_run, scene("specular", "mirrors"),
-            "run/checkpoint.safetensors: scene: specular: found \"mirrors\", expected none, "
-            "environment-gaussians or environment-map"},
-           {"a negative extent", export_run, scene("extent", -1),
-            "run/checkpoint.safetensors: scene: extent: found -1, expected 1e-12 to 1000000000000"},
-           {"a field larger than any memory", export_run,
-            scene("main_field", {{"depth", 2},
-                                 {"width", 1024},
-                                 {"skip", 0},
-                                 {"position_frequencies", 0},
-                                 {"time_frequencies", 0},
-                                 {"outputs", 2147483647}}),
-            "run/checkpoint.safetensors: scene: main_field.outputs: found 2147483647, expected 11"},
-           {"a tensor of another shape", export_run, edit([](Safetensors& file) {
-              file.add("scene/main/rotation", Tensor<float>({7, 4}));
-            }),
-            "run/checkpoint.safetensors: scene/main/rotation: found shape 7x4, expected 2x4"},
-           {"a position tensor of one dimension", export_run,
-            edit([](Safetensors& file) { file.add("scene/main/position", Tensor<float>({7})); }),
-            "run/checkpoint.safetensors: scene/main/: found shapes 7 and 2x9x3, expected N×3 positions and "
-            "N×K×3 harmonics, K of 1, 4, 9 or 16"},
-           {"an unknown option", export_run, metadata("options", R"({"iterationz": 5})"),
-            "run/checkpoint.safetensors: options: iterationz: found no option of this name, expected one "
-            "that `traceflow --help-options` lists; did you mean iterations?"},
-           {"a string for an iteration", export_run, metadata("iteration", "the last"),
-            "run/checkpoint.safetensors: iteration: found the last, expected a number"}}};
+  return {
+      "Checkpoints: .safetensors",
+      {{"cut short", export_run, promised(23000, std::string(92, ' ')),
+        "run/checkpoint.safetensors: header length: found 23000, expected at most 92; the file is cut "
+        "short or is not a safetensors file; there is no checkpoint before it to go back to"},
+       {"another file type", export_run, put(checkpoint, "ply\nformat"),
+        "run/checkpoint.safetensors: header length: found 7886488381532236912, expected at most 2; the "
+        "file is cut short or is not a safetensors file; there is no checkpoint before it to go back to"},
+       {"a header that is not JSON", export_run, header("{\"a\": "),
+        "run/checkpoint.safetensors: header: found text that is not JSON, expected a JSON object; there "
+        "is no checkpoint before it to go back to"},
+       {"a tensor outside the file", export_run,
+        header(R"({"a":{"dtype":"F32","shape":[9],"data_offsets":[0,36]}})"),
+        "run/checkpoint.safetensors: tensor a data_offsets: found [0,36], expected a range within 0 "
+        "bytes of data; there is no checkpoint before it to go back to"},
+       {"a tensor of another size than its shape", export_run,
+        header(R"({"a":{"dtype":"F32","shape":[9223372036854775807,9],"data_offsets":[0,0]}})"),
+        "run/checkpoint.safetensors: tensor a shape: found [9223372036854775807,9], expected a size that "
+        "fits 63 bits; there is no checkpoint before it to go back to"},
+       {"an unknown dtype", export_run, header(R"({"a":{"dtype":"F8","shape":[0],"data_offsets":[0,0]}})"),
+        "run/checkpoint.safetensors: tensor a dtype: found \"F8\", expected F32, F64, I32, I64, U8, F16 "
+        "or BF16; there is no checkpoint before it to go back to"},
+       {"a tensor listed twice", export_run,
+        header(R"({"a":{"dtype":"U8","shape":[0],"data_offsets":[0,0]},"a":{}})"),
+        "run/checkpoint.safetensors: header: found the name \"a\" twice, expected every tensor once; "
+        "there is no checkpoint before it to go back to"},
+       {"no scene", export_run, edit([](Safetensors& file) { file.metadata.erase("scene"); }),
+        "run/checkpoint.safetensors: scene: found no such metadata, expected a checkpoint written by "
+        "traceflow train"},
+       {"a scene that is not JSON", export_run, metadata("scene", "{"),
+        "run/checkpoint.safetensors: scene: byte 2: found text that is not JSON, expected JSON"},
+       {"an unknown reflection model", export_run, scene("specular", "mirrors"),
+        "run/checkpoint.safetensors: scene: specular: found \"mirrors\", expected none, "
+        "environment-gaussians or environment-map"},
+       {"a negative extent", export_run, scene("extent", -1),
+        "run/checkpoint.safetensors: scene: extent: found -1, expected 1e-12 to 1000000000000"},
+       {"a field larger than any memory", export_run,
+        scene("main_field", {{"depth", 2},
+                             {"width", 1024},
+                             {"skip", 0},
+                             {"position_frequencies", 0},
+                             {"time_frequencies", 0},
+                             {"outputs", 2147483647}}),
+        "run/checkpoint.safetensors: scene: main_field.outputs: found 2147483647, expected 11"},
+       {"a tensor of another shape", export_run, edit([](Safetensors& file) {
+          file.add("scene/main/rotation", Tensor<float>({7, 4}));
+        }),
+        "run/checkpoint.safetensors: scene/main/rotation: found shape 7x4, expected 2x4"},
+       {"a position tensor of one dimension", export_run,
+        edit([](Safetensors& file) { file.add("scene/main/position", Tensor<float>({7})); }),
+        "run/checkpoint.safetensors: scene/main/: found shapes 7 and 2x9x3, expected N×3 positions and "
+        "N×K×3 harmonics, K of 1, 4, 9 or 16"},
+       {"an unknown option", export_run, metadata("options", R"({"iterationz": 5})"),
+        "run/checkpoint.safetensors: options: iterationz: found no option of this name, expected one "
+        "that `traceflow --help-options` lists; did you mean iterations?"},
+       {"a string for an iteration", export_run, metadata("iteration", "the last"),
+        "run/checkpoint.safetensors: iteration: found the last, expected a number"}}};
 }
 
 }  // namespace traceflow::cli

@@ -108,10 +108,10 @@ std::string page() {
   }
   return "# Input that cannot be used\n\nWritten by `tests/cli/malformed_test.cpp`; do not edit.\n\n"
          "Bad input ends the program with exit code 2 and one line after `traceflow: `. The line names the "
-         "file and the\nfield, what was found and what was expected. Nothing has been written. The tests compare "
+         "file and the\nfield, what was found and what was expected. Nothing has been written. The tests "
+         "compare "
          "these " +
-         std::to_string(count) +
-         " lines\nexactly. [Fuzzing](testing.md#fuzzing) covers arbitrary bytes.\n" +
+         std::to_string(count) + " lines\nexactly. [Fuzzing](testing.md#fuzzing) covers arbitrary bytes.\n" +
          tables;
 }
 

@@ -123,7 +123,8 @@ TEST(TransformsLensHostile, each_is_refused_by_name) {
       {R"({"y_fov": 180})", "y_fov: found 180, expected an angle below 180°"},
       {R"({"fl_x": 5, "x_fov": "wide"})", "x_fov: found \"wide\""},
       {R"({"fl_x": 5, "ftheta_p0": 0, "ftheta_p1": 0.001})",
-       "ftheta_p1: found an f-theta lens, expected OPENCV, OPENCV_FISHEYE, PINHOLE or a simpler model of these; "
+       "ftheta_p1: found an f-theta lens, expected OPENCV, OPENCV_FISHEYE, PINHOLE or a simpler model of "
+       "these; "
        "undistort the images"},
       {R"({"fl_x": 5, "ftheta_p4": 1e-9})", "ftheta_p4: found an f-theta lens"},
       {R"({"fl_x": 5, "latlong": true})", "latlong: found a panorama"},
