@@ -171,6 +171,16 @@ void DensityControl::shorten_needles(Surfels& surfels, float cloud) const {
       ShortenNeedle{std::log(aspect), std::log(options_.longest_needle * cloud), surfels.log_scale.data()});
 }
 
+void DensityControl::shorten_unseen(Surfels& surfels, const Tensor<Camera<float>>& cameras,
+                                    float cloud) const {
+  if (options_.longest_unseen == 0) return;
+  parallel_for(
+      surfels.device(), "density: shorten unseen", surfels.count(),
+      ShortenUnseen{cameras.data(), cameras.size(), surfels.body.empty() ? nullptr : surfels.body.data(),
+                    surfels.position.data(), surfels.rotation.data(), options_.longest_unseen * cloud,
+                    surfels.log_scale.data()});
+}
+
 void DensityControl::reset_opacity(Surfels& surfels, SurfelMoments& moments) const {
   const float ceiling = logit(options_.opacity_reset);
   parallel_for(surfels.device(), "density: lower opacity", surfels.count(),

@@ -4,6 +4,7 @@
 
 #include "base/random.h"
 #include "files/safetensors.h"
+#include "math/camera.h"
 #include "record/events.h"
 #include "scene/rows.h"
 #include "train/optimiser.h"
@@ -48,6 +49,11 @@ class DensityControl {
   // none). A needle looks right in the few views that see it end-on, and sticks out in others. Allocates no
   // memory.
   void shorten_needles(Surfels& surfels, float cloud) const;
+
+  // Shortens surfels of no body that extend, towards the cameras, into space that none of them sees, to
+  // options.longest_unseen past the last point that one sees (0: no limit). Such a surfel hides the scene
+  // from other views. cameras: of the training views, on the surfels' device. Allocates no memory.
+  void shorten_unseen(Surfels& surfels, const Tensor<Camera<float>>& cameras, float cloud) const;
 
   // Lowers every opacity to at most options.opacity_reset and sets the moments of the opacities to zero.
   void reset_opacity(Surfels& surfels, SurfelMoments& moments) const;

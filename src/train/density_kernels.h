@@ -2,7 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
+#include "math/camera.h"
 #include "math/rotation.h"
 #include "math/types.h"
 
@@ -71,6 +73,60 @@ struct ShortenNeedle {
     const float most = by_width < longest ? longest : by_width;
     if (most < scale[0]) scale[0] = most;
     if (most < scale[1]) scale[1] = most;
+  }
+};
+
+// Shortens a surfel of no body along each axis on which it extends by more than `margin` past the last point
+// that a camera sees, towards the cameras (method §7.7). A surfel ends three standard deviations from its
+// centre.
+struct ShortenUnseen {
+  static constexpr float ends = 3;
+  static constexpr int steps = 12;  // from the centre to an end
+  // A point that no camera sees does no harm if its distance to the cameras is at least this share of that of
+  // the centre.
+  static constexpr float not_nearer = 0.9F;
+
+  const Camera<float>* cameras;
+  int64_t camera_count;
+  const int32_t* body;  // null: no bodies
+  const float *position, *rotation;
+  float margin;
+  float* log_scale;
+
+  TRACEFLOW_HD float nearest2(const Vec3<float>& point) const {
+    float nearest = std::numeric_limits<float>::max();
+    for (int64_t c = 0; c < camera_count; ++c) {
+      const Vec3<float> arm = point - cameras[c].position;
+      if (dot(arm, arm) < nearest) nearest = dot(arm, arm);
+    }
+    return nearest;
+  }
+  TRACEFLOW_HD bool harmless(const Vec3<float>& point, float nearest2_of_centre) const {
+    for (int64_t c = 0; c < camera_count; ++c)
+      if (cameras[c].sees(point)) return true;
+    return nearest2(point) >= not_nearer * not_nearer * nearest2_of_centre;
+  }
+  TRACEFLOW_HD void operator()(int64_t i) const {
+    if (body != nullptr && body[i] >= 0) return;
+    float* const scale = log_scale + 2 * i;
+    const float longest = margin / ends;
+    if (!(std::exp(scale[0]) > longest) && !(std::exp(scale[1]) > longest)) return;
+    const Vec3<float> centre = load3<float>(position + 3 * i);
+    const Mat3<float> axes = rotation_from_quaternion(load4<float>(rotation + 4 * i));
+    const float of_centre = nearest2(centre);
+    for (int axis = 0; axis < 2; ++axis) {
+      const float end = ends * std::exp(scale[axis]);
+      float limit = end;
+      for (int side = -1; side <= 1; side += 2) {
+        float last = 0;
+        for (int k = 1; k <= steps; ++k) {
+          const float x = end * static_cast<float>(k) / steps;
+          if (harmless(centre + static_cast<float>(side) * x * axes[axis], of_centre)) last = x;
+        }
+        if (last + margin < limit) limit = last + margin;
+      }
+      if (limit < end) scale[axis] = std::log(limit / ends);
+    }
   }
 };
 

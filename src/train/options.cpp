@@ -67,6 +67,7 @@ TrainOptions cpu_preset() {
   o.density.prune_above = 10;
   o.density.prune_above_cloud = 0.5F;
   o.density.longest_needle = 0.1F;
+  o.density.longest_unseen = 0.1F;
   o.density.prune_above_from = 0;
   o.density.opacity_reset_every = 0;
   o.density.max_surfels = 20000;
@@ -164,6 +165,7 @@ void DensityOptions::validate(const std::string& group) const {
   check_option(prune_above > 0, group + ".prune_above", prune_above, "a positive number");
   check_option(prune_above_cloud > 0, group + ".prune_above_cloud", prune_above_cloud, "a positive number");
   check_not_negative(longest_needle, (group + ".longest_needle").c_str());
+  check_not_negative(longest_unseen, (group + ".longest_unseen").c_str());
   check_option(growth > 0 && growth <= 1, group + ".growth", growth, "above 0, up to 1");
   check_option(gradient_threshold > 0, group + ".gradient_threshold", gradient_threshold,
                "a positive number");
@@ -226,6 +228,8 @@ void TrainOptions::validate() const {
   schedule.validate();
   density.validate("density");
   environment_density.validate("environment_density");
+  check_option(environment_density.longest_unseen == 0, "environment_density.longest_unseen",
+               environment_density.longest_unseen, "0: cameras see the environment by reflection");
 }
 
 TrainOptions preset(const std::string& name) {

@@ -176,6 +176,7 @@ struct DensityOptions {
   float prune_above = 0.1F;
   float prune_above_cloud = 1000;
   float longest_needle = 0;
+  float longest_unseen = 0;
   int prune_above_from = 3000;
   int opacity_reset_every = 3000;
   float opacity_reset = 0.01F;
@@ -204,6 +205,10 @@ struct DensityOptions {
     v.field("longest_needle", longest_needle, "clouds",
             "Maximum standard deviation of surfels that are more than ten times as long as wide, in the unit "
             "of prune_above_cloud; 0: no limit.");
+    v.field(
+        "longest_unseen", longest_unseen, "clouds",
+        "Maximum length by which a surfel of no body extends past the last point that a training view "
+        "sees, towards the cameras, in the unit of prune_above_cloud; 0: no limit. For the main set only.");
     v.field("prune_above_from", prune_above_from, "iteration", "The removal of large surfels starts.");
     v.field("opacity_reset_every", opacity_reset_every, "iterations",
             "Interval of opacity resets; 0: no resets. There are also none if half the interval, in "

@@ -27,6 +27,8 @@ constexpr int neighbour_stride = 4;
 constexpr float slower_fields = 0.25F;
 // Relative to the rate of positions, during tracking: a shape that learns fast absorbs the lag of each key.
 constexpr double share_while_tracking = 1.0 / 3;
+// Iterations between two shortenings of surfels that extend into unseen space.
+constexpr int unseen_every = 20;
 
 // Keeps only edges between surfels that the field moves.
 void keep_edges_of_field(const Tensor<int32_t>& body, Tensor<int32_t>& edges) {
@@ -253,6 +255,13 @@ void Trainer::learn(const View& view, const Frame& frame, const FrameRequest& re
   half_updated_ = false;
 }
 
+Tensor<Camera<float>> Trainer::training_cameras() const {
+  Tensor<Camera<float>> cameras({static_cast<int64_t>(capture_.train.size())});
+  for (size_t k = 0; k < capture_.train.size(); ++k)
+    cameras[static_cast<int64_t>(k)] = capture_.train[k].camera;
+  return cameras.on(device_);
+}
+
 void Trainer::control_density(const Surfels& new_surface, bool tracks) {
   // If memory runs out in an update, the set is unchanged. The code after an update allocates none.
   const int done = state_.iteration;
@@ -280,9 +289,13 @@ void Trainer::control_density(const Surfels& new_surface, bool tracks) {
   }
   // Surfels that multiply where a body lags behind the photograph fix the lag in its shape.
   if (tracks) return;
+  const Tensor<Camera<float>> cameras = done % unseen_every == 0 && options_.density.longest_unseen > 0
+                                            ? training_cameras()
+                                            : Tensor<Camera<float>>();
   if (control(state_.main_density, scene.main, state_.optimiser.main(), schedule_.main_density(done),
               cloud_radius_, memory_.caps.main))
     state_.neighbours = {};
+  if (!cameras.empty()) state_.main_density.shorten_unseen(scene.main, cameras, cloud_radius_);
   if (scene.environment.count() == 0) return;
   control(state_.environment_density, scene.environment, state_.optimiser.environment(),
           schedule_.environment_density(done), state_.environment_radius, memory_.caps.environment);

@@ -75,6 +75,7 @@ class Trainer {
   const Neighbours& neighbours();
   // The part after a finite loss.
   void learn(const View& view, const Frame& frame, const FrameRequest& request, const Trainable& trainable);
+  Tensor<Camera<float>> training_cameras() const;  // on device_
   void control_density(const Surfels& new_surface, bool tracks);
 
   struct End {

@@ -127,6 +127,77 @@ TEST(Density, ShortensOnlyNeedlesAndKeepsTheirWidth) {
   EXPECT_LT(shortened, count / 2);
 }
 
+// One camera at the origin that looks along z, 90° wide and high.
+Tensor<Camera<float>> one_camera() {
+  Tensor<Camera<float>> cameras({1});
+  cameras[0] = {.width = 100, .height = 100, .focal_x = 50, .focal_y = 50, .centre_x = 50, .centre_y = 50};
+  return cameras;
+}
+
+// A surfel with its long axis along `axis` (0: x, 1: y, 2: z), in front of one_camera().
+Set surfel_along(int axis, const Vec3<float>& centre, float length) {
+  const float half = std::sqrt(0.5F);
+  const Vec4<float> rotations[] = {{1, 0, 0, 0}, {half, 0, 0, half}, {half, 0, -half, 0}};
+  Set set(1, 0.001F, 0.5F);
+  set.surfels.log_scale[0] = std::log(length);
+  for (int k = 0; k < 3; ++k) set.surfels.position[k] = centre[k];
+  for (int k = 0; k < 4; ++k) set.surfels.rotation[k] = rotations[axis][k];
+  return set;
+}
+
+float length_after_shortening(Set set, float limit) {
+  DensityOptions o = options();
+  o.longest_unseen = limit;
+  DensityControl("main", o, 1).shorten_unseen(set.surfels, one_camera(), 2);
+  return std::exp(set.surfels.log_scale[0]);
+}
+
+TEST(Density, ShortensWhatExtendsUnseenTowardsTheCameras) {
+  // Along z at y = 1.45: seen where z > 1.45. In twelfths of its half length, 3, the last point that is seen
+  // is 0.5 before the centre.
+  const Vec3<float> centre(0, 1.45F, 2);
+  EXPECT_NEAR(length_after_shortening(surfel_along(2, centre, 1), 0.1F), (0.5 + 0.2) / 3, 1e-5);
+  EXPECT_NEAR(length_after_shortening(surfel_along(2, centre, 1), 0.5F), (0.5 + 1) / 3, 1e-5);
+  // No limit, or one beyond its end.
+  EXPECT_EQ(length_after_shortening(surfel_along(2, centre, 1), 0), 1);
+  EXPECT_EQ(length_after_shortening(surfel_along(2, centre, 1), 1.4F), 1);
+}
+
+TEST(Density, LeavesWhatIsSeenOrNoNearerThanItsCentre) {
+  // Seen as a whole.
+  EXPECT_FLOAT_EQ(length_after_shortening(surfel_along(2, {0, 0, 5}, 1), 0.1F), 1);
+  EXPECT_FLOAT_EQ(length_after_shortening(surfel_along(0, {0, 0, 5}, 1), 0.1F), 1);
+  // It leaves the image sideways, on both sides, and its ends are farther away.
+  EXPECT_FLOAT_EQ(length_after_shortening(surfel_along(0, {0, 0, 2}, 1), 0.1F), 1);
+  // It belongs to a body, which moves.
+  Set moving = surfel_along(2, {0, 1.5F, 2}, 1);
+  moving.surfels.body.reset({1});
+  EXPECT_FLOAT_EQ(length_after_shortening(moving, 0.1F), 1);
+  moving.surfels.body[0] = motionless;
+  EXPECT_LT(length_after_shortening(moving, 0.1F), 0.3F);
+}
+
+TEST(Density, ShorteningUnseenPartsNeverLengthensAndLeavesTheWidth) {
+  constexpr int64_t count = 300;
+  Set set(count, 1, 0.5F);
+  Random random(8);
+  for (float& x : set.surfels.position.values()) x = static_cast<float>(2 * random.normal());
+  for (float& x : set.surfels.rotation.values()) x = static_cast<float>(random.normal());
+  for (float& scale : set.surfels.log_scale.values()) scale = static_cast<float>(-1 + random.normal());
+  const Tensor<float> before = set.surfels.log_scale;
+  DensityOptions o = options();
+  o.longest_unseen = 0.1F;
+  DensityControl("main", o, count).shorten_unseen(set.surfels, one_camera(), 1);
+  int64_t shortened = 0;
+  for (int64_t k = 0; k < before.size(); ++k) {
+    EXPECT_LE(set.surfels.log_scale[k], before[k]);
+    EXPECT_GE(std::exp(set.surfels.log_scale[k]), std::min(std::exp(before[k]), 0.1F / 3) * 0.999F);
+    shortened += set.surfels.log_scale[k] < before[k] ? 1 : 0;
+  }
+  EXPECT_GT(shortened, 20);
+  EXPECT_LT(shortened, count);
+}
+
 TEST(Density, PrunesTheWideOnlyWhenItIsTold) {
   Set set(5, 0.5F, 0.5F);
   DensityControl control("main", options(), 5);

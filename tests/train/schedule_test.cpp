@@ -241,6 +241,9 @@ TEST(Options, NonsenseIsRefusedByName) {
   expect_refused("density.prune_opacity", [](TrainOptions& o) { o.density.prune_opacity = 1; });
   expect_refused("density.prune_above", [](TrainOptions& o) { o.density.prune_above = 0; });
   expect_refused("density.longest_needle", [](TrainOptions& o) { o.density.longest_needle = -1; });
+  expect_refused("density.longest_unseen", [](TrainOptions& o) { o.density.longest_unseen = -1; });
+  expect_refused("environment_density.longest_unseen",
+                 [](TrainOptions& o) { o.environment_density.longest_unseen = 0.1F; });
   expect_refused("environment_density.prune_above_cloud",
                  [](TrainOptions& o) { o.environment_density.prune_above_cloud = -1; });
   expect_refused("loss.rigidity_strain", [](TrainOptions& o) { o.loss.rigidity_strain = 1e-12F; });

@@ -56,6 +56,7 @@ Edited edited(Device device) {
   });
   DensityOptions options;
   options.longest_needle = 0.05F;
+  options.longest_unseen = 0.02F;
   options.clones_share_opacity = true;
   DensityControl density("main", options, count, device);
   const Tensor<float> signal = random_tensor<float>({count}, random, 0, 4e-4);
@@ -65,6 +66,9 @@ Edited edited(Device device) {
   e.change = density.update(e.surfels, e.moments, {{.extent = 10, .cloud = 1}, 400}, random);
   density.reset_opacity(e.surfels, e.moments);
   density.shorten_needles(e.surfels, 1);
+  Tensor<Camera<float>> cameras({1});
+  cameras[0] = {.width = 100, .height = 100, .focal_x = 50, .focal_y = 50, .centre_x = 50, .centre_y = 50};
+  density.shorten_unseen(e.surfels, cameras.on(device), 1);
   return e;
 }
 
