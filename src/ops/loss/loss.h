@@ -25,7 +25,7 @@ double ssim_loss_reference(const Tensor<double>& image, const Tensor<double>& ta
 // is non-zero. NaN if there are none. The host waits for it.
 double ssim(const Tensor<float>& image, const Tensor<float>& target, const Tensor<uint8_t>& mask);
 
-// L_norm = mean (1 − (1 − α)² − n·N_d) over pixels where N_d is not zero (method §7.4). normal: the blended
+// L_norm = mean (min(1, 2α) − n·N_d) over pixels where N_d is not zero (method §7.4). normal: the blended
 // normal, H×W×3, not normalised (its length contains alpha); alpha: H×W; pseudo: H×W×3 unit or zero.
 // Differentiable in all three. A pixel whose hits agree with N_d gains by becoming opaque above α = 0.5, and
 // by becoming empty below it. The mean divides by H·W, so that a half-empty frame weighs half.

@@ -155,13 +155,13 @@ struct NormalConsistency {
   TRACEFLOW_HD double operator()(int64_t i) const {
     const Vec3<T> n = load3<T>(normal + 3 * i), p = load3<T>(pseudo + 3 * i);
     if (is_zero(p)) return 0;
-    const T clear = 1 - alpha[i];
+    const bool is_faint = alpha[i] < T(0.5);
     if (is_finite(n) && is_finite(p)) {
-      grad_alpha[i] += scale * 2 * clear;
+      if (is_faint) grad_alpha[i] += 2 * scale;
       add3(grad_normal + 3 * i, -scale * p);
       add3(grad_pseudo + 3 * i, -scale * n);
     }
-    return 1 - static_cast<double>(clear * clear) - static_cast<double>(dot(n, p));
+    return (is_faint ? 2 * static_cast<double>(alpha[i]) : 1) - static_cast<double>(dot(n, p));
   }
 };
 
