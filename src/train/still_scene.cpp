@@ -90,6 +90,7 @@ TrainOptions still(const TrainOptions& options, int iterations) {
   o.iterations = iterations;
   o.specular = Specular::none;
   o.deform.main = o.deform.environment = false;
+  o.density.longest_unseen = 0;  // only the training views look at it
   o.loss.normal = o.loss.normal_prior = o.loss.rigidity = 0;
   return o;
 }
