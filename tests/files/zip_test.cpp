@@ -61,8 +61,7 @@ TEST(Zip, UnpacksWhatTheChecksumSays) {
 TEST(ZipHostile, SizesThatAreNotThoseOfTheDataAreRefused) {
   const std::string zip = zip_archive({{"a", std::string(1000, 'a')}}, true);
   EXPECT_THAT(zip_refusal(in_directory(zip, 24, little_endian(999, 4))), HasSubstr("more data than"));
-  EXPECT_THAT(zip_refusal(in_directory(zip, 24, little_endian(1001, 4))),
-              HasSubstr("wrong checksum"));
+  EXPECT_THAT(zip_refusal(in_directory(zip, 24, little_endian(1001, 4))), HasSubstr("wrong checksum"));
   EXPECT_THAT(zip_refusal(in_directory(zip, 24, little_endian(0x7fffffff, 4))),
               HasSubstr("bytes that unpacks to 2147483647"));
 }
