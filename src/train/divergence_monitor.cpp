@@ -15,11 +15,11 @@ constexpr int64_t settling_steps = 300;
 }  // namespace
 
 std::string DivergenceMonitor::check(const LossValues& terms, const NonFiniteGradients& gradients) {
-  if (!std::isfinite(terms.total)) return "the loss is not a number";
+  if (!std::isfinite(terms.total)) return "the loss is not finite";
   if (gradients.count > 0) {
     dropped_ += gradients.count;
     if (policy_ == NonFinite::stop) {
-      return std::to_string(gradients.count) + " gradients are not numbers, the first at " + gradients.first;
+      return std::to_string(gradients.count) + " gradients are not finite, the first at " + gradients.first;
     }
   }
   if (!terms.psnr) return "";
