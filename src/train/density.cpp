@@ -173,7 +173,7 @@ void DensityControl::shorten_needles(Surfels& surfels, float cloud) const {
 
 void DensityControl::shorten_unseen(Surfels& surfels, const Tensor<Camera<float>>& cameras,
                                     float cloud) const {
-  if (options_.longest_unseen == 0) return;
+  if (!(options_.longest_unseen * cloud > 0)) return;
   parallel_for(
       surfels.device(), "density: shorten unseen", surfels.count(),
       ShortenUnseen{cameras.data(), cameras.size(), surfels.body.empty() ? nullptr : surfels.body.data(),

@@ -145,10 +145,10 @@ Set surfel_along(int axis, const Vec3<float>& centre, float length) {
   return set;
 }
 
-float length_after_shortening(Set set, float limit) {
+float length_after_shortening(Set set, float limit, float cloud = 2) {
   DensityOptions o = options();
   o.longest_unseen = limit;
-  DensityControl("main", o, 1).shorten_unseen(set.surfels, one_camera(), 2);
+  DensityControl("main", o, 1).shorten_unseen(set.surfels, one_camera(), cloud);
   return std::exp(set.surfels.log_scale[0]);
 }
 
@@ -161,6 +161,8 @@ TEST(Density, ShortensWhatExtendsUnseenTowardsTheCameras) {
   // No limit, or one beyond its end.
   EXPECT_EQ(length_after_shortening(surfel_along(2, centre, 1), 0), 1);
   EXPECT_EQ(length_after_shortening(surfel_along(2, centre, 1), 1.4F), 1);
+  // All points of the capture coincide.
+  EXPECT_EQ(length_after_shortening(surfel_along(2, centre, 1), 0.1F, 0), 1);
 }
 
 TEST(Density, LeavesWhatIsSeenOrNoNearerThanItsCentre) {
