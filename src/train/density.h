@@ -50,9 +50,10 @@ class DensityControl {
   // memory.
   void shorten_needles(Surfels& surfels, float cloud) const;
 
-  // Shortens surfels of no body that extend, towards the cameras, into space that none of them sees, to
-  // options.longest_unseen past the last point that one sees (0: no limit). Such a surfel hides the scene
-  // from other views. cameras: of the training views, on the surfels' device. Allocates no memory.
+  // Shortens surfels of no body that extend, towards the cameras, into space that none of them sees: to at
+  // most options.longest_unseen · cloud past the last point that one sees (0: no limit; method §7.7). Such a
+  // surfel hides the scene from other views. cameras: of the training views, on the surfels' device.
+  // Allocates no memory.
   void shorten_unseen(Surfels& surfels, const Tensor<Camera<float>>& cameras, float cloud) const;
 
   // Lowers every opacity to at most options.opacity_reset and sets the moments of the opacities to zero.
