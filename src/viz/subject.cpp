@@ -12,7 +12,7 @@
 #include "ops/lighting/lighting.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 #include "scene/rows.h"
 
 namespace traceflow::viz {

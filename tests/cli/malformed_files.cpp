@@ -2,7 +2,7 @@
 #include "cli/program.h"
 #include "files/npy.h"
 #include "files/png.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 #include "support/file_bytes.h"
 #include "support/temp_folder.h"
 

@@ -148,9 +148,6 @@ MalformedKind malformed_plys() {
        {"a list among the properties", trace, replace(ply, "float nx", "list uchar int nx"),
         "scene.ply: property: found \"property list uchar int nx\", expected a scalar type and a name; write "
         "it with 2DGS or `traceflow export`"},
-       {"3D Gaussians of 3DGS", trace, replace(ply, "float nx", "float scale_2"),
-        "scene.ply: property scale_2: found three scales, a 3DGS scene of ellipsoids, expected two, the "
-        "surfels of 2DGS; retrain with 2DGS or `traceflow train`"},
        {"a missing attribute", trace, replace(ply, "float opacity", "float transparency"),
         "scene.ply: property opacity: found none, expected every attribute of 2DGS; write it with 2DGS or "
         "`traceflow export`"},

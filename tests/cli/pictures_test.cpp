@@ -9,7 +9,7 @@
 #include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
 #include "files/png.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 
 // The verbs that need no capture, from their arguments to the files they leave.
 namespace traceflow::cli {

@@ -12,7 +12,7 @@
 #include "base/parallel.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 
 namespace traceflow::cli {
 namespace {

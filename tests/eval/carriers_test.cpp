@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 #include "support/temp_folder.h"
 
 namespace traceflow::eval {

@@ -2,7 +2,7 @@
 #include <cstring>
 
 #include "fuzz/scratch_file.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 #include "support/file_bytes.h"
 
 using namespace traceflow;

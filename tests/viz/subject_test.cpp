@@ -8,7 +8,7 @@
 #include <fstream>
 #include <limits>
 
-#include "scene/ply.h"
+#include "splat/ply.h"
 #include "viz/layers.h"
 
 namespace traceflow::viz {

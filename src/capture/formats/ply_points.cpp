@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 #include "files/limits.h"
-#include "scene/ply_header.h"
+#include "files/ply_header.h"
 
 namespace traceflow {
 

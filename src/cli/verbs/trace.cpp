@@ -10,7 +10,7 @@
 #include "math/spherical_harmonics.h"
 #include "ops/deform/deform.h"
 #include "ops/trace/trace.h"
-#include "scene/ply.h"
+#include "splat/ply.h"
 
 namespace traceflow::cli {
 

@@ -1,4 +1,4 @@
-#include "scene/ply.h"
+#include "splat/ply.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <sstream>
 
-#include "base/random.h"
+#include "splat/random_surfels.h"
 #include "support/refusal.h"
 
 namespace traceflow {
@@ -39,22 +39,6 @@ class Ply : public testing::Test {
 
   std::filesystem::path folder_, file_;
 };
-
-Surfels random_surfels(int64_t n, int64_t coefficients, bool tint) {
-  Random random(7);
-  Surfels s;
-  s.position = Tensor<float>(Shape{n, 3});
-  s.log_scale = Tensor<float>(Shape{n, 2});
-  s.rotation = Tensor<float>(Shape{n, 4});
-  s.opacity_logit = Tensor<float>(Shape{n});
-  s.sh = Tensor<float>(Shape{n, coefficients, 3});
-  if (tint) s.tint_logit = Tensor<float>(Shape{n});
-  if (tint && coefficients > 1) s.roughness_logit = Tensor<float>(Shape{n});
-  s.for_each([&](const std::string&, Tensor<float>& t) {
-    for (float& v : t.values()) v = static_cast<float>(random.normal());
-  });
-  return s;
-}
 
 void expect_equal(const Surfels& a, const Surfels& b) {
   const auto equal = [](const Tensor<float>& x, const Tensor<float>& y) {
@@ -170,11 +154,23 @@ TEST_F(Ply, NotesEndBeforeAllCarriageReturns) {
   EXPECT_EQ(read_ply(file_).notes, scene.notes);
 }
 
-TEST_F(Ply, RefusesThreeScalesWithAWordOn3dgs) {
+TEST_F(Ply, GaussiansHaveAThirdScaleAndReadBackAsSurfels) {
+  const PlyScene scene = {random_surfels(500, 16, true), {}, PlyVertex::gaussian};
+  write_ply(file_, scene);
+  EXPECT_THAT(bytes(), HasSubstr("property float scale_1\nproperty float scale_2\nproperty float rot_0\n"));
+  const PlyScene back = read_ply(file_);
+  EXPECT_EQ(back.vertex, PlyVertex::gaussian);
+  expect_equal(back.surfels, scene.surfels);
+}
+
+// The body is 0, 1, 2, …: scale_0 = 7 is the shortest axis, so the others, 8 and 13, are the surfel's.
+TEST_F(Ply, TheShortestAxisOfAGaussianIsTheNormal) {
   std::vector<std::string> names = degree_0;
   names.emplace_back("scale_2");
   write(file_of(names, 1));
-  EXPECT_THAT(refusal(), HasSubstr("3DGS"));
+  const Surfels s = read_ply(file_).surfels;
+  EXPECT_EQ(s.log_scale(0, 0), 8);
+  EXPECT_EQ(s.log_scale(0, 1), 13);
 }
 
 TEST_F(Ply, RefusesWhatTheHeaderDoesNotHold) {

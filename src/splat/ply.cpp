@@ -1,4 +1,4 @@
-#include "scene/ply.h"
+#include "splat/ply.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,8 @@
 
 #include "base/atomic_file.h"
 #include "math/types.h"
-#include "scene/ply_header.h"
+#include "files/ply_header.h"
+#include "splat/gaussians.h"
 
 namespace traceflow {
 
@@ -120,18 +121,19 @@ void read_rows(const InputFile& file, const PlyHeader& header, const std::vector
   }
 }
 
-std::vector<std::string> written_properties(const Surfels& surfels) {
+std::vector<std::string> written_properties(const Surfels& surfels, PlyVertex vertex) {
   std::vector<std::string> names = {"x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"};
   for (int64_t i = 0; i < 3 * (surfels.sh.dim(1) - 1); ++i) names.push_back("f_rest_" + std::to_string(i));
-  for (const char* name : {"opacity", "scale_0", "scale_1", "rot_0", "rot_1", "rot_2", "rot_3"})
-    names.emplace_back(name);
+  for (const char* name : {"opacity", "scale_0", "scale_1"}) names.emplace_back(name);
+  if (vertex == PlyVertex::gaussian) names.emplace_back("scale_2");
+  for (const char* name : {"rot_0", "rot_1", "rot_2", "rot_3"}) names.emplace_back(name);
   if (surfels.has_tint()) names.emplace_back("tint");
   if (surfels.has_roughness()) names.emplace_back("roughness");
   return names;
 }
 
 // One surfel's numbers in the order of written_properties.
-void append_row(const Surfels& s, int64_t i, std::vector<float>& out) {
+void append_row(const Surfels& s, int64_t i, PlyVertex vertex, std::vector<float>& out) {
   const int64_t k = s.sh.dim(1);
   const float* sh = s.sh.row(i);
   out.insert(out.end(), s.position.row(i), s.position.row(i) + 3);
@@ -142,6 +144,7 @@ void append_row(const Surfels& s, int64_t i, std::vector<float>& out) {
   }
   out.push_back(s.opacity_logit[i]);
   out.insert(out.end(), s.log_scale.row(i), s.log_scale.row(i) + 2);
+  if (vertex == PlyVertex::gaussian) out.push_back(log_thickness(s, i));
   out.insert(out.end(), s.rotation.row(i), s.rotation.row(i) + 4);
   if (s.has_tint()) out.push_back(s.tint_logit[i]);
   if (s.has_roughness()) out.push_back(s.roughness_logit[i]);
@@ -152,10 +155,6 @@ void append_row(const Surfels& s, int64_t i, std::vector<float>& out) {
 PlyScene read_ply(const std::filesystem::path& path) {
   const InputFile file(path);
   const PlyHeader header = read_ply_header(file);
-  if (header.find("scale_2") != nullptr) {
-    throw InputError(path.string(), "property scale_2", "three scales, a 3DGS scene of ellipsoids",
-                     "two, the surfels of 2DGS", "retrain with 2DGS or `traceflow train`");
-  }
   require_attributes(path.string(), header);
   const int rest = rest_count(path.string(), header);
   const int64_t n = header.rows;
@@ -165,6 +164,7 @@ PlyScene read_ply(const std::filesystem::path& path) {
   scene.notes = header.notes;
   Surfels& s = scene.surfels;
   ColumnPlan plan(path.string(), header);
+  Tensor<float> log_scales;
   for_each_field(
       [&](const SurfelField& field, Tensor<float>& tensor) {
         if (field.is_optional && header.find(std::string(field.ply[0])) == nullptr) return;
@@ -179,14 +179,20 @@ PlyScene read_ply(const std::filesystem::path& path) {
       plan.add_one("f_rest_" + std::to_string(channel * (k - 1) + c - 1), s.sh, 3 * c + channel);
     }
   }
+  if (header.find("scale_2") != nullptr) {
+    scene.vertex = PlyVertex::gaussian;
+    log_scales = Tensor<float>(Shape{n, 3});
+    plan.add(std::array<std::string_view, 3>{"scale_0", "scale_1", "scale_2"}, log_scales);
+  }
   read_rows(file, header, plan.columns());
+  if (scene.vertex == PlyVertex::gaussian) flatten(log_scales, s);
   return scene;
 }
 
 void write_ply(const std::filesystem::path& path, const PlyScene& scene) {
   const Surfels& surfels = scene.surfels;
   require(surfels.sh.shape().rank() == 3, "surfels have harmonics", surfels.sh.shape().to_string());
-  const std::vector<std::string> names = written_properties(surfels);
+  const std::vector<std::string> names = written_properties(surfels, scene.vertex);
   std::string bytes = "ply\nformat binary_little_endian 1.0\n";
   for (const auto& [key, value] : scene.notes) bytes += fmt::format("comment traceflow {} {}\n", key, value);
   bytes += fmt::format("element vertex {}\n", surfels.count());
@@ -197,7 +203,7 @@ void write_ply(const std::filesystem::path& path, const PlyScene& scene) {
   bytes.reserve(bytes.size() + static_cast<size_t>(surfels.count()) * names.size() * sizeof(float));
   for (int64_t i = 0; i < surfels.count(); ++i) {
     row.clear();
-    append_row(surfels, i, row);
+    append_row(surfels, i, scene.vertex, row);
     bytes.append(reinterpret_cast<const char*>(row.data()), row.size() * sizeof(float));
   }
   write_atomically(path, bytes);

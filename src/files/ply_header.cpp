@@ -1,4 +1,4 @@
-#include "scene/ply_header.h"
+#include "files/ply_header.h"
 
 #include <fmt/format.h>
 
