@@ -54,6 +54,12 @@ std::array<int64_t, 6> part_sizes(const SpzHeader& h) {
   return {9 * n, n, 3 * n, 3 * n, (h.version == 2 ? 3 : 4) * n, 3 * (sh_coefficients(h.degree) - 1) * n};
 }
 
+constexpr std::array<uint8_t, 2> gzip_magic = {0x1f, 0x8b};
+constexpr std::array<uint8_t, 4> zstd_spz_magic = {'N', 'G', 'S', 'P'};
+bool begins_with(std::span<const uint8_t> bytes, std::span<const uint8_t> magic) {
+  return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
+}
+
 uint8_t to_byte(float x) {
   // Not a number becomes 0.
   return x > 0 ? static_cast<uint8_t>(std::min(std::round(x), 255.0F)) : uint8_t{0};
@@ -98,9 +104,8 @@ class SpzReader {
   }
 
   void read() {
-    if (bytes_.size() >= 2 && bytes_[0] == 0x1f && bytes_[1] == 0x8b) return read_gzip();
-    if (bytes_.size() >= zstd_header_bytes && std::memcmp(bytes_.data(), &spz_magic, 4) == 0)
-      return read_zstd();
+    if (begins_with(bytes_, gzip_magic)) return read_gzip();
+    if (begins_with(bytes_, zstd_spz_magic) && bytes_.size() >= zstd_header_bytes) return read_zstd();
     fail("first bytes", "neither a gzip stream nor \"NGSP\"", "an .spz of version 2, 3 or 4");
   }
   const SpzHeader& header() const { return header_; }
@@ -289,6 +294,13 @@ void write_spz(const std::filesystem::path& path, const Surfels& surfels) {
   const std::vector<uint8_t> bytes = packed_bytes(surfels);
   require(bytes.size() <= UINT32_MAX, "an .spz is smaller than 4 GiB unpacked", std::to_string(bytes.size()));
   write_atomically(path, gzipped(bytes));
+}
+
+bool is_spz(const std::filesystem::path& path) {
+  const InputFile file(path);
+  std::vector<uint8_t> bytes(static_cast<size_t>(std::min<int64_t>(file.size(), 4)));
+  file.read_at(0, std::as_writable_bytes(std::span(bytes)));
+  return begins_with(bytes, gzip_magic) || begins_with(bytes, zstd_spz_magic);
 }
 
 Surfels read_spz(const std::filesystem::path& path) {

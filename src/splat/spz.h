@@ -14,6 +14,9 @@ namespace traceflow {
 // axes, as other programs that convert .ply do.
 void write_spz(const std::filesystem::path& path, const Surfels& surfels);
 
+// Whether a file begins like an .spz and not like a .ply. Throws InputError if it cannot be read.
+bool is_spz(const std::filesystem::path& path);
+
 // Reads versions 2 and 3 (gzip) and 4 (Zstandard), harmonics of degree 0 to 3, as surfels (flatten). Ignores
 // extensions. Throws InputError for anything else, and for more Gaussians than the file can hold.
 Surfels read_spz(const std::filesystem::path& path);

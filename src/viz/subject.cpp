@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 
 #include "base/robust.h"
 #include "files/options_json.h"
@@ -12,8 +13,11 @@
 #include "ops/lighting/lighting.h"
 #include "ops/motion/motion.h"
 #include "ops/motion/nodes.h"
-#include "splat/ply.h"
 #include "scene/rows.h"
+#include "splat/ply.h"
+#include "splat/sog.h"
+#include "splat/splat_file.h"
+#include "splat/spz.h"
 
 namespace traceflow::viz {
 
@@ -24,8 +28,6 @@ constexpr const char* extent_note = "extent";
 constexpr const char* focal_note = "focal";
 constexpr const char* render_note = "render";
 constexpr const char* environment_note = "environment";
-constexpr const char* main_file = "main.ply";
-constexpr const char* environment_file = "environment.ply";
 
 std::string note(const PlyScene& file, const char* key) {
   const auto found = file.notes.find(key);
@@ -78,10 +80,14 @@ Surfels posed(const Surfels& stored, const Field* field, const Nodes* nodes, con
   return result;
 }
 
+const char* extension_of(SplatFormat format) {
+  return format == SplatFormat::spz ? ".spz" : format == SplatFormat::sog ? ".sog" : ".ply";
+}
+
 }  // namespace
 
-Subject read_ply_subject(const std::filesystem::path& path, const std::filesystem::path& environment) {
-  PlyScene file = read_ply(path);
+Subject read_splat_subject(const std::filesystem::path& path, const std::filesystem::path& environment) {
+  PlyScene file = read_splat_file(path);
   Subject subject;
   subject.scene.specular = Specular::none;
   subject.scene.extent = number_in(file, extent_note, path);
@@ -91,6 +97,9 @@ Subject read_ply_subject(const std::filesystem::path& path, const std::filesyste
     subject.render.validate();
   }
   subject.scene.main = std::move(file.surfels);
+  if (file.vertex == PlyVertex::gaussian) {
+    subject.warning = path.string() + " holds 3D Gaussians: each is drawn as a surfel without its shortest axis";
+  }
 
   std::filesystem::path reflected = environment;
   if (reflected.empty() && !note(file, environment_note).empty()) {
@@ -101,7 +110,7 @@ Subject read_ply_subject(const std::filesystem::path& path, const std::filesyste
     }
   }
   if (!reflected.empty()) {
-    subject.scene.environment = read_ply(reflected).surfels;
+    subject.scene.environment = read_splat_file(reflected).surfels;
     subject.scene.environment.tint_logit = subject.scene.environment.roughness_logit = Tensor<float>();
     subject.scene.specular = Specular::environment_gaussians;
     if (!subject.scene.main.has_tint()) {
@@ -125,36 +134,53 @@ float extent_seen_from(const Surfels& surfels, const std::vector<Shot>& shots) {
   return median > 0 ? median : 1;
 }
 
-std::vector<std::filesystem::path> export_subject(const Subject& subject, std::optional<float> time,
-                                                  const std::filesystem::path& folder) {
+Surfels posed_main(const Subject& subject, std::optional<float> time) {
+  const Scene& scene = subject.scene;
+  return posed(scene.main, subject.request.deform_main && scene.main_field ? &*scene.main_field : nullptr,
+               scene.main_nodes ? &*scene.main_nodes : nullptr, scene.main_motion ? &*scene.main_motion : nullptr,
+               scene.lighting ? &*scene.lighting : nullptr, time, subject.render.precision);
+}
+
+std::vector<std::filesystem::path> write_subject(const Subject& subject, std::optional<float> time, Surfels surfels,
+                                                 const std::filesystem::path& folder, SplatFormat format,
+                                                 const std::string& name_suffix) {
   const Scene& scene = subject.scene;
   const FrameRequest& request = subject.request;
-  const auto make = [&](const Surfels& stored, const std::optional<Field>& field, const Nodes* nodes,
-                        const Motion* motion, const Lighting* lighting, bool deform) {
-    PlyScene file;
-    file.surfels = posed(stored, deform && field ? &*field : nullptr, nodes, motion, lighting, time,
-                         subject.render.precision);
-    undo_normalisation(scene.normalisation, file.surfels);
-    file.notes[extent_note] = fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale));
-    if (scene.focal > 0) file.notes[focal_note] = fmt::format("{}", scene.focal);
-    return file;
-  };
-  const bool reflects =
-      request.specular && scene.specular == Specular::environment_gaussians && scene.environment.count() > 0;
-
   std::filesystem::create_directories(folder);
-  std::vector<std::filesystem::path> written = {folder / main_file};
-  PlyScene main = make(scene.main, scene.main_field, scene.main_nodes ? &*scene.main_nodes : nullptr,
-                       scene.main_motion ? &*scene.main_motion : nullptr,
-                       scene.lighting ? &*scene.lighting : nullptr, request.deform_main);
-  main.notes[render_note] = options_to_json(subject.render);
-  if (reflects) {
-    written.push_back(folder / environment_file);
-    main.notes[environment_note] = environment_file;
-    write_ply(written[1], make(scene.environment, scene.environment_field, nullptr, nullptr, nullptr,
-                               request.deform_environment));
+  const std::filesystem::path path = folder / ("main" + name_suffix + extension_of(format));
+  PlyScene main{std::move(surfels), {}, PlyVertex::surfel};
+  undo_normalisation(scene.normalisation, main.surfels);
+  switch (format) {
+    case SplatFormat::spz:
+      write_spz(path, main.surfels);
+      return {path};
+    case SplatFormat::sog:
+      write_sog(path, main.surfels);
+      return {path};
+    case SplatFormat::gaussian_ply:
+      main.vertex = PlyVertex::gaussian;
+      write_ply(path, main);
+      return {path};
+    case SplatFormat::surfel_ply:
+      break;
   }
-  write_ply(written[0], main);
+
+  std::vector<std::filesystem::path> written = {path};
+  std::map<std::string, std::string> notes = {
+      {extent_note, fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale))}};
+  if (scene.focal > 0) notes[focal_note] = fmt::format("{}", scene.focal);
+  main.notes = notes;
+  main.notes[render_note] = options_to_json(subject.render);
+  if (request.specular && scene.specular == Specular::environment_gaussians && scene.environment.count() > 0) {
+    written.push_back(folder / ("environment" + name_suffix + ".ply"));
+    main.notes[environment_note] = written[1].filename().string();
+    const Field* field = request.deform_environment && scene.environment_field ? &*scene.environment_field : nullptr;
+    PlyScene environment{
+        posed(scene.environment, field, nullptr, nullptr, nullptr, time, subject.render.precision), notes};
+    undo_normalisation(scene.normalisation, environment.surfels);
+    write_ply(written[1], environment);
+  }
+  write_ply(path, main);
   return written;
 }
 

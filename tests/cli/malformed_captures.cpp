@@ -160,7 +160,7 @@ MalformedKind malformed_folders() {
        {"a missing scene",
         {"render", "nowhere.ply", "-o", "out"},
         nothing,
-        "nowhere.ply: found no such file or folder, expected a run's folder or a .ply"},
+        "nowhere.ply: found no such file or folder, expected a run's folder, a .ply or an .spz"},
        {"a run's folder without a checkpoint",
         {"export", "capture", "-o", "out"},
         nothing,

@@ -113,7 +113,7 @@ TEST_F(Export, RoundTripGivesTheSamePictures) {
 
   const std::vector<std::filesystem::path> files = export_subject(subject, 0.5F, folder_);
   ASSERT_EQ(files.size(), 2U);
-  const Subject back = read_ply_subject(files[0], {});
+  const Subject back = read_splat_subject(files[0], {});
   EXPECT_EQ(back.warning, "");
   const Frame again = render(back, in_capture(camera_in_scene(), subject.scene.normalisation), 0);
   for (size_t i = 0; i < layer_names.size(); ++i) {
@@ -125,7 +125,7 @@ TEST_F(Export, RoundTripGivesTheSamePictures) {
 
 TEST_F(Export, WithoutTimeIsUndeformed) {
   Subject subject = moving_subject();
-  const Subject back = read_ply_subject(export_subject(subject, std::nullopt, folder_)[0], {});
+  const Subject back = read_splat_subject(export_subject(subject, std::nullopt, folder_)[0], {});
   subject.request.deform_main = subject.request.deform_environment = false;
   const Frame direct = render(subject, camera_in_scene(), 0.5F);
   const Frame again = render(back, in_capture(camera_in_scene(), subject.scene.normalisation), 0.5F);
@@ -136,21 +136,21 @@ TEST_F(Export, LeavesOutWhatTheRunHasNotReached) {
   Subject subject = moving_subject();
   subject.request.specular = false;
   EXPECT_EQ(export_subject(subject, 0.5F, folder_).size(), 1U);
-  EXPECT_EQ(read_ply_subject(folder_ / "main.ply", {}).scene.specular, Specular::none);
+  EXPECT_EQ(read_splat_subject(folder_ / "main.ply", {}).scene.specular, Specular::none);
 }
 
 TEST_F(Export, LeavesOutSurfelsThatAreNotFinite) {
   Subject subject = moving_subject();
   subject.scene.main.log_scale(7, 1) = std::numeric_limits<float>::quiet_NaN();
   export_subject(subject, 0.5F, folder_);
-  const Subject back = read_ply_subject(folder_ / "main.ply", {});
+  const Subject back = read_splat_subject(folder_ / "main.ply", {});
   EXPECT_EQ(back.scene.main.count(), subject.scene.main.count() - 1);
 }
 
 TEST_F(Export, AMissingEnvironmentIsAWarning) {
   export_subject(moving_subject(), 0.5F, folder_);
   std::filesystem::remove(folder_ / "environment.ply");
-  const Subject back = read_ply_subject(folder_ / "main.ply", {});
+  const Subject back = read_splat_subject(folder_ / "main.ply", {});
   EXPECT_THAT(back.warning, testing::HasSubstr("environment.ply"));
   EXPECT_EQ(render(back, camera_in_scene(), 0).traced.pixel.size(), 0);
 }
@@ -171,7 +171,7 @@ TEST_F(Export, NotesFromAHostileFileAreRefused) {
                                                                   {"render", R"({"unknown": 1})"}};
   for (const auto& [key, value] : cases) {
     write_ply(folder_ / "a.ply", {surfels, {{key, value}}});
-    EXPECT_THROW(read_ply_subject(folder_ / "a.ply", {}), InputError) << key << " " << value;
+    EXPECT_THROW(read_splat_subject(folder_ / "a.ply", {}), InputError) << key << " " << value;
   }
 }
 

@@ -5,14 +5,14 @@
 namespace traceflow::cli {
 
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
-  if (std::filesystem::is_regular_file(path)) return {viz::read_ply_subject(path, environment), std::nullopt};
+  if (std::filesystem::is_regular_file(path)) return {viz::read_splat_subject(path, environment), std::nullopt};
   // If a run was exported into its own folder, the run contains more than the exported time.
   const bool is_taken_for_run = environment.empty() && RunFolder{path}.holds_a_run();
   if (!is_taken_for_run && std::filesystem::is_regular_file(path / "main.ply")) {
-    return {viz::read_ply_subject(path / "main.ply", environment), std::nullopt};
+    return {viz::read_splat_subject(path / "main.ply", environment), std::nullopt};
   }
   if (!std::filesystem::exists(path)) {
-    throw InputError(path.string(), "", "no such file or folder", "a run's folder or a .ply");
+    throw InputError(path.string(), "", "no such file or folder", "a run's folder, a .ply or an .spz");
   }
   if (!environment.empty()) {
     throw InputError("option", "environment", "a run, which has its own", "a .ply to go with");

@@ -10,7 +10,7 @@
 #include "math/spherical_harmonics.h"
 #include "ops/deform/deform.h"
 #include "ops/trace/trace.h"
-#include "splat/ply.h"
+#include "splat/splat_file.h"
 
 namespace traceflow::cli {
 
@@ -40,7 +40,7 @@ trace::Rays read_rays(const std::filesystem::path& path) {
 
 void run_trace(const TraceArguments& a, const DeviceArguments& devices) {
   a.options.validate();
-  Surfels surfels = read_ply(a.ply).surfels;
+  Surfels surfels = read_splat_file(a.ply).surfels;
   trace::Rays rays = read_rays(a.rays);
   const Device device = devices.choose();
   surfels = surfels.on(device);
