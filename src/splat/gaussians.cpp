@@ -33,8 +33,8 @@ void flatten(const Tensor<float>& log_scales, Surfels& surfels) {
     surfels.log_scale(i, 1) = s[(normal + 2) % 3];
     if (normal == 2) continue;
     float* rotation = surfels.rotation.row(i);
-    const Vec4<double> turned = quaternion_product<double>({rotation[0], rotation[1], rotation[2], rotation[3]},
-                                        normal == 0 ? third_turn : two_thirds);
+    const Vec4<double> turned = quaternion_product<double>(
+        {rotation[0], rotation[1], rotation[2], rotation[3]}, normal == 0 ? third_turn : two_thirds);
     for (int c = 0; c < 4; ++c) rotation[c] = static_cast<float>(turned[c]);
   }
 }

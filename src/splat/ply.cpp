@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "base/atomic_file.h"
-#include "math/types.h"
 #include "files/ply_header.h"
+#include "math/types.h"
 #include "splat/gaussians.h"
 
 namespace traceflow {

@@ -6,8 +6,8 @@
 
 #include "scene/scene.h"
 
-// The .ply of 2DGS and of 3DGS: one vertex per surfel or Gaussian, stored values before activation (method §1.1),
-// binary little endian.
+// The .ply of 2DGS and of 3DGS: one vertex per surfel or Gaussian, stored values before activation (method
+// §1.1), binary little endian.
 namespace traceflow {
 
 // What a vertex is: 3DGS's Gaussians have a third scale.
@@ -28,8 +28,8 @@ struct PlyScene {
 // header promises. Values are not checked: rendering skips a surfel with a value that is not finite.
 PlyScene read_ply(const std::filesystem::path& path);
 
-// Writes x y z nx ny nz (zeros) f_dc_* f_rest_* opacity scale_0 scale_1 [scale_2] rot_0..3 [tint] [roughness],
-// float32, atomically. The scale_2 of Gaussians is log_thickness.
+// Writes x y z nx ny nz (zeros) f_dc_* f_rest_* opacity scale_0 scale_1 [scale_2] rot_0..3 [tint]
+// [roughness], float32, atomically. The scale_2 of Gaussians is log_thickness.
 void write_ply(const std::filesystem::path& path, const PlyScene& scene);
 
 // Converts positions and log-scales from the normalised scene to the capture's own coordinates (method §2).

@@ -39,7 +39,8 @@ std::vector<float> first_entries(const std::vector<float>& values) {
 
 class MedianCut {
  public:
-  MedianCut(const Tensor<float>& rows, Palette& palette) : rows_(rows), palette_(palette), order_(rows.dim(0)) {
+  MedianCut(const Tensor<float>& rows, Palette& palette)
+      : rows_(rows), palette_(palette), order_(rows.dim(0)) {
     std::iota(order_.begin(), order_.end(), int64_t{0});
   }
 

@@ -28,9 +28,9 @@ struct Palette {
   std::vector<uint16_t> labels;  // of each row
 };
 
-// At most `most` (a power of two, up to 65,536) vectors that stand for N rows, N×D, by median cut: the rows are
-// halved along the coordinate with the largest variance until there are enough groups, and each entry is a
-// group's mean. Every row has its own entry where N is at most `most`.
+// At most `most` (a power of two, up to 65,536) vectors that stand for N rows, N×D, by median cut: the rows
+// are halved along the coordinate with the largest variance until there are enough groups, and each entry is
+// a group's mean. Every row has its own entry where N is at most `most`.
 Palette make_palette(const Tensor<float>& rows, int64_t most);
 
 }  // namespace traceflow

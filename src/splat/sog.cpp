@@ -126,16 +126,19 @@ class SogWriter {
   // The three components of the unit quaternion besides its largest one, which is made positive, times √2.
   void write_rotations() {
     Tensor<uint8_t> image = opaque_image();
-    for_each_pixel([&](int64_t i, uint8_t* pixel) {
-      const float* q = s_.rotation.row(i);
-      const double length = std::sqrt(std::inner_product(q, q + 4, q, 0.0));
-      const float* largest = std::max_element(q, q + 4, [](float a, float b) { return std::abs(a) < std::abs(b); });
-      const double factor = std::copysign(std::sqrt(2.0) / (length > 0 ? length : 1), *largest);
-      for (const float* c = q; c < q + 4; ++c) {
-        if (c != largest) *pixel++ = rounded_byte(255 * (0.5 * factor * *c + 0.5));
-      }
-      *pixel = static_cast<uint8_t>(rotation_tag + (largest - q));
-    }, image);
+    for_each_pixel(
+        [&](int64_t i, uint8_t* pixel) {
+          const float* q = s_.rotation.row(i);
+          const double length = std::sqrt(std::inner_product(q, q + 4, q, 0.0));
+          const float* largest =
+              std::max_element(q, q + 4, [](float a, float b) { return std::abs(a) < std::abs(b); });
+          const double factor = std::copysign(std::sqrt(2.0) / (length > 0 ? length : 1), *largest);
+          for (const float* c = q; c < q + 4; ++c) {
+            if (c != largest) *pixel++ = rounded_byte(255 * (0.5 * factor * *c + 0.5));
+          }
+          *pixel = static_cast<uint8_t>(rotation_tag + (largest - q));
+        },
+        image);
     add("quats.webp", image);
     meta_["quats"]["files"] = json_array({"quats.webp"});
   }
@@ -147,9 +150,11 @@ class SogWriter {
     }
     const Codebook codebook(values);
     Tensor<uint8_t> image = opaque_image();
-    for_each_pixel([&](int64_t i, uint8_t* pixel) {
-      for (const float v : scales_of(i)) *pixel++ = codebook.index_of(v);
-    }, image);
+    for_each_pixel(
+        [&](int64_t i, uint8_t* pixel) {
+          for (const float v : scales_of(i)) *pixel++ = codebook.index_of(v);
+        },
+        image);
     add("scales.webp", image);
     meta_["scales"] = {{"codebook", padded_codebook(codebook)}, {"files", json_array({"scales.webp"})}};
   }
@@ -159,10 +164,12 @@ class SogWriter {
     for (int64_t i = 0; i < n_; ++i) values.insert(values.end(), s_.sh.row(i), s_.sh.row(i) + 3);
     const Codebook codebook(values);
     Tensor<uint8_t> image = opaque_image();
-    for_each_pixel([&](int64_t i, uint8_t* pixel) {
-      for (int c = 0; c < 3; ++c) *pixel++ = codebook.index_of(s_.sh.row(i)[c]);
-      *pixel = rounded_byte(255 * sigmoid(double{s_.opacity_logit[i]}));
-    }, image);
+    for_each_pixel(
+        [&](int64_t i, uint8_t* pixel) {
+          for (int c = 0; c < 3; ++c) *pixel++ = codebook.index_of(s_.sh.row(i)[c]);
+          *pixel = rounded_byte(255 * sigmoid(double{s_.opacity_logit[i]}));
+        },
+        image);
     add("sh0.webp", image);
     meta_["sh0"] = {{"codebook", padded_codebook(codebook)}, {"files", json_array({"sh0.webp"})}};
   }
@@ -187,11 +194,13 @@ class SogWriter {
       }
     }
     Tensor<uint8_t> labels = opaque_image();
-    for_each_pixel([&](int64_t i, uint8_t* pixel) {
-      const uint16_t label = palette.labels[static_cast<size_t>(i)];
-      pixel[0] = static_cast<uint8_t>(label & 0xff);
-      pixel[1] = static_cast<uint8_t>(label >> 8);
-    }, labels);
+    for_each_pixel(
+        [&](int64_t i, uint8_t* pixel) {
+          const uint16_t label = palette.labels[static_cast<size_t>(i)];
+          pixel[0] = static_cast<uint8_t>(label & 0xff);
+          pixel[1] = static_cast<uint8_t>(label >> 8);
+        },
+        labels);
     add("shN_centroids.webp", image);
     add("shN_labels.webp", labels);
     meta_["shN"] = {{"count", count},

@@ -274,8 +274,9 @@ std::vector<uint8_t> packed_bytes(const Surfels& s) {
 
 std::vector<std::byte> gzipped(const std::vector<uint8_t>& bytes) {
   z_stream stream{};
-  require(deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, 16 + MAX_WBITS, 9, Z_DEFAULT_STRATEGY) == Z_OK,
-          "zlib starts", "no memory");
+  require(
+      deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, 16 + MAX_WBITS, 9, Z_DEFAULT_STRATEGY) == Z_OK,
+      "zlib starts", "no memory");
   std::vector<std::byte> packed(deflateBound(&stream, bytes.size()));
   stream.next_in = const_cast<Bytef*>(bytes.data());
   stream.avail_in = static_cast<uInt>(bytes.size());
@@ -310,8 +311,9 @@ Surfels read_spz(const std::filesystem::path& path) {
   const Parts& parts = reader.parts();
   const int64_t n = header.count, k = sh_coefficients(header.degree);
 
-  Surfels s{Tensor<float>(Shape{n, 3}), Tensor<float>(),               Tensor<float>(Shape{n, 4}),
-            Tensor<float>(Shape{n}),    Tensor<float>(Shape{n, k, 3}), Tensor<float>()};
+  Surfels s{Tensor<float>(Shape{n, 3}),    Tensor<float>(),
+            Tensor<float>(Shape{n, 4}),    Tensor<float>(Shape{n}),
+            Tensor<float>(Shape{n, k, 3}), Tensor<float>()};
   Tensor<float> log_scales(Shape{n, 3});
   const float step = std::ldexp(1.0F, -header.fractional_bits);
   const int64_t rotation_bytes = header.version == 2 ? 3 : 4;
@@ -319,7 +321,8 @@ Surfels read_spz(const std::filesystem::path& path) {
     const uint8_t* p = parts[positions].data() + 3 * i;
     const uint32_t high = uint32_t{p[0]} << 8 | uint32_t{p[1]} << 16 | uint32_t{p[2]} << 24;
     s.position.data()[i] = static_cast<float>(static_cast<int32_t>(high) >> 8) * step;
-    log_scales.data()[i] = static_cast<float>(parts[scales][static_cast<size_t>(i)]) / scale_steps - scale_offset;
+    log_scales.data()[i] =
+        static_cast<float>(parts[scales][static_cast<size_t>(i)]) / scale_steps - scale_offset;
   }
   for (int64_t i = 0; i < n; ++i) {
     // Opacities 0 and 1 have no finite logit.
@@ -328,7 +331,8 @@ Surfels read_spz(const std::filesystem::path& path) {
     unpack_rotation(parts[rotations].data() + rotation_bytes * i, header.version == 2, s.rotation.row(i));
     float* sh = s.sh.row(i);
     for (int64_t c = 0; c < 3; ++c)
-      sh[c] = (static_cast<float>(parts[colours][static_cast<size_t>(3 * i + c)]) / 255 - 0.5F) / colour_scale;
+      sh[c] =
+          (static_cast<float>(parts[colours][static_cast<size_t>(3 * i + c)]) / 255 - 0.5F) / colour_scale;
     const uint8_t* rest = parts[harmonics].data() + 3 * (k - 1) * i;
     for (int64_t c = 3; c < 3 * k; ++c) sh[c] = static_cast<float>(rest[c - 3]) / harmonic_steps - 1;
   }

@@ -34,7 +34,8 @@ Tensor<float> first_harmonics(const Surfels& s) {
 
 class Baker {
  public:
-  Baker(const Subject& subject, float time, const Surfels& posed) : subject_(subject), renderer_(subject.render) {
+  Baker(const Subject& subject, float time, const Surfels& posed)
+      : subject_(subject), renderer_(subject.render) {
     const Device device = subject.scene.device();
     plain_.main = posed.on(device);
     plain_.main.tint_logit = plain_.main.roughness_logit = Tensor<float>();
@@ -47,8 +48,14 @@ class Baker {
     plain_request_ = request_;
     plain_request_.specular = false;
     plain_request_.sh_degree_main = bake_degree;
-    trainable_ = {.tint = false, .main_field = false, .main_motion = false, .main_nodes = false,
-                  .lighting = false, .environment = false, .environment_field = false, .camera = false};
+    trainable_ = {.tint = false,
+                  .main_field = false,
+                  .main_motion = false,
+                  .main_nodes = false,
+                  .lighting = false,
+                  .environment = false,
+                  .environment_field = false,
+                  .camera = false};
   }
 
   // The image with reflections. The same renderer for all cameras: the pose and the tracer's BVH are reused.
@@ -126,8 +133,9 @@ std::vector<Camera<float>> with_moved(const std::vector<Camera<float>>& captured
 
 }  // namespace
 
-Baked bake(const Subject& subject, float time, const Surfels& posed, const std::vector<Camera<float>>& captured,
-           const Tensor<float>* start, const std::function<bool(int64_t, int64_t)>& progress) {
+Baked bake(const Subject& subject, float time, const Surfels& posed,
+           const std::vector<Camera<float>>& captured, const Tensor<float>* start,
+           const std::function<bool(int64_t, int64_t)>& progress) {
   require(!captured.empty(), "there is a camera to bake for");
   Baker baker(subject, time, posed);
   const std::vector<Camera<float>> cameras = with_moved(captured, subject.scene.extent);

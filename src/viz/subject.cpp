@@ -98,7 +98,8 @@ Subject read_splat_subject(const std::filesystem::path& path, const std::filesys
   }
   subject.scene.main = std::move(file.surfels);
   if (file.vertex == PlyVertex::gaussian) {
-    subject.warning = path.string() + " holds 3D Gaussians: each is drawn as a surfel without its shortest axis";
+    subject.warning =
+        path.string() + " holds 3D Gaussians: each is drawn as a surfel without its shortest axis";
   }
 
   std::filesystem::path reflected = environment;
@@ -137,13 +138,14 @@ float extent_seen_from(const Surfels& surfels, const std::vector<Shot>& shots) {
 Surfels posed_main(const Subject& subject, std::optional<float> time) {
   const Scene& scene = subject.scene;
   return posed(scene.main, subject.request.deform_main && scene.main_field ? &*scene.main_field : nullptr,
-               scene.main_nodes ? &*scene.main_nodes : nullptr, scene.main_motion ? &*scene.main_motion : nullptr,
-               scene.lighting ? &*scene.lighting : nullptr, time, subject.render.precision);
+               scene.main_nodes ? &*scene.main_nodes : nullptr,
+               scene.main_motion ? &*scene.main_motion : nullptr, scene.lighting ? &*scene.lighting : nullptr,
+               time, subject.render.precision);
 }
 
-std::vector<std::filesystem::path> write_subject(const Subject& subject, std::optional<float> time, Surfels surfels,
-                                                 const std::filesystem::path& folder, SplatFormat format,
-                                                 const std::string& name_suffix) {
+std::vector<std::filesystem::path> write_subject(const Subject& subject, std::optional<float> time,
+                                                 Surfels surfels, const std::filesystem::path& folder,
+                                                 SplatFormat format, const std::string& name_suffix) {
   const Scene& scene = subject.scene;
   const FrameRequest& request = subject.request;
   std::filesystem::create_directories(folder);
@@ -171,10 +173,12 @@ std::vector<std::filesystem::path> write_subject(const Subject& subject, std::op
   if (scene.focal > 0) notes[focal_note] = fmt::format("{}", scene.focal);
   main.notes = notes;
   main.notes[render_note] = options_to_json(subject.render);
-  if (request.specular && scene.specular == Specular::environment_gaussians && scene.environment.count() > 0) {
+  if (request.specular && scene.specular == Specular::environment_gaussians &&
+      scene.environment.count() > 0) {
     written.push_back(folder / ("environment" + name_suffix + ".ply"));
     main.notes[environment_note] = written[1].filename().string();
-    const Field* field = request.deform_environment && scene.environment_field ? &*scene.environment_field : nullptr;
+    const Field* field =
+        request.deform_environment && scene.environment_field ? &*scene.environment_field : nullptr;
     PlyScene environment{
         posed(scene.environment, field, nullptr, nullptr, nullptr, time, subject.render.precision), notes};
     undo_normalisation(scene.normalisation, environment.surfels);

@@ -26,8 +26,8 @@ struct MalformedKind {
   std::vector<MalformedCase> cases;
 };
 
-// Whole captures in capture/ (NeRF-DS), colmap/ and transforms/, a scene.ply, rays.npy, cameras.json and a
-// run in run/, all of which can be used.
+// Whole captures in capture/ (NeRF-DS), colmap/ and transforms/, a scene.ply, a scene.spz, rays.npy,
+// cameras.json and a run in run/, all of which can be used.
 const Files& good_files();
 
 MalformedKind malformed_json();
@@ -36,6 +36,7 @@ MalformedKind malformed_transforms();
 MalformedKind malformed_camera_lists();
 MalformedKind malformed_arrays();
 MalformedKind malformed_plys();
+MalformedKind malformed_spzs();
 MalformedKind malformed_checkpoints();
 MalformedKind malformed_images();
 MalformedKind malformed_archives();

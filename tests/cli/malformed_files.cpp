@@ -3,6 +3,7 @@
 #include "files/npy.h"
 #include "files/png.h"
 #include "splat/ply.h"
+#include "splat/spz.h"
 #include "support/file_bytes.h"
 #include "support/temp_folder.h"
 
@@ -53,9 +54,10 @@ void add_written(const fs::path& folder, Files& files) {
                   Tensor<float>({1}),    Tensor<float>({1, 1, 3}), Tensor<float>()};
   surfels.rotation(0, 0) = 1;
   write_ply(folder / "scene.ply", {surfels, {}});
+  write_spz(folder / "scene.spz", surfels);
   write_npy(folder / "rays.npy", Tensor<float>({1, 6}));
   write_npy(folder / "capture/points.npy", Tensor<float>({2, 3}));
-  for (const char* name : {"scene.ply", "rays.npy", "capture/points.npy"})
+  for (const char* name : {"scene.ply", "scene.spz", "rays.npy", "capture/points.npy"})
     files[name] = bytes_of(folder / name);
 }
 

@@ -1,3 +1,5 @@
+#include <zlib.h>
+
 #include "base/atomic_file.h"
 #include "cli/malformed_cases.h"
 #include "files/safetensors.h"
@@ -10,8 +12,10 @@ namespace traceflow::cli {
 namespace {
 
 const std::vector<std::string> trace = {"trace", "scene.ply", "--rays", "rays.npy", "-o", "out"};
+const std::vector<std::string> trace_spz = {"trace", "scene.spz", "--rays", "rays.npy", "-o", "out"};
 const std::vector<std::string> export_run = {"export", "run", "-o", "out"};
-const std::string rays = "rays.npy", ply = "scene.ply", checkpoint = "run/checkpoint.safetensors";
+const std::string rays = "rays.npy", ply = "scene.ply", spz = "scene.spz",
+                  checkpoint = "run/checkpoint.safetensors";
 
 // A .npy as numpy writes it, of what is said to be six numbers.
 std::string npy(const std::string& type, const std::string& shape, size_t bytes) {
@@ -162,6 +166,43 @@ MalformedKind malformed_plys() {
        {"a negative number of surfels", trace, replace(ply, "vertex 1", "vertex -1"),
         "scene.ply: first element: found \"element vertex -1\", expected element vertex COUNT; write it with "
         "2DGS or `traceflow export`"}}};
+}
+
+MalformedKind malformed_spzs() {
+  const auto gzipped = [](uint32_t version, uint32_t count, int degree, int fractional_bits, size_t bytes) {
+    const TempFolder folder;
+    const std::string header = "NGSP" + little_endian(version, 4) + little_endian(count, 4) +
+                               static_cast<char>(degree) + static_cast<char>(fractional_bits) +
+                               std::string(2, '\0');
+    gzFile file = gzopen((folder / "a").c_str(), "wb");
+    const std::string all = header + std::string(bytes, '\0');
+    gzwrite(file, all.data(), static_cast<unsigned>(all.size()));
+    gzclose(file);
+    return put(spz, bytes_of(folder / "a"));
+  };
+  const std::string remedy = "; write it with Niantic's spz, splat-transform or `traceflow export`";
+  return {"Gaussians: .spz",
+          {{"an .spz cut short", trace_spz, gzipped(3, 1, 0, 12, 19),
+            "scene.spz: found a gzip stream that is broken or ends early, expected a whole .spz" + remedy},
+           {"a gzip file of something else", trace_spz,
+            [](Files& files) {
+              const TempFolder folder;
+              gzFile file = gzopen((folder / "a").c_str(), "wb");
+              gzwrite(file, "a tar archive or so", 19);
+              gzclose(file);
+              files[spz] = bytes_of(folder / "a");
+            },
+            "scene.spz: magic number: found 1635000417, expected \"NGSP\"" + remedy},
+           {"an .spz of version 1", trace_spz, gzipped(1, 1, 0, 12, 20),
+            "scene.spz: version: found 1, expected 2 or 3 in a gzip stream" + remedy},
+           {"harmonics of degree 4", trace_spz, gzipped(3, 1, 4, 12, 92),
+            "scene.spz: degree of the harmonics: found 4, expected 0 to 3" + remedy},
+           {"more fractional bits than a position has", trace_spz, gzipped(3, 1, 0, 99, 20),
+            "scene.spz: fractional bits: found 99, expected 0 to 24" + remedy},
+           {"an .spz of version 4 without its table", trace_spz,
+            put(spz, "NGSP" + little_endian(4, 4) + little_endian(1, 4) + std::string("\0\f\0\5", 4) +
+                         little_endian(1000, 4) + std::string(12, '\0')),
+            "scene.spz: table of contents: found offset 1000, expected one within the file" + remedy}}};
 }
 
 MalformedKind malformed_checkpoints() {

@@ -16,9 +16,9 @@ namespace {
 namespace fs = std::filesystem;
 
 std::vector<MalformedKind> all_kinds() {
-  return {malformed_json(),     malformed_colmap(),  malformed_transforms(),  malformed_camera_lists(),
-          malformed_arrays(),   malformed_plys(),    malformed_checkpoints(), malformed_images(),
-          malformed_archives(), malformed_options(), malformed_folders()};
+  return {malformed_json(),   malformed_colmap(),   malformed_transforms(), malformed_camera_lists(),
+          malformed_arrays(), malformed_plys(),     malformed_spzs(),       malformed_checkpoints(),
+          malformed_images(), malformed_archives(), malformed_options(),    malformed_folders()};
 }
 
 // A folder that the program is run in.

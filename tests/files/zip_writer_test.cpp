@@ -12,7 +12,8 @@ namespace {
 
 TEST(ZipWriter, AReaderFindsTheEntries) {
   const TempFolder folder;
-  const std::vector<ZipEntry> entries = {{"a.txt", "one"}, {"folder/b", ""}, {"c", std::string(70000, '\xff')}};
+  const std::vector<ZipEntry> entries = {
+      {"a.txt", "one"}, {"folder/b", ""}, {"c", std::string(70000, '\xff')}};
   write_zip(folder / "a.zip", entries);
   const InputFile file(folder / "a.zip");
   const std::vector<ZipMember> members = list_zip(file);

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Writes the first inputs of the fuzzers that read files, small whole files of every kind, and of the one that reads what
 a page says, into corpus/NAME/."""
+import gzip
 import io
 import json
 import pathlib
@@ -43,6 +44,16 @@ def png(width, height, depth, colour, rows, extra=(), interlace=0):
     chunks = b"".join(chunk(kind, data) for kind, data in extra)
     return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunks
             + chunk(b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))) + chunk(b"IEND", b""))
+
+
+def spz_header(version, degree=0):
+    return b"NGSP" + struct.pack("<IIBBBB", version, 1, degree, 12, 0, 0)
+
+
+def spz_streams(parts):
+    """The table and the Zstandard frames of version 4: one raw block each."""
+    frames = [struct.pack("<IBB", 0xFD2FB528, 0x20, len(part)) + (len(part) << 3 | 1).to_bytes(3, "little") + part for part in parts]
+    return b"".join(struct.pack("<QQ", len(frame), len(part)) for frame, part in zip(frames, parts)) + b"".join(frames)
 
 
 def ply(properties, rows, notes=(), tail=""):
@@ -121,6 +132,11 @@ def images():
 
 def models():
     row = [0.5] * 13
+    spz_gaussian = bytes([0, 16, 0, 0, 224, 255, 0, 8, 0, 51, 0, 128, 255, 0, 160, 128])
+    put("spz", "version_2", gzip.compress(spz_header(2) + spz_gaussian + bytes([128, 218, 128]), mtime=0))
+    put("spz", "version_3", gzip.compress(spz_header(3, 1) + spz_gaussian + bytes([0, 252, 7, 192] + [128] * 9), mtime=0))
+    put("spz", "version_4", spz_header(4)[:15] + bytes([5]) + struct.pack("<I12x", 32) + spz_streams(
+        [spz_gaussian[:9], spz_gaussian[9:10], spz_gaussian[10:13], spz_gaussian[13:], bytes([0, 252, 7, 192])]))
     put("ply", "plain", ply(surfel(), [row, row]))
     put("ply", "tint", ply(surfel(9, True), [[0.25] * 23], ["extent 2.5", 'render {"degree":1}']))
     put("ply", "double", ply(surfel(kind="double") + [("uchar", "red")], [row + [7]], tail="element face 0\n"))

@@ -37,7 +37,8 @@ TEST(Codebook, FindsTheNearestEntry) {
   }
 }
 
-// Oracle: Panter and Dite's error of the best quantiser of many levels, for the normal distribution √3 π/2 · σ²/L².
+// Oracle: Panter and Dite's error of the best quantiser of many levels, for the normal distribution √3 π/2 ·
+// σ²/L².
 TEST(Codebook, ComesNearTheLeastPossibleError) {
   Random random(5);
   std::vector<float> values;

@@ -6,8 +6,8 @@
 
 #include <cmath>
 #include <map>
-#include <set>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "files/zip.h"
 #include "math/activation.h"
@@ -43,8 +43,8 @@ class SogFile {
   Image image(const char* key, size_t i = 0) const {
     const std::string& bytes = files_.at(meta.at(key).at("files").at(i));
     Image result;
-    uint8_t* pixels = WebPDecodeRGBA(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), &result.width,
-                                     &result.height);
+    uint8_t* pixels = WebPDecodeRGBA(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(),
+                                     &result.width, &result.height);
     EXPECT_NE(pixels, nullptr);
     result.rgba.assign(pixels, pixels + size_t{4} * static_cast<size_t>(result.width * result.height));
     WebPFree(pixels);

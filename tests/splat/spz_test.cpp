@@ -54,13 +54,15 @@ std::string header_bytes(const Header& h) {
          little_endian(h.streams, 1);
 }
 
-// One Gaussian by hand after the format's description: at (1, −2, 0.5), opacity 51/255, colour bytes 0, 128, 255,
-// log-scales −10, 0, −2, a rotation of 90° about y.
-const std::string at_one = std::string("\x00\x10\x00", 3) + std::string("\x00\xe0\xff", 3) + std::string("\x00\x08\x00", 3);
+// One Gaussian by hand after the format's description: at (1, −2, 0.5), opacity 51/255, colour bytes 0, 128,
+// 255, log-scales −10, 0, −2, a rotation of 90° about y.
+const std::string at_one =
+    std::string("\x00\x10\x00", 3) + std::string("\x00\xe0\xff", 3) + std::string("\x00\x08\x00", 3);
 const std::string opacity_51 = "\x33";
 const std::string colours = std::string("\x00\x80\xff", 3);
 const std::string scales = std::string("\x00\xa0\x80", 3);
-// Version 2 stores x, y, z; versions 3 and 4 three of ten bits each and, above them, which is left out: w (3).
+// Version 2 stores x, y, z; versions 3 and 4 three of ten bits each and, above them, which is left out: w
+// (3).
 const std::string rotation_v2 = "\x80\xda\x80";
 const std::string rotation_v3 = little_endian(3U << 30 | 0U << 20 | 511U << 10 | 0U, 4);
 
@@ -82,7 +84,8 @@ void expect_the_gaussian(const Surfels& s, double rotation_error) {
   EXPECT_NEAR(s.sh(0, 0, 0), -0.5 / 0.15, 1e-5);
   EXPECT_NEAR(s.sh(0, 0, 1), (128 / 255.0 - 0.5) / 0.15, 1e-5);
   EXPECT_NEAR(s.sh(0, 0, 2), 0.5 / 0.15, 1e-5);
-  // The shortest axis is x, which 90° about y turns to −z. The others are y, which stays, and z, which becomes x.
+  // The shortest axis is x, which 90° about y turns to −z. The others are y, which stays, and z, which
+  // becomes x.
   EXPECT_FLOAT_EQ(s.log_scale(0, 0), 0);
   EXPECT_FLOAT_EQ(s.log_scale(0, 1), -2);
   const float* q = s.rotation.row(0);
@@ -108,7 +111,8 @@ TEST(Spz, ReadsVersions2And3And4) {
     streams += packed;
   }
   // Eight bytes of extensions before the table.
-  const std::string version_4 = header_bytes(h) + little_endian(40, 4) + std::string(12, '\0') + "extended" + table;
+  const std::string version_4 =
+      header_bytes(h) + little_endian(40, 4) + std::string(12, '\0') + "extended" + table;
   expect_the_gaussian(read(version_4 + streams), 0.003);
 
   EXPECT_THAT(spz_refusal(version_4 + streams.substr(0, streams.size() - 1)), HasSubstr("stream 4"));
@@ -190,7 +194,8 @@ TEST(Spz, RefusesWhatItCannotRead) {
   EXPECT_THAT(spz_refusal(gzipped_bytes(header_bytes(h) + body)), HasSubstr("version: found 5"));
   h = {};
   h.degree = 4;
-  EXPECT_THAT(spz_refusal(gzipped_bytes(header_bytes(h) + body)), HasSubstr("degree of the harmonics: found 4"));
+  EXPECT_THAT(spz_refusal(gzipped_bytes(header_bytes(h) + body)),
+              HasSubstr("degree of the harmonics: found 4"));
   h = {};
   h.fractional_bits = 25;
   EXPECT_THAT(spz_refusal(gzipped_bytes(header_bytes(h) + body)), HasSubstr("fractional bits: found 25"));

@@ -5,7 +5,8 @@
 namespace traceflow::cli {
 
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
-  if (std::filesystem::is_regular_file(path)) return {viz::read_splat_subject(path, environment), std::nullopt};
+  if (std::filesystem::is_regular_file(path))
+    return {viz::read_splat_subject(path, environment), std::nullopt};
   // If a run was exported into its own folder, the run contains more than the exported time.
   const bool is_taken_for_run = environment.empty() && RunFolder{path}.holds_a_run();
   if (!is_taken_for_run && std::filesystem::is_regular_file(path / "main.ply")) {

@@ -78,15 +78,15 @@ std::vector<float> times_in(const ExportArguments& a, RunCapture& capture) {
   if (error != std::errc() || end != a.times.data() + a.times.size() || count < 2 || count > most_times)
     throw InputError("option", "times", a.times, fmt::format("all, or a number from 2 to {}", most_times));
   std::vector<float> times;
-  for (int64_t i = 0; i < count; ++i)
-    times.push_back(static_cast<float>(i) / static_cast<float>(count - 1));
+  for (int64_t i = 0; i < count; ++i) times.push_back(static_cast<float>(i) / static_cast<float>(count - 1));
   return times;
 }
 
 // Writes the surfels of one time after another, and bakes them first if asked to.
 class Exporter {
  public:
-  Exporter(const ExportArguments& a, const DeviceArguments& devices, const TrainedRun& run, RunCapture& capture)
+  Exporter(const ExportArguments& a, const DeviceArguments& devices, const TrainedRun& run,
+           RunCapture& capture)
       : a_(a), run_(run), format_(format_of(a.format)) {
     if (!a.bake) return;
     cameras_ = capture.training_cameras();
@@ -97,7 +97,8 @@ class Exporter {
   void write(std::optional<float> time, const std::string& suffix, const std::string& label) {
     Surfels main = viz::posed_main(run_.subject, time);
     if (a_.bake) main = baked(*time, main, label);
-    for (const auto& path : viz::write_subject(run_.subject, time, std::move(main), a_.output, format_, suffix))
+    for (const auto& path :
+         viz::write_subject(run_.subject, time, std::move(main), a_.output, format_, suffix))
       fmt::print("{}\n", path.string());
   }
 
@@ -113,8 +114,9 @@ class Exporter {
                                   });
     progress.finish();
     if (stop) throw Exit{exit_interrupted};
-    fmt::print("{:.2f} dB against the images with reflections, {:.2f} dB without baking ({} cameras, time {:.3f})\n",
-               result.psnr, result.psnr_without, cameras_.size(), time);
+    fmt::print(
+        "{:.2f} dB against the images with reflections, {:.2f} dB without baking ({} cameras, time {:.3f})\n",
+        result.psnr, result.psnr_without, cameras_.size(), time);
     harmonics_ = result.main.sh;
     return std::move(result.main);
   }
@@ -123,7 +125,7 @@ class Exporter {
   const TrainedRun& run_;
   viz::SplatFormat format_;
   std::vector<Camera<float>> cameras_;
-  viz::Subject traced_;  // on the device
+  viz::Subject traced_;                     // on the device
   std::optional<Tensor<float>> harmonics_;  // of the time before
 };
 
@@ -153,19 +155,21 @@ void add_export(CLI::App& program) {
   verb->add_option("-o,--output", a->output, "Output folder")->required();
   std::vector<std::string> formats;
   for (const std::string_view name : enum_names(viz::SplatFormat())) formats.emplace_back(name);
-  verb->add_option("--format", a->format,
-                   "2dgs: .ply of surfels, with reflections for TraceFlow; 3dgs: .ply of thin Gaussians; spz; sog")
+  verb->add_option(
+          "--format", a->format,
+          "2dgs: .ply of surfels, with reflections for TraceFlow; 3dgs: .ply of thin Gaussians; spz; sog")
       ->check(CLI::IsMember(formats))
       ->capture_default_str();
   CLI::Option* time = verb->add_option("--time", a->time, "Time of the exported surfels, 0 to 1")
                           ->check(CLI::Range(0.0, 1.0))
                           ->capture_default_str();
-  CLI::Option* times = verb->add_option("--times", a->times,
-                                        "Numbered files for several times: all of the capture, or N evenly spaced")
-                           ->excludes(time);
+  CLI::Option* times =
+      verb->add_option("--times", a->times,
+                       "Numbered files for several times: all of the capture, or N evenly spaced")
+          ->excludes(time);
   verb->add_option("-d,--data", a->capture, "The capture, if it is no longer where the run was trained");
-  CLI::Option* bake =
-      verb->add_flag("--bake", a->bake, "Fit the harmonics to what the training cameras see with reflections");
+  CLI::Option* bake = verb->add_flag("--bake", a->bake,
+                                     "Fit the harmonics to what the training cameras see with reflections");
   verb->add_flag("--undeformed", a->undeformed,
                  "Export the surfels as they are stored, without motion and light changes")
       ->excludes(time)

@@ -140,7 +140,7 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
 }  // namespace
 
 void add_render(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("render", "Render a run or a 2DGS .ply");
+  CLI::App* verb = program.add_subcommand("render", "Render a run, a .ply or an .spz");
   const auto a = std::make_shared<RenderArguments>();
   verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder written by export")
       ->required();

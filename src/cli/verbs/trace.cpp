@@ -64,7 +64,7 @@ void run_trace(const TraceArguments& a, const DeviceArguments& devices) {
 }  // namespace
 
 void add_trace(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("trace", "Trace rays through the surfels of a .ply");
+  CLI::App* verb = program.add_subcommand("trace", "Trace rays through the surfels of a .ply or an .spz");
   const auto a = std::make_shared<TraceArguments>();
   a->options.t_min = 0;
   verb->add_option("FILE", a->ply, "The surfels, a 2DGS .ply")->required();

@@ -69,7 +69,7 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
 }  // namespace
 
 void add_view(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("view", "View a run or a .ply in a browser");
+  CLI::App* verb = program.add_subcommand("view", "View a run, a .ply or an .spz in a browser");
   const auto a = std::make_shared<ViewArguments>();
   verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder written by export")
       ->required();
