@@ -13,7 +13,7 @@ namespace traceflow::mesh {
 // How depth images are fused. Lengths are those of the cameras; for fuse_views, of the capture.
 struct FusionOptions {
   float voxel = 0;
-  int resolution = 256;
+  int resolution = 512;
   float truncation = 4;
   float max_depth = 0;
   float min_alpha = 0.5F;

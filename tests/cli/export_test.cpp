@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
+#include <cstring>
 
 #include "cli/malformed_cases.h"
 #include "cli/program_call.h"
@@ -74,6 +74,30 @@ TEST_F(ExportVerb, BakingReportsItsError) {
   EXPECT_EQ(read_splat_file(path("out/main.ply")).surfels.sh.dim(1), 16);
 }
 
+// A wide surfel across the training camera's view, 2 before it: the mesh is a flat piece there.
+TEST_F(ExportVerb, AMeshOfASurfelIsFlat) {
+  Surfels s{Tensor<float>({1, 3}), Tensor<float>({1, 2}),    Tensor<float>({1, 4}),
+            Tensor<float>({1}),    Tensor<float>({1, 1, 3}), Tensor<float>()};
+  s.position(0, 2) = 1;
+  s.rotation(0, 0) = 1;
+  s.log_scale.fill(1);
+  s.opacity_logit[0] = 5;
+  write_ply(folder_ / "wide.ply", {s, {}});
+  const Outcome o = run_with({"export", path("wide.ply"), "-o", path("out"), "--format", "mesh", "-d",
+                              path("capture"), "--set", "mesh.voxel=0.05", "--set", "mesh.min_triangles=1"});
+  ASSERT_EQ(o.code, exit_done) << o.err;
+  EXPECT_THAT(o.out, HasSubstr("triangles"));
+  const std::string ply = bytes_of(path("out/mesh.ply"));
+  EXPECT_THAT(ply.substr(0, 400), HasSubstr("element face"));
+  const size_t begin = ply.find("end_header\n") + 11;
+  for (int i = 0; i < 10; ++i) {
+    float vertex[3];
+    std::memcpy(vertex, ply.data() + begin + static_cast<size_t>(27 * i), sizeof vertex);
+    EXPECT_NEAR(vertex[2], 1, 0.01);
+  }
+  EXPECT_EQ(bytes_of(path("out/mesh.glb")).substr(0, 4), "glTF");
+}
+
 TEST_F(ExportVerb, WrongArgumentsGetOneLineAndExitCode2) {
   const auto refuses = [&](const std::vector<std::string>& words, const std::string& text) {
     const Outcome o = export_run(words);
@@ -81,8 +105,10 @@ TEST_F(ExportVerb, WrongArgumentsGetOneLineAndExitCode2) {
     EXPECT_THAT(o.err, HasSubstr(text));
     EXPECT_FALSE(std::filesystem::exists(path("out")));
   };
-  refuses({"--bake"},
-          "option: bake: found it with --format 2dgs, which has reflections, expected 3dgs, spz or sog");
+  refuses({"--bake"}, "option: bake: found it with --format 2dgs, expected it with 3dgs, spz or sog");
+  refuses({"--bake", "--format", "mesh"}, "option: bake: found it with --format mesh");
+  refuses({"--undeformed", "--format", "mesh"}, "option: undeformed: found it with --format mesh");
+  refuses({"--format", "mesh", "--set", "mesh.voxel=-1"}, "mesh.voxel: found -1");
   refuses({"--times", "1"}, "option: times: found 1, expected all, or a number from 2 to 10000");
   refuses({"--times", "2x"}, "option: times: found 2x");
   refuses({"--times", "2", "--time", "0.5"}, "--time");

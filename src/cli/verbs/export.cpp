@@ -3,18 +3,21 @@
 
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 #include "base/clock.h"
 #include "cli/arguments/device_arguments.h"
-#include "cli/runs/trained_run.h"
+#include "cli/arguments/option_arguments.h"
+#include "cli/runs/loaded_scene.h"
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
+#include "mesh/fuse_views.h"
+#include "mesh/mesh_glb.h"
+#include "mesh/mesh_ply.h"
 #include "scene/viewpoint.h"
 #include "viz/bake.h"
 
@@ -25,20 +28,32 @@ namespace {
 constexpr int64_t most_times = 10000;
 
 struct ExportArguments {
-  std::string run, output, format = "2dgs", times, capture;
+  std::string scene, output, format = "2dgs", times, capture;
   float time = 0;
   bool undeformed = false, bake = false;
 };
 
-viz::SplatFormat format_of(const std::string& name) {
+// The format of surfels; absent for meshes.
+std::optional<viz::SplatFormat> splat_format(const std::string& name) {
   const auto names = enum_names(viz::SplatFormat());
-  return static_cast<viz::SplatFormat>(std::ranges::find(names, name) - names.begin());
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<viz::SplatFormat>(found - names.begin());
 }
 
+struct ExportOptions {
+  mesh::FusionOptions mesh;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v.group("mesh", mesh);
+  }
+};
+
 // What the files lack, on standard error.
-void print_losses(const viz::Subject& subject, viz::SplatFormat format, bool bake) {
-  if (!subject.request.specular || subject.scene.specular == Specular::none || bake) return;
-  if (format != viz::SplatFormat::surfel_ply) {
+void print_losses(const viz::Subject& subject, std::optional<viz::SplatFormat> format, bool bake) {
+  if (!format || !subject.request.specular || subject.scene.specular == Specular::none || bake) return;
+  if (*format != viz::SplatFormat::surfel_ply) {
     std::cerr << "the files are without reflections, which only 2dgs has: --bake adds them as harmonics\n";
   } else if (subject.scene.specular == Specular::environment_map) {
     std::cerr
@@ -48,29 +63,35 @@ void print_losses(const viz::Subject& subject, viz::SplatFormat format, bool bak
   }
 }
 
-// The run's capture, read when it is first needed.
-class RunCapture {
+// The scene's capture, read when it is first needed.
+class SceneCapture {
  public:
-  RunCapture(const TrainedRun& run, const ExportArguments& a) : run_(run), a_(a) {}
+  SceneCapture(const LoadedScene& scene, const ExportArguments& a) : scene_(scene), a_(a) {}
   const Capture& get() {
-    if (!capture_) capture_ = capture_of(run_, a_.capture, 0);
+    if (!capture_) {
+      if (!scene_.run && a_.capture.empty())
+        throw InputError(a_.scene, "", "no capture", "a run, or -d CAPTURE");
+      capture_ = capture_of(scene_, a_.capture, 0);
+    }
     return *capture_;
   }
-  std::vector<Camera<float>> training_cameras() {
-    std::vector<Camera<float>> cameras;
-    for (const View& view : views_of(get(), "train"))
-      cameras.push_back(renormalised(view.camera, get().normalisation, run_.subject.scene.normalisation));
-    return cameras;
+  std::vector<viz::Shot> training_shots() {
+    std::vector<viz::Shot> shots;
+    for (const View& view : views_of(get(), "train")) {
+      shots.push_back({view.id, view.time,
+                       renormalised(view.camera, get().normalisation, scene_.subject.scene.normalisation)});
+    }
+    return shots;
   }
 
  private:
-  const TrainedRun& run_;
+  const LoadedScene& scene_;
   const ExportArguments& a_;
   std::optional<Capture> capture_;
 };
 
 // Empty: only --time.
-std::vector<float> times_in(const ExportArguments& a, RunCapture& capture) {
+std::vector<float> times_in(const ExportArguments& a, SceneCapture& capture) {
   if (a.times.empty()) return {};
   if (a.times == "all") return times_of(capture.get());
   int64_t count = 0;
@@ -82,65 +103,93 @@ std::vector<float> times_in(const ExportArguments& a, RunCapture& capture) {
   return times;
 }
 
-// Writes the surfels of one time after another, and bakes them first if asked to.
+// Writes what the run shows at one time after another.
 class Exporter {
  public:
-  Exporter(const ExportArguments& a, const DeviceArguments& devices, const TrainedRun& run,
-           RunCapture& capture)
-      : a_(a), run_(run), format_(format_of(a.format)) {
-    if (!a.bake) return;
-    cameras_ = capture.training_cameras();
-    traced_ = run.subject;
+  Exporter(const ExportArguments& a, const ExportOptions& options, const DeviceArguments& devices,
+           const viz::Subject& subject, SceneCapture& capture)
+      : a_(a), options_(options), subject_(subject), format_(splat_format(a.format)) {
+    if (!a.bake && format_) return;
+    shots_ = capture.training_shots();
+    traced_ = subject;
     traced_.scene.move_to(devices.choose());
   }
 
+  // label: of the time, in the progress.
   void write(std::optional<float> time, const std::string& suffix, const std::string& label) {
-    Surfels main = viz::posed_main(run_.subject, time);
+    if (!format_) return write_mesh(*time, suffix, label);
+    Surfels main = viz::posed_main(subject_, time);
     if (a_.bake) main = baked(*time, main, label);
-    for (const auto& path :
-         viz::write_subject(run_.subject, time, std::move(main), a_.output, format_, suffix))
+    for (const auto& path : viz::write_subject(subject_, time, std::move(main), a_.output, *format_, suffix))
       fmt::print("{}\n", path.string());
   }
 
  private:
   Surfels baked(float time, const Surfels& main, const std::string& label) {
-    const std::atomic<bool>& stop = stop_on_signals();
-    const auto start = std::chrono::steady_clock::now();
+    std::vector<Camera<float>> cameras;
+    for (const viz::Shot& shot : shots_) cameras.push_back(shot.camera);
     CountProgress progress = CountProgress::for_stderr();
-    viz::Baked result = viz::bake(traced_, time, main, cameras_, harmonics_ ? &*harmonics_ : nullptr,
+    const auto start = Clock::now();
+    viz::Baked result = viz::bake(traced_, time, main, cameras, harmonics_ ? &*harmonics_ : nullptr,
                                   [&](int64_t done, int64_t all) {
                                     progress.show({label, "images baked", done, all}, seconds_since(start));
-                                    return !stop;
+                                    return !stop_;
                                   });
     progress.finish();
-    if (stop) throw Exit{exit_interrupted};
+    if (stop_) throw Exit{exit_interrupted};
     fmt::print(
         "{:.2f} dB against the images with reflections, {:.2f} dB without baking ({} cameras, time {:.3f})\n",
-        result.psnr, result.psnr_without, cameras_.size(), time);
+        result.psnr, result.psnr_without, cameras.size(), time);
     harmonics_ = result.main.sh;
     return std::move(result.main);
   }
 
+  void write_mesh(float time, const std::string& suffix, const std::string& label) {
+    CountProgress progress = CountProgress::for_stderr();
+    const auto start = Clock::now();
+    const mesh::TriangleMesh mesh =
+        mesh::fuse_views(traced_, shots_, time, options_.mesh, [&](size_t done, size_t all) {
+          progress.show({label, "images fused", static_cast<int64_t>(done), static_cast<int64_t>(all)},
+                        seconds_since(start));
+          if (stop_) throw Exit{exit_interrupted};
+        });
+    progress.finish();
+    const std::filesystem::path folder(a_.output), name = "mesh" + suffix;
+    std::filesystem::create_directories(folder);
+    mesh::write_mesh_ply(folder / (name.string() + ".ply"), mesh);
+    mesh::write_mesh_glb(folder / (name.string() + ".glb"), mesh);
+    fmt::print("{0}.ply, {0}.glb: {1} vertices, {2} triangles\n", (folder / name).string(),
+               mesh.vertex_count(), mesh.triangle_count());
+  }
+
   const ExportArguments& a_;
-  const TrainedRun& run_;
-  viz::SplatFormat format_;
-  std::vector<Camera<float>> cameras_;
+  const ExportOptions& options_;
+  const viz::Subject& subject_;
+  std::optional<viz::SplatFormat> format_;
+  const std::atomic<bool>& stop_ = stop_on_signals();
+  std::vector<viz::Shot> shots_;            // of the training cameras
   viz::Subject traced_;                     // on the device
   std::optional<Tensor<float>> harmonics_;  // of the time before
 };
 
-void run_export(const ExportArguments& a, const DeviceArguments& devices) {
+void run_export(const ExportArguments& a, const ExportOptions& options, const DeviceArguments& devices) {
   // CLI11's range check accepts "nan".
   check_option(a.time >= 0 && a.time <= 1, "time", a.time, "0 to 1");
-  const viz::SplatFormat format = format_of(a.format);
-  if (a.bake && format == viz::SplatFormat::surfel_ply)
-    throw InputError("option", "bake", "it with --format 2dgs, which has reflections", "3dgs, spz or sog");
-  const TrainedRun run = read_run(a.run);
-  if (!run.note.empty()) std::cerr << run.note << std::endl;
-  print_losses(run.subject, format, a.bake);
-  RunCapture capture(run, a);
+  options.mesh.validate();
+  const std::optional<viz::SplatFormat> format = splat_format(a.format);
+  if (a.bake && (!format || *format == viz::SplatFormat::surfel_ply))
+    throw InputError("option", "bake", "it with --format " + a.format, "it with 3dgs, spz or sog");
+  if (a.undeformed && !format)
+    throw InputError("option", "undeformed", "it with --format mesh", "it with surfels or Gaussians");
+  LoadedScene scene = load_scene(a.scene, "");
+  const viz::Subject& subject = scene.subject;
+  if (!subject.warning.empty()) std::cerr << subject.warning << std::endl;
+  print_losses(subject, format, a.bake);
+  SceneCapture capture(scene, a);
   const std::vector<float> times = times_in(a, capture);
-  Exporter exporter(a, devices, run, capture);
+  if (!(subject.scene.extent > 0) && (a.bake || !format))
+    scene.subject.scene.extent = viz::extent_seen_from(subject.scene.main, capture.training_shots());
+  Exporter exporter(a, options, devices, subject, capture);
   if (times.empty()) return exporter.write(a.undeformed ? std::nullopt : std::optional(a.time), "", "");
   for (size_t i = 0; i < times.size(); ++i)
     exporter.write(times[i], fmt::format("_{:04}", i), fmt::format("time {}/{}", i + 1, times.size()));
@@ -149,15 +198,17 @@ void run_export(const ExportArguments& a, const DeviceArguments& devices) {
 }  // namespace
 
 void add_export(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("export", "Write a run's surfels for other programs");
+  CLI::App* verb = program.add_subcommand("export", "Write surfels, Gaussians or a mesh for other programs");
   const auto a = std::make_shared<ExportArguments>();
-  verb->add_option("RUN", a->run, "The run's folder")->required();
+  verb->add_option("SCENE", a->scene, "A run's folder, a .ply or an .spz")->required();
   verb->add_option("-o,--output", a->output, "Output folder")->required();
   std::vector<std::string> formats;
   for (const std::string_view name : enum_names(viz::SplatFormat())) formats.emplace_back(name);
+  formats.emplace_back("mesh");
   verb->add_option(
           "--format", a->format,
-          "2dgs: .ply of surfels, with reflections for TraceFlow; 3dgs: .ply of thin Gaussians; spz; sog")
+          "2dgs: .ply of surfels, with reflections for TraceFlow; 3dgs: .ply of thin Gaussians; spz; sog; "
+          "mesh: .ply and .glb")
       ->check(CLI::IsMember(formats))
       ->capture_default_str();
   CLI::Option* time = verb->add_option("--time", a->time, "Time of the exported surfels, 0 to 1")
@@ -167,7 +218,8 @@ void add_export(CLI::App& program) {
       verb->add_option("--times", a->times,
                        "Numbered files for several times: all of the capture, or N evenly spaced")
           ->excludes(time);
-  verb->add_option("-d,--data", a->capture, "The capture, if it is no longer where the run was trained");
+  verb->add_option("-d,--data", a->capture,
+                   "The capture, if it is no longer where the run was trained, or for a .ply or an .spz");
   CLI::Option* bake = verb->add_flag("--bake", a->bake,
                                      "Fit the harmonics to what the training cameras see with reflections");
   verb->add_flag("--undeformed", a->undeformed,
@@ -175,8 +227,13 @@ void add_export(CLI::App& program) {
       ->excludes(time)
       ->excludes(times)
       ->excludes(bake);
+  const auto options = std::make_shared<ExportOptions>();
+  const OptionArguments given(*verb, option_fields(*options));
   const DeviceArguments devices(*verb);
-  verb->callback([a, devices] { run_export(*a, devices); });
+  verb->callback([a, options, given, devices] {
+    given.apply(option_fields(*options));
+    run_export(*a, *options, devices);
+  });
 }
 
 }  // namespace traceflow::cli
