@@ -67,7 +67,6 @@ TrainOptions cpu_preset() {
   o.density.prune_above = 10;
   o.density.prune_above_cloud = 0.5F;
   o.density.longest_needle = 0.1F;
-  o.density.longest_unseen = 0.1F;
   o.density.prune_above_from = 0;
   o.density.opacity_reset_every = 0;
   o.density.max_surfels = 20000;
