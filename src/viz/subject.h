@@ -37,7 +37,7 @@ constexpr std::array<std::string_view, 4> enum_names(SplatFormat) { return {"2dg
 // finite are left out. Without a time, they are not deformed.
 Surfels posed_main(const Subject& subject, std::optional<float> time);
 
-// Writes `main` (posed_main at `time`), converted to the capture's coordinates, as main.ply, main.spz or
+// Writes `surfels` (posed_main at `time`), converted to the capture's coordinates, as main.ply, main.spz or
 // main.sog into `folder`. surfel_ply also writes the environment's surfels, as environment.ply, and header
 // comments let read_splat_subject reproduce the pictures. name_suffix goes before the extensions, for files
 // of several times. Returns the written files.
