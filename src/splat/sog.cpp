@@ -30,7 +30,10 @@ nlohmann::ordered_json json_array(std::initializer_list<const char*> names) {
   return std::vector<std::string>(names.begin(), names.end());
 }
 
-uint8_t rounded_byte(double x) { return static_cast<uint8_t>(std::clamp(std::round(x), 0.0, 255.0)); }
+// Not a number becomes 0.
+uint8_t rounded_byte(double x) {
+  return x > 0 ? static_cast<uint8_t>(std::min(std::round(x), 255.0)) : uint8_t{0};
+}
 
 // Sign-preserving log(1 + |x|), and the 16-bit steps in which it is written between the extremes of an axis.
 double log_position(double x) { return std::copysign(std::log1p(std::abs(x)), x); }
@@ -38,11 +41,14 @@ double log_position(double x) { return std::copysign(std::log1p(std::abs(x)), x)
 struct AxisRange {
   double low = INFINITY, high = -INFINITY;
   void include(double x) {
+    if (!std::isfinite(x)) return;
     low = std::min(low, x);
     high = std::max(high, x);
   }
   uint32_t steps(double x) const {
-    return high > low ? static_cast<uint32_t>(std::lround(65535 * (x - low) / (high - low))) : 0;
+    return high > low && std::isfinite(x)
+               ? static_cast<uint32_t>(std::lround(65535 * (x - low) / (high - low)))
+               : 0;
   }
 };
 

@@ -233,7 +233,9 @@ uint32_t packed_rotation(const float* rotation) {
 // The most fractional bits, up to 20, with which the farthest surfel fits into 24 bits.
 uint8_t fractional_bits_for(const Tensor<float>& position) {
   float farthest = 0;
-  for (const float v : position.values()) farthest = std::max(farthest, std::abs(v));
+  for (const float v : position.values()) {
+    if (std::isfinite(v)) farthest = std::max(farthest, std::abs(v));
+  }
   int bits = 20;
   while (bits > 0 && std::ldexp(farthest, bits) > 0x7fffff) --bits;
   return static_cast<uint8_t>(bits);
@@ -251,7 +253,8 @@ std::vector<uint8_t> packed_bytes(const Surfels& s) {
   std::memcpy(bytes.data(), &header, sizeof header);
   const float steps = std::ldexp(1.0F, header.fractional_bits);
   for (const float v : s.position.values()) {
-    const auto fixed = static_cast<int32_t>(std::round(std::clamp(v * steps, -8388608.0F, 8388607.0F)));
+    const float place = std::isfinite(v) ? v * steps : 0;
+    const auto fixed = static_cast<int32_t>(std::round(std::clamp(place, -8388608.0F, 8388607.0F)));
     for (const int shift : {0, 8, 16}) bytes.push_back(static_cast<uint8_t>(fixed >> shift & 0xff));
   }
   for (const float v : s.opacity_logit.values()) bytes.push_back(to_byte(255 * sigmoid(v)));

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "files/input_file.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"
 
@@ -99,6 +100,8 @@ TEST_F(RunFolderTest, OneThatIsDroppedLeavesTheOneBefore) {
 TEST_F(RunFolderTest, OneThatCannotBeReadIsNotTakenForDamaged) {
   write_checkpoint(run_, state(1));
   write_checkpoint(run_, state(2));
+  // The sanitizers open files to look at an object for the first time, here at the one that has the reason.
+  EXPECT_THROW(InputFile(run_.checkpoint().string() + ".missing"), InputError);
   rlimit usual{};
   ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
   const rlimit none{0, usual.rlim_max};

@@ -166,6 +166,20 @@ TEST(Sog, TheSameSurfelsGiveTheSameBytes) {
   EXPECT_EQ(bytes_of(folder / "a.sog"), bytes_of(folder / "b.sog"));
 }
 
+TEST(Sog, NumbersThatAreNotFiniteDoNoHarm) {
+  Surfels s = random_surfels(5, 4, false);
+  s.position(0, 0) = INFINITY;
+  s.position(1, 1) = NAN;
+  s.rotation(1, 0) = NAN;
+  s.log_scale(2, 0) = -INFINITY;
+  s.sh(2, 0, 0) = s.sh(2, 1, 0) = NAN;
+  s.opacity_logit[3] = NAN;
+  const TempFolder folder;
+  write_sog(folder / "a.sog", s);
+  const Tensor<float> positions = positions_of(SogFile(folder / "a.sog"));
+  for (const float v : positions.values()) EXPECT_TRUE(std::isfinite(v));
+}
+
 TEST(Sog, OneSurfelIsEnoughAndNoneTooFew) {
   const TempFolder folder;
   const Surfels one = random_surfels(1, 4, false);
