@@ -42,7 +42,7 @@ Surfels posed_main(const Subject& subject, std::optional<float> time);
 // comments let read_splat_subject reproduce the pictures. name_suffix goes before the extensions, for files
 // of several times. Returns the written files.
 std::vector<std::filesystem::path> write_subject(const Subject& subject, std::optional<float> time,
-                                                 Surfels main, const std::filesystem::path& folder,
+                                                 Surfels surfels, const std::filesystem::path& folder,
                                                  SplatFormat format = SplatFormat::surfel_ply,
                                                  const std::string& name_suffix = "");
 inline std::vector<std::filesystem::path> export_subject(const Subject& subject, std::optional<float> time,
