@@ -168,8 +168,9 @@ std::vector<std::filesystem::path> write_subject(const Subject& subject, std::op
   }
 
   std::vector<std::filesystem::path> written = {path};
-  std::map<std::string, std::string> notes = {
-      {extent_note, fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale))}};
+  std::map<std::string, std::string> notes;
+  if (scene.extent > 0)
+    notes[extent_note] = fmt::format("{}", static_cast<float>(scene.extent / scene.normalisation.scale));
   if (scene.focal > 0) notes[focal_note] = fmt::format("{}", scene.focal);
   main.notes = notes;
   main.notes[render_note] = options_to_json(subject.render);

@@ -50,6 +50,14 @@ TEST_F(ExportVerb, FilesOfAllFormatsButSogRenderAgain) {
   EXPECT_EQ(bytes_of(path("out/main.sog")).substr(0, 2), "PK");
 }
 
+// An .spz stores no extent, so neither does what is written of it.
+TEST_F(ExportVerb, AnSpzBecomesA2dgsFileThatRenders) {
+  ASSERT_EQ(run_with({"export", path("scene.spz"), "-o", path("out")}).code, exit_done);
+  const Outcome o =
+      run_with({"render", path("out/main.ply"), "--cameras", path("cameras.json"), "-o", path("pictures")});
+  EXPECT_EQ(o.code, exit_done) << o.err;
+}
+
 TEST_F(ExportVerb, SeveralTimesAreNumberedFiles) {
   ASSERT_EQ(export_run({"--times", "3"}).code, exit_done);
   EXPECT_TRUE(std::filesystem::exists(path("out/main_0002.ply")));

@@ -117,6 +117,7 @@ class Exporter {
 
   // label: of the time, in the progress.
   void write(std::optional<float> time, const std::string& suffix, const std::string& label) {
+    if (stop_) throw Exit{exit_interrupted};
     if (!format_) return write_mesh(*time, suffix, label);
     Surfels main = viz::posed_main(subject_, time);
     if (a_.bake) main = baked(*time, main, label);
