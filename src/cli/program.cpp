@@ -13,9 +13,11 @@
 #include "base/parallel.h"
 #include "base/printable.h"
 #include "base/profile.h"
-#include "base/version.h"
+#include "cli/arguments/completion.h"
 #include "cli/arguments/help_formatter.h"
+#include "cli/arguments/man_page.h"
 #include "cli/arguments/option_page.h"
+#include "cli/arguments/version_page.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/standard_streams.h"
 #include "cli/verbs/verbs.h"
@@ -31,12 +33,24 @@ struct GlobalArguments {
   std::string instructions = "automatic";
   bool profile = false;
   bool help_options = false;
+  std::string completion, man;
 };
 
 void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
-  program.set_version_flag("--version", std::string("traceflow ") + version());
+  program.set_version_flag("--version", version_page,
+                           "Print the version, and those of the compiler and the libraries, and exit");
   program.add_flag("--help-options", arguments.help_options,
                    "Print all training options with their values in each preset, and exit");
+  constexpr auto shells = enum_names(Shell{});
+  program
+      .add_option("--completion", arguments.completion,
+                  "Print a script that completes command lines in bash, zsh or fish, and exit")
+      ->check(CLI::IsMember(std::vector<std::string>(shells.begin(), shells.end())))
+      ->option_text("SHELL");
+  program
+      .add_option("--man", arguments.man,
+                  "Print the manual page of traceflow or of a subcommand for man(1), and exit")
+      ->option_text("NAME");
   program
       .add_option("--threads", arguments.threads,
                   "Number of threads; 0: OMP_NUM_THREADS or all cores. The results do not depend on it")
@@ -52,9 +66,11 @@ void add_global_arguments(CLI::App& program, GlobalArguments& arguments) {
   program.add_flag("--profile", arguments.profile, "Print how much time each part of the program took");
 }
 
-Instructions instructions_of(const std::string& name) {
-  constexpr auto names = enum_names(Instructions{});
-  return static_cast<Instructions>(std::ranges::find(names, name) - names.begin());
+// The value of a choice that CLI11 has checked.
+template <class Choice>
+Choice choice_of(const std::string& name) {
+  constexpr auto names = enum_names(Choice{});
+  return static_cast<Choice>(std::ranges::find(names, name) - names.begin());
 }
 
 void print_profile() {
@@ -86,7 +102,7 @@ int run_program(int argc, const char* const* argv) {
   add_global_arguments(program, arguments);
   program.parse_complete_callback([&arguments] {
     set_threads(arguments.threads);
-    limit_instructions(instructions_of(arguments.instructions));
+    limit_instructions(choice_of<Instructions>(arguments.instructions));
     profile::enable(arguments.profile);
   });
   add_verbs(program);
@@ -100,6 +116,14 @@ int run_program(int argc, const char* const* argv) {
   }
   if (arguments.help_options) {
     std::cout << option_page();
+    return exit_done;
+  }
+  if (!arguments.completion.empty()) {
+    std::cout << completion_script(program, choice_of<Shell>(arguments.completion));
+    return exit_done;
+  }
+  if (!arguments.man.empty()) {
+    std::cout << man_page(program, arguments.man);
     return exit_done;
   }
   if (program.get_subcommands().empty()) {

@@ -12,6 +12,7 @@
 #include "base/parallel.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/npy.h"
+#include "primitives/instructions.h"
 #include "splat/ply.h"
 
 namespace traceflow::cli {
@@ -24,7 +25,11 @@ int lines(const std::string& text) { return static_cast<int>(std::count(text.beg
 TEST(Program, SaysItsVersion) {
   const Outcome o = run_with({"--version"});
   EXPECT_EQ(o.code, exit_done);
-  EXPECT_THAT(o.out, testing::MatchesRegex("traceflow [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+  EXPECT_THAT(o.out, testing::MatchesRegex("traceflow [0-9]+\\.[0-9]+\\.[0-9]+\n.*"));
+  for (const char* part :
+       {"\ncompiler: ", "fmt [0-9.]+, ", "oneDNN [0-9.]+, ", "\ninstructions: ", "\nCUDA: "})
+    EXPECT_THAT(o.out, testing::ContainsRegex(part));
+  EXPECT_THAT(o.out, HasSubstr("\ninstructions: " + instructions_in_use() + "\n"));
 }
 
 TEST(Program, HelpNamesEveryVerbAndEveryVerbHasHelp) {

@@ -12,15 +12,13 @@
 
 namespace traceflow::cli {
 
-namespace {
-
 std::string cuda_text() {
+  std::string why_not;
+  if (!cuda::is_ready(why_not)) return "none: " + why_not;
   const cuda::DeviceFacts facts = cuda::facts();
   return fmt::format("{} ({}.{}), {} of {} MiB free", facts.name, facts.major, facts.minor,
                      facts.free_bytes >> 20, facts.total_bytes >> 20);
 }
-
-}  // namespace
 
 struct DeviceArguments::State {
   std::string device = "auto";

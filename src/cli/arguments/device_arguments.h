@@ -11,6 +11,9 @@ class App;
 
 namespace traceflow::cli {
 
+// The CUDA device and its memory, or why there is none.
+std::string cuda_text();
+
 // The device of a verb: `--device auto|cpu|cuda` and `--deterministic`.
 class DeviceArguments {
  public:

@@ -85,6 +85,12 @@ std::string help_of_set(const std::vector<OptionField>& fields,
   return fmt::format("{}, as in {}; may be repeated", what, example_of(fields, without_flag));
 }
 
+std::string names_for_completion(const std::vector<OptionField>& fields) {
+  std::vector<std::string> names;
+  for (const OptionField& field : fields) names.push_back(field.path + "=");
+  return fmt::format("{{{}}}", fmt::join(names, ","));
+}
+
 }  // namespace
 
 struct OptionArguments::State {
@@ -114,6 +120,9 @@ OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>&
       flag.option =
           verb.add_option((name == "iterations" ? "-i,--" : "--") + name, flag.text, help_text(field))
               ->option_text(placeholder(field));
+      // Completion reads it.
+      if (!field.choices.empty())
+        flag.option->type_name(fmt::format("{{{}}}", fmt::join(field.choices, ",")));
     }
     flag.option->group("Settings");
   }
@@ -122,6 +131,7 @@ OptionArguments::OptionArguments(CLI::App& verb, const std::vector<OptionField>&
                                                         : "traceflow " + verb.get_name() + " --help";
   verb.add_option("--set", state_->assignments, help_of_set(fields, without_flag))
       ->option_text("PATH=VALUE")
+      ->type_name(names_for_completion(fields))
       ->expected(1)
       ->take_all()
       ->group("Settings");

@@ -57,6 +57,7 @@ void add_inspect(CLI::App& program) {
                    "Preset whose training memory is estimated, with the settings below, as in train; the "
                    "defaults shown are those of paper")
       ->option_text("NAME")
+      ->type_name("{paper,cpu,demo}")
       ->capture_default_str();
   const auto defaults = std::make_shared<TrainOptions>(preset(arguments->preset_name));
   const auto given =

@@ -142,7 +142,7 @@ void run_render(const RenderArguments& a, const OptionArguments& options, const 
 void add_render(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("render", "Render a run, a .ply or an .spz");
   const auto a = std::make_shared<RenderArguments>();
-  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder written by export")
+  verb->add_option("SCENE", a->scene, "A run's folder, a .ply, an .spz or a folder written by export")
       ->required();
   verb->add_option("-o,--output", a->output, "Output folder for LAYER/NAME.png or .npy");
   verb->add_option("--environment", a->environment,

@@ -236,6 +236,7 @@ void add_train(CLI::App& program) {
                        "Preset: paper (60,000 iterations; its values are the defaults below), cpu (a quarter "
                        "of an hour on two cores at 240x135) or demo (a few minutes)")
           ->option_text("NAME")
+          ->type_name("{paper,cpu,demo}")
           ->capture_default_str();
   verb->add_flag("--resume", arguments->resume, "Continue the run from its checkpoint, with its settings");
   verb->add_flag("-q,--quiet", arguments->quiet, "Print only warnings and errors");

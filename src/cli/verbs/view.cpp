@@ -71,7 +71,7 @@ void view(const ViewArguments& a, const DeviceArguments& devices, const ServerAr
 void add_view(CLI::App& program) {
   CLI::App* verb = program.add_subcommand("view", "View a run, a .ply or an .spz in a browser");
   const auto a = std::make_shared<ViewArguments>();
-  verb->add_option("SCENE", a->scene, "A run's folder, a 2DGS .ply, or a folder written by export")
+  verb->add_option("SCENE", a->scene, "A run's folder, a .ply, an .spz or a folder written by export")
       ->required();
   verb->add_option("--environment", a->environment,
                    "A second .ply, with the surfels that the first one reflects");
