@@ -14,6 +14,7 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "files/zip.h"
+#include "files/zip_writer.h"
 
 namespace traceflow {
 
@@ -229,7 +230,7 @@ Tensor<float> read_npz(const std::filesystem::path& path, const std::string& nam
 namespace {
 
 template <class T>
-void write_array(const std::filesystem::path& path, const std::string& type, const Tensor<T>& array) {
+std::string npy_bytes(const std::string& type, const Tensor<T>& array) {
   std::string header = "{'descr': '" + type + "', 'fortran_order': False, 'shape': (";
   for (int r = 0; r < array.shape().rank(); ++r)
     header += (r == 0 ? "" : ", ") + std::to_string(array.dim(r));
@@ -241,17 +242,25 @@ void write_array(const std::filesystem::path& path, const std::string& type, con
   text += {'\x01', '\x00', static_cast<char>(header.size() & 0xff), static_cast<char>(header.size() >> 8)};
   text += header;
   text.append(reinterpret_cast<const char*>(array.data()), static_cast<size_t>(array.size()) * sizeof(T));
-  write_atomically(path, text);
+  return text;
 }
 
 }  // namespace
 
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array) {
-  write_array(path, "<f4", array);
+  write_atomically(path, npy_bytes("<f4", array));
 }
 
 void write_npy(const std::filesystem::path& path, const Tensor<int32_t>& array) {
-  write_array(path, "<i4", array);
+  write_atomically(path, npy_bytes("<i4", array));
+}
+
+void write_npz(const std::filesystem::path& path,
+               const std::vector<std::pair<std::string, const Tensor<float>*>>& arrays) {
+  std::vector<ZipEntry> entries;
+  entries.reserve(arrays.size());
+  for (const auto& [name, array] : arrays) entries.push_back({name + ".npy", npy_bytes("<f4", *array)});
+  write_zip(path, entries);
 }
 
 }  // namespace traceflow

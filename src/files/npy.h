@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "base/tensor.h"
 #include "files/input_file.h"
@@ -20,6 +22,9 @@ Tensor<float> read_npz(const std::filesystem::path& path, const std::string& nam
 // Writes float32 or int32, C order, format version 1.0, atomically.
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array);
 void write_npy(const std::filesystem::path& path, const Tensor<int32_t>& array);
+// Writes arrays of float32 under their names as a .npz, not deflated, atomically.
+void write_npz(const std::filesystem::path& path,
+               const std::vector<std::pair<std::string, const Tensor<float>*>>& arrays);
 
 // An array that stays on the disk and is read in slices, for arrays too large for memory. Throws InputError
 // like read_npy.

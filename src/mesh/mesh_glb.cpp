@@ -1,125 +1,17 @@
 #include "mesh/mesh_glb.h"
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <limits>
-#include <nlohmann/json.hpp>
-#include <span>
-#include <string>
-#include <vector>
-
-#include "base/atomic_file.h"
-#include "base/version.h"
+#include "base/error.h"
+#include "files/glb_writer.h"
 
 namespace traceflow::mesh {
-
-namespace {
-
-using nlohmann::ordered_json;
-
-static_assert(std::endian::native == std::endian::little, "the file's byte order is the machine's");
-
-// Numbers that the format gives its types.
-enum ComponentType { type_uint16 = 5123, type_uint32 = 5125, type_float = 5126 };
-enum Target { target_vertices = 34962, target_indices = 34963 };
-constexpr uint32_t file_magic = 0x46546C67, json_chunk = 0x4E4F534A, binary_chunk = 0x004E4942;
-
-float linear_from_srgb(float v) { return v <= 0.04045F ? v / 12.92F : std::pow((v + 0.055F) / 1.055F, 2.4F); }
-
-std::vector<uint16_t> linear_colours(const Tensor<float>& colours) {
-  std::vector<uint16_t> result;
-  result.reserve(static_cast<size_t>(colours.size() / 3 * 4));
-  constexpr uint16_t full = std::numeric_limits<uint16_t>::max();
-  for (int64_t i = 0; i < colours.dim(0); ++i) {
-    for (int64_t c = 0; c < 3; ++c) {
-      const float linear = linear_from_srgb(std::clamp(colours(i, c), 0.0F, 1.0F));
-      result.push_back(static_cast<uint16_t>(std::lround(linear * full)));
-    }
-    result.push_back(full);
-  }
-  return result;
-}
-
-// The least or largest coordinates of the vertices.
-template <class F>
-std::array<float, 3> bound(const Tensor<float>& vertices, F&& choose) {
-  std::array<float, 3> result = {vertices(0, 0), vertices(0, 1), vertices(0, 2)};
-  for (int64_t i = 0; i < vertices.dim(0); ++i) {
-    for (size_t c = 0; c < 3; ++c) result[c] = choose(result[c], vertices(i, static_cast<int64_t>(c)));
-  }
-  return result;
-}
-
-// The parts of the binary chunk, all of which have multiples of four bytes, with their descriptions.
-struct Parts {
-  std::vector<std::span<const std::byte>> bytes;
-  ordered_json views = ordered_json::array(), accessors = ordered_json::array();
-  int64_t size = 0;
-
-  // Returns the description of the new accessor.
-  template <class T>
-  ordered_json& add(std::span<const T> values, Target target, ComponentType type, const char* shape,
-                    int64_t count) {
-    const auto length = static_cast<int64_t>(values.size_bytes());
-    views.push_back({{"buffer", 0}, {"byteOffset", size}, {"byteLength", length}, {"target", target}});
-    accessors.push_back(
-        {{"bufferView", views.size() - 1}, {"componentType", type}, {"count", count}, {"type", shape}});
-    bytes.push_back(std::as_bytes(values));
-    size += length;
-    return accessors.back();
-  }
-};
-
-ordered_json description(Parts& parts) {
-  const ordered_json attributes = {{"POSITION", 0}, {"NORMAL", 1}, {"COLOR_0", 2}};
-  ordered_json primitive = {{"attributes", attributes}, {"indices", 3}, {"material", 0}};
-  ordered_json material = {{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}},
-                           {"doubleSided", true}};
-  ordered_json node = {{"mesh", 0}, {"rotation", {1, 0, 0, 0}}};
-  ordered_json document;
-  document["asset"] = {{"version", "2.0"}, {"generator", std::string("traceflow ") + version()}};
-  document["scene"] = 0;
-  document["scenes"] = {{{"nodes", {0}}}};
-  document["nodes"] = ordered_json::array({std::move(node)});
-  document["meshes"] = {{{"primitives", ordered_json::array({std::move(primitive)})}}};
-  document["materials"] = ordered_json::array({std::move(material)});
-  document["accessors"] = std::move(parts.accessors);
-  document["bufferViews"] = std::move(parts.views);
-  document["buffers"] = {{{"byteLength", parts.size}}};
-  return document;
-}
-
-}  // namespace
 
 void write_mesh_glb(const std::filesystem::path& path, const TriangleMesh& mesh) {
   if (mesh.triangle_count() == 0)
     throw InputError(path.string(), "", "a mesh without triangles", "at least one");
-  const std::vector<uint16_t> colours = linear_colours(mesh.colours);
-  const int64_t vertices = mesh.vertex_count();
-  Parts parts;
-  ordered_json& position = parts.add(mesh.vertices.values(), target_vertices, type_float, "VEC3", vertices);
-  position["min"] = bound(mesh.vertices, [](float a, float b) { return std::min(a, b); });
-  position["max"] = bound(mesh.vertices, [](float a, float b) { return std::max(a, b); });
-  parts.add(mesh.normals.values(), target_vertices, type_float, "VEC3", vertices);
-  parts.add(std::span(colours), target_vertices, type_uint16, "VEC4", vertices)["normalized"] = true;
-  parts.add(mesh.triangles.values(), target_indices, type_uint32, "SCALAR", mesh.triangles.size());
-
-  const int64_t binary = parts.size;
-  std::string json = description(parts).dump();
-  json.resize((json.size() + 3) / 4 * 4, ' ');
-  const int64_t total = 12 + 8 + static_cast<int64_t>(json.size()) + 8 + binary;
-  if (total > std::numeric_limits<uint32_t>::max()) {
-    throw InputError(path.string(), "", std::to_string(total) + " bytes", "at most 4294967295",
-                     "write .ply, or choose a larger voxel");
-  }
-  const std::array<uint32_t, 5> head = {file_magic, 2, static_cast<uint32_t>(total),
-                                        static_cast<uint32_t>(json.size()), json_chunk};
-  const std::array<uint32_t, 2> binary_head = {static_cast<uint32_t>(binary), binary_chunk};
-  parts.bytes.insert(parts.bytes.begin(), {std::as_bytes(std::span(head)), std::as_bytes(std::span(json)),
-                                           std::as_bytes(std::span(binary_head))});
-  write_atomically(path, parts.bytes);
+  GlbWriter writer(mesh.vertices);
+  writer.set_normals(mesh.normals);
+  writer.set_colours(mesh.colours);
+  writer.write(path, GlbPrimitive::triangles, mesh.triangles);
 }
 
 }  // namespace traceflow::mesh

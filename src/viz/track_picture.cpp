@@ -104,12 +104,6 @@ class Pen {
   std::vector<int64_t> wet_;
 };
 
-bool is_hidden(const Tensor<float>& depth, const Vec2<double>& place, double z) {
-  const float surface =
-      depth(static_cast<int64_t>(std::floor(place.y)), static_cast<int64_t>(std::floor(place.x)));
-  return surface > 0 && z > (1 + behind) * surface;
-}
-
 }  // namespace
 
 Vec3<float> rainbow_colour(float hue) {
@@ -122,24 +116,35 @@ Vec3<float> rainbow_colour(float hue) {
   return {channel(0), channel(4), channel(2)};
 }
 
+PointViewer::PointViewer(const Frame& frame)
+    : camera_(convert<double>(frame.camera)),
+      near_plane_(frame.drawn_with.near_plane),
+      depth_(on_host(frame.raster.median_depth, fetched_)) {}
+
+SeenPoint PointViewer::see(const Vec3<double>& point) const {
+  SeenPoint seen;
+  const Vec3<double> in_camera = camera_.point_in_camera(point);
+  const Vec2<double> place = camera_.project(in_camera);
+  if (!(in_camera.z >= near_plane_) || !std::isfinite(place.x + place.y)) return seen;
+  seen.place = place;
+  seen.in_front = true;
+  if (!(place.x >= 0 && place.y >= 0 && place.x < camera_.width && place.y < camera_.height)) return seen;
+  const float surface =
+      depth_(static_cast<int64_t>(std::floor(place.y)), static_cast<int64_t>(std::floor(place.x)));
+  seen.visible = !(surface > 0 && in_camera.z > (1 + behind) * surface);
+  return seen;
+}
+
 std::vector<SeenTrack> seen_tracks(const Frame& frame, const Tracks& tracks) {
   std::vector<SeenTrack> seen;
   if (tracks.count() == 0) return seen;
-  Tensor<float> fetched;
-  const Tensor<float>& depth = on_host(frame.raster.median_depth, fetched);
-  const auto camera = convert<double>(frame.camera);
-  const double near_plane = frame.drawn_with.near_plane;
+  const PointViewer viewer(frame);
   for (int64_t p = 0; p < tracks.count(); ++p) {
     SeenTrack track;
     for (size_t v = 0; v < tracks.age.size(); ++v) {
-      const Vec3<double> point =
-          camera.point_in_camera(load3<double>(&tracks.position(static_cast<int64_t>(v), p, 0)));
-      const Vec2<double> place = camera.project(point);
-      if (!(point.z >= near_plane) || !std::isfinite(place.x + place.y)) break;
-      const bool is_inside =
-          place.x >= 0 && place.y >= 0 && place.x < camera.width && place.y < camera.height;
-      if (v == 0 && (!is_inside || is_hidden(depth, place, point.z))) break;
-      track.place.push_back(place);
+      const SeenPoint point = viewer.see(load3<double>(&tracks.position(static_cast<int64_t>(v), p, 0)));
+      if (!point.in_front || (v == 0 && !point.visible)) break;
+      track.place.push_back(point.place);
       track.age.push_back(tracks.age[v]);
     }
     if (track.place.empty()) continue;

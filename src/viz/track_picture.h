@@ -6,6 +6,26 @@
 
 namespace traceflow::viz {
 
+// Where a frame's camera sees a point of the scene.
+struct SeenPoint {
+  Vec2<double> place{0};  // pixels; 0 unless in_front
+  bool in_front = false;  // not nearer than the near plane
+  bool visible = false;   // in front, in the image, and at most 1.02 times as far as the median depth
+};
+
+// Sees points in a frame, which must outlive it.
+class PointViewer {
+ public:
+  explicit PointViewer(const Frame& frame);
+  SeenPoint see(const Vec3<double>& point) const;
+
+ private:
+  const Camera<double> camera_;
+  const double near_plane_;
+  Tensor<float> fetched_;
+  const Tensor<float>& depth_;
+};
+
 // A point's track in the image of a frame's camera.
 struct SeenTrack {
   std::vector<Vec2<double>> place;  // pixels, from the present backwards
@@ -14,8 +34,7 @@ struct SeenTrack {
 };
 
 // The tracks of the points that are visible in the frame, all projected by the frame's camera, so that static
-// points have no track even if the camera moves. Points outside the image, or farther than 1.02 times the
-// median depth, are left out. A track ends where it would pass behind the near plane.
+// points have no track even if the camera moves. A track ends where it would pass behind the near plane.
 std::vector<SeenTrack> seen_tracks(const Frame& frame, const Tracks& tracks);
 
 // H×W×3: the frame's colours with the tracks as thin lines that fade with age, each in its point's colour of

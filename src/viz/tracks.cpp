@@ -207,6 +207,10 @@ void TrackFollower::choose(const Scene& scene) {
   chosen_ = tensor_of(chosen).on(scene.device());
 }
 
+Tensor<float> TrackFollower::positions(const Scene& scene, float time) const {
+  return places(scene, time, chosen_).position;
+}
+
 Tracks TrackFollower::at(const Scene& scene, float time) const {
   Tracks tracks;
   if (hue_.empty()) return tracks;
@@ -225,7 +229,7 @@ Tracks TrackFollower::at(const Scene& scene, float time) const {
   }
   tracks.position.resize({static_cast<int64_t>(when.size()), tracks.count(), 3});
   for (size_t v = 0; v < when.size(); ++v) {
-    const Tensor<float> position = places(scene, when[v], chosen_).position;
+    const Tensor<float> position = positions(scene, when[v]);
     std::copy_n(position.data(), position.size(), tracks.position.row(static_cast<int64_t>(v)));
   }
   return tracks;

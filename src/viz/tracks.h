@@ -30,6 +30,12 @@ class TrackFollower {
   // The tracks up to `time`. The scene must be the same as in the constructor.
   Tracks at(const Scene& scene, float time) const;
 
+  // P×3: the points' positions at `time`, in the scene, on the host. The scene must be the same as in the
+  // constructor.
+  Tensor<float> positions(const Scene& scene, float time) const;
+  // P, 0 to 1.
+  const std::vector<float>& hues() const { return hue_; }
+
   // P, the points' rows among the stored main surfels, ascending. On the scene's device.
   const Tensor<int32_t>& chosen() const { return chosen_; }
 

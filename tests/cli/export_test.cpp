@@ -106,6 +106,14 @@ TEST_F(ExportVerb, AMeshOfASurfelIsFlat) {
   EXPECT_EQ(bytes_of(path("out/mesh.glb")).substr(0, 4), "glTF");
 }
 
+TEST_F(ExportVerb, NoTrajectoriesWithoutMotion) {
+  const Outcome o = run_with(
+      {"export", path("scene.spz"), "-o", path("out"), "--format", "trajectories", "-d", path("capture")});
+  EXPECT_EQ(o.code, exit_input);
+  EXPECT_THAT(o.err, HasSubstr("trajectories: found no surfel that moves, expected at least one"));
+  EXPECT_FALSE(std::filesystem::exists(path("out")));
+}
+
 TEST_F(ExportVerb, WrongArgumentsGetOneLineAndExitCode2) {
   const auto refuses = [&](const std::vector<std::string>& words, const std::string& text) {
     const Outcome o = export_run(words);
@@ -116,6 +124,9 @@ TEST_F(ExportVerb, WrongArgumentsGetOneLineAndExitCode2) {
   refuses({"--bake"}, "option: bake: found it with --format 2dgs, expected it with 3dgs, spz or sog");
   refuses({"--bake", "--format", "mesh"}, "option: bake: found it with --format mesh");
   refuses({"--undeformed", "--format", "mesh"}, "option: undeformed: found it with --format mesh");
+  refuses({"--times", "2", "--format", "trajectories"},
+          "option: times: found it with --format trajectories, expected neither");
+  refuses({"--format", "trajectories", "--tracks-most", "0"}, "tracks_most: found 0");
   refuses({"--format", "mesh", "--set", "mesh.voxel=-1"}, "mesh.voxel: found -1");
   refuses({"--times", "1"}, "option: times: found 1, expected all, or a number from 2 to 10000");
   refuses({"--times", "2x"}, "option: times: found 2x");

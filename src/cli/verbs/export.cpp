@@ -20,12 +20,14 @@
 #include "mesh/mesh_ply.h"
 #include "scene/viewpoint.h"
 #include "viz/bake.h"
+#include "viz/trajectories.h"
 
 namespace traceflow::cli {
 
 namespace {
 
 constexpr int64_t most_times = 10000;
+constexpr const char* trajectories = "trajectories";
 
 struct ExportArguments {
   std::string scene, output, format = "2dgs", times, capture;
@@ -33,7 +35,7 @@ struct ExportArguments {
   bool undeformed = false, bake = false;
 };
 
-// The format of surfels; absent for meshes.
+// The format of surfels; absent for meshes and trajectories.
 std::optional<viz::SplatFormat> splat_format(const std::string& name) {
   const auto names = enum_names(viz::SplatFormat());
   const auto found = std::ranges::find(names, name);
@@ -42,10 +44,14 @@ std::optional<viz::SplatFormat> splat_format(const std::string& name) {
 }
 
 struct ExportOptions {
+  TracksOptions tracks;
   mesh::FusionOptions mesh;
 
   template <class Visitor>
   void visit(Visitor& v) {
+    v.field("tracks_most", tracks.most, "points", "Trajectories: maximum number of points.");
+    v.field("tracks_least_move", tracks.least_move, "extents",
+            "Trajectories: minimum distance that a point must move within the video.");
     v.group("mesh", mesh);
   }
 };
@@ -112,12 +118,14 @@ class Exporter {
     if (!a.bake && format_) return;
     shots_ = capture.training_shots();
     traced_ = subject;
+    traced_.render.tracks = options.tracks;
     traced_.scene.move_to(devices.choose());
   }
 
   // label: of the time, in the progress.
   void write(std::optional<float> time, const std::string& suffix, const std::string& label) {
     if (stop_) throw Exit{exit_interrupted};
+    if (a_.format == trajectories) return write_trajectories();
     if (!format_) return write_mesh(*time, suffix, label);
     Surfels main = viz::posed_main(subject_, time);
     if (a_.bake) main = baked(*time, main, label);
@@ -143,6 +151,23 @@ class Exporter {
         result.psnr, result.psnr_without, cameras.size(), time);
     harmonics_ = result.main.sh;
     return std::move(result.main);
+  }
+
+  void write_trajectories() {
+    CountProgress progress = CountProgress::for_stderr();
+    const auto start = Clock::now();
+    const viz::Trajectories paths = viz::follow_surfels(traced_, shots_, [&](size_t done, size_t all) {
+      progress.show({"", "views", static_cast<int64_t>(done), static_cast<int64_t>(all)},
+                    seconds_since(start));
+      if (stop_) throw Exit{exit_interrupted};
+    });
+    progress.finish();
+    const std::filesystem::path folder(a_.output);
+    std::filesystem::create_directories(folder);
+    viz::write_trajectories_npz(folder / "trajectories.npz", paths);
+    viz::write_trajectories_glb(folder / "trajectories.glb", paths);
+    fmt::print("{0}.npz, {0}.glb: {1} points, {2} views\n", (folder / "trajectories").string(), paths.count(),
+               shots_.size());
   }
 
   void write_mesh(float time, const std::string& suffix, const std::string& label) {
@@ -177,11 +202,15 @@ void run_export(const ExportArguments& a, const ExportOptions& options, const De
   // CLI11's range check accepts "nan".
   check_option(a.time >= 0 && a.time <= 1, "time", a.time, "0 to 1");
   options.mesh.validate();
+  options.tracks.validate();
   const std::optional<viz::SplatFormat> format = splat_format(a.format);
   if (a.bake && (!format || *format == viz::SplatFormat::surfel_ply))
     throw InputError("option", "bake", "it with --format " + a.format, "it with 3dgs, spz or sog");
   if (a.undeformed && !format)
-    throw InputError("option", "undeformed", "it with --format mesh", "it with surfels or Gaussians");
+    throw InputError("option", "undeformed", "it with --format " + a.format, "it with surfels or Gaussians");
+  if (a.format == trajectories && (a.time != 0 || !a.times.empty()))
+    throw InputError("option", a.times.empty() ? "time" : "times", "it with --format trajectories",
+                     "neither: trajectories go through all times of the capture");
   LoadedScene scene = load_scene(a.scene, "");
   const viz::Subject& subject = scene.subject;
   if (!subject.warning.empty()) std::cerr << subject.warning << std::endl;
@@ -199,17 +228,18 @@ void run_export(const ExportArguments& a, const ExportOptions& options, const De
 }  // namespace
 
 void add_export(CLI::App& program) {
-  CLI::App* verb = program.add_subcommand("export", "Write surfels, Gaussians or a mesh for other programs");
+  CLI::App* verb =
+      program.add_subcommand("export", "Write surfels, Gaussians, a mesh or trajectories for other programs");
   const auto a = std::make_shared<ExportArguments>();
   verb->add_option("SCENE", a->scene, "A run's folder, a .ply or an .spz")->required();
   verb->add_option("-o,--output", a->output, "Output folder")->required();
   std::vector<std::string> formats;
   for (const std::string_view name : enum_names(viz::SplatFormat())) formats.emplace_back(name);
-  formats.emplace_back("mesh");
+  formats.insert(formats.end(), {"mesh", trajectories});
   verb->add_option(
           "--format", a->format,
           "2dgs: .ply of surfels, with reflections for TraceFlow; 3dgs: .ply of thin Gaussians; spz; sog; "
-          "mesh: .ply and .glb")
+          "mesh: .ply and .glb; trajectories: paths of moving surfels, .npz as from CoTracker and .glb")
       ->check(CLI::IsMember(formats))
       ->capture_default_str();
   CLI::Option* time = verb->add_option("--time", a->time, "Time of the exported surfels, 0 to 1")
