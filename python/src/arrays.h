@@ -73,7 +73,7 @@ py::object array_or_none(Tensor<T>&& tensor) {
 // The size of one of an array's dimensions: a number, or a letter for any size, as in {'N', 3}.
 struct Dimension {
   template <std::integral I>
-  Dimension(I value)  // NOLINT(google-explicit-constructor): so that lists of them read like shapes
+  Dimension(I value)  // not explicit, so that lists of them read like shapes
       : size(static_cast<int64_t>(value)),
         letter(std::is_same_v<I, char> ? static_cast<char>(value) : '\0') {}
   int64_t size;

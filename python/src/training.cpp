@@ -65,6 +65,7 @@ class HeldTrainer {
     trainer_->stream().listen([this](const events::Event& event) { hear(event); });
     const InUse in_use(*this);
     run_.begin(*trainer_);
+    if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
   }
 
   // Returns the last event. Throws what the callback threw, KeyboardInterrupt after Ctrl-C, or an Error if
