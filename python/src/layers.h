@@ -33,14 +33,14 @@ void take_layer_gradients(const py::dict& gradients, const Camera<float>& camera
       [&](const char* name, Tensor<float>&) { names += (names.empty() ? "" : ", ") + std::string(name); });
   for (const auto& [key, value] : gradients) {
     const auto name = py::cast<std::string>(py::str(key));
+    const auto array = py::reinterpret_borrow<py::object>(value);
     bool found = false;
     for_each([&](const char* layer, Tensor<float>& gradient) {
       if (name != layer) return;
       found = true;
       Dimensions shape = {camera.height, camera.width};
       if (name == "colour" || name == "normal" || name == "pseudo_normal") shape.emplace_back(3);
-      gradient =
-          *tensor_of_array<float>(py::reinterpret_borrow<py::object>(value), "gradients: " + name, shape);
+      gradient = *tensor_of_array<float>(array, "gradients: " + name, shape);
     });
     if (!found) throw InputError("argument", "gradients", name, "layers among " + names);
   }
