@@ -42,8 +42,8 @@ py::array array_of(std::shared_ptr<const void> owner, const Tensor<T>& tensor,
     auto copy = std::make_shared<const Tensor<T>>(tensor.on(Device::cpu));
     return array_of(copy, *copy, access);
   }
-  std::vector<py::ssize_t> shape;
-  for (int i = 0; i < tensor.shape().rank(); ++i) shape.push_back(tensor.dim(i));
+  std::vector<py::ssize_t> shape(static_cast<size_t>(tensor.shape().rank()));
+  for (size_t i = 0; i < shape.size(); ++i) shape[i] = tensor.dim(static_cast<int>(i));
   py::array array(py::dtype::of<T>(), shape, tensor.data(),
                   capsule_of({std::move(owner), &tensor, &typeid(T)}));
   if (access == Access::read_only) array.attr("setflags")(py::arg("write") = false);

@@ -8,6 +8,7 @@
 #include "ops/motion/nodes.h"
 #include "options.h"
 #include "parts.h"
+#include "render/render_options.h"
 #include "tensor_fields.h"
 
 namespace traceflow::python {

@@ -76,6 +76,7 @@ std::vector<Tensor<float>> render_layers(HeldScene& self, const Place& place,
   request.specular = request.specular && std::ranges::any_of(layers, viz::needs_reflections);
   const Frame& frame = self.renderer->forward(subject.scene, request);
   std::vector<Tensor<float>> values;
+  values.reserve(layers.size());
   for (const viz::Layer layer : layers) {
     values.push_back(
         viz::layer_values(frame, layer, subject.scene.normalisation.scale,
