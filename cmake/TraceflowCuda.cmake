@@ -79,7 +79,8 @@ function(traceflow_cuda_library)
   # cuBLASLt is opened when it is needed (primitives/cublas_lt.h).
   target_compile_definitions(traceflow_cuda_objects PRIVATE TRACEFLOW_CUDA_LIBRARIES="${CUDAToolkit_LIBRARY_DIR}")
   # The standard is named as an option because CMake 3.25 does not know that nvcc has it.
-  set_target_properties(traceflow_cuda_objects PROPERTIES CUDA_EXTENSIONS ON CXX_STANDARD_REQUIRED OFF UNITY_BUILD OFF)
+  set_target_properties(traceflow_cuda_objects PROPERTIES CUDA_EXTENSIONS ON CXX_STANDARD_REQUIRED OFF UNITY_BUILD OFF
+    POSITION_INDEPENDENT_CODE ON)
   set_property(TARGET traceflow_cuda_objects PROPERTY CXX_STANDARD)
   # 20012: GLM marks its defaulted constructors for the device, which needs no mark.
   target_compile_options(traceflow_cuda_objects PRIVATE

@@ -77,6 +77,10 @@ function(traceflow_library name)
   if(sources)
     add_library(traceflow_${name} STATIC ${sources})
     target_link_libraries(traceflow_${name} PUBLIC traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})
+    # The Python module is a shared object. Nothing replaces a function of a library when the program is loaded, so that calls
+    # within it stay direct.
+    set_target_properties(traceflow_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_compile_options(traceflow_${name} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fno-semantic-interposition>)
   else()
     add_library(traceflow_${name} INTERFACE)
     target_link_libraries(traceflow_${name} INTERFACE traceflow_settings ${ARG_LINKS} ${ARG_SYSTEM})

@@ -11,11 +11,11 @@
 
 #include "capture/synth/synth.h"
 #include "cli/program_call.h"
-#include "cli/runs/loaded_scene.h"
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "files/png.h"
 #include "files/safetensors.h"
+#include "runs/loaded_scene.h"
 #include "support/file_bytes.h"
 
 // `report`, `eval`'s page and the films of `render`, from a run's folder to the files they leave.
@@ -145,8 +145,10 @@ TEST_F(See, RefinedCamerasAreThoseOfTheTrainingViews) {
             exit_done);
   const TrainedRun run = read_run(path("refined"));
   ASSERT_FALSE(run.cameras.empty());
+  std::string warning;
   const Capture given = load_capture(run.capture_folder, run.options.capture),
-                refined = capture_of(run, "", 0);
+                refined = capture_of(run, "", 0, warning);
+  EXPECT_EQ(warning, "");
   ASSERT_EQ(refined.train.size(), given.train.size());
   float largest = 0;
   for (size_t i = 0; i < given.train.size(); ++i) {

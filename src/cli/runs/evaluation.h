@@ -3,8 +3,8 @@
 #include <string>
 
 #include "cli/arguments/device_arguments.h"
-#include "cli/runs/trained_run.h"
 #include "eval/report_page.h"
+#include "runs/trained_run.h"
 
 namespace traceflow::cli {
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <map>
 
+#include "cli/runs/told_capture.h"
 #include "scene/viewpoint.h"
 #include "viz/cameras/camera_file.h"
 #include "viz/cameras/camera_path.h"
@@ -80,7 +81,7 @@ class Chooser {
       throw InputError("a .ply", "", "no cameras",
                        "--cameras FILE, --camera-path FILE, --orbit, or -d CAPTURE");
     }
-    capture_ = capture_of(scene_, a_.capture, a_.downscale);
+    capture_ = told_capture(scene_, a_.capture, a_.downscale);
     return *capture_;
   }
 

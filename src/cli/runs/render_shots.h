@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "cli/runs/loaded_scene.h"
+#include "runs/loaded_scene.h"
 #include "viz/cameras/shot.h"
 
 namespace CLI {

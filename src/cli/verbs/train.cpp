@@ -5,26 +5,20 @@
 #include <memory>
 #include <optional>
 
-#include "base/atomic_file.h"
 #include "base/clock.h"
-#include "base/folder_lock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
 #include "cli/arguments/server_arguments.h"
-#include "cli/runs/trained_run.h"
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/progress.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
-#include "record/event_log.h"
 #include "record/log_history.h"
+#include "runs/run_training.h"
+#include "runs/trained_run.h"
 #include "serve/live_view.h"
 #include "train/continuation.h"
-#include "train/found_masks.h"
-#include "train/initialise.h"
-#include "train/odd_masks.h"
-#include "train/trainer.h"
 
 namespace traceflow::cli {
 
@@ -43,68 +37,20 @@ struct TrainArguments {
   bool names_preset() const { return preset->count() > 0; }
 };
 
-// The data of the checkpoint of a resumed run.
-struct Checkpoint {
-  TrainOptions options;
-  std::string capture_folder;
-};
-
 // The run's settings: from the checkpoint when resuming, else from the preset. The command line overrides
 // both.
-TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given,
-                      const Checkpoint& checkpoint) {
+TrainOptions settings(const TrainArguments& arguments, const OptionArguments& given, const RunTraining& run) {
   const auto with_given = [&](TrainOptions options) {
     given.apply(option_fields(options));
     return options;
   };
   const auto of_preset = [&] { return with_given(preset(arguments.preset_name)); };
-  TrainOptions options = arguments.resume ? with_given(checkpoint.options) : of_preset();
-  options.validate();
-  if (arguments.resume) refuse_reshaping(checkpoint.options, options);
+  TrainOptions options = arguments.resume ? with_given(run.checkpoint().options) : of_preset();
+  run.check(options);
   if (arguments.resume && arguments.names_preset())
     refuse_other_preset(arguments.preset_name, of_preset(), options);
   return options;
 }
-
-// Empty for a new run.
-Checkpoint checkpoint_to_resume(const TrainArguments& arguments) {
-  if (!arguments.resume) return {};
-  std::string note;
-  const RunFolder run{arguments.output};
-  const Safetensors file = read_checkpoint(run, note);
-  return {options_in(file, run.checkpoint().string()), file.text("capture_folder")};
-}
-
-void refuse_another_run(const TrainArguments& arguments) {
-  if (arguments.resume || !RunFolder{arguments.output}.holds_a_run()) return;
-  throw InputError("--output", "", arguments.output + ", which holds a run", "a new folder",
-                   "add --resume to continue it, or choose another");
-}
-
-// The run's folder, locked against other trainings. A new folder is created only after all other arguments
-// are valid.
-class HeldFolder {
- public:
-  explicit HeldFolder(const TrainArguments& arguments) : arguments_(&arguments) {
-    if (arguments.resume || std::filesystem::exists(arguments.output)) hold();
-  }
-  void make() {
-    if (!lock_) hold();
-  }
-  bool keeps_others_out() const { return lock_ && lock_->keeps_others_out(); }
-
- private:
-  void hold() {
-    if (!arguments_->resume) make_folder(arguments_->output);
-    const RunFolder run{arguments_->output};
-    if (arguments_->resume && !run.holds_a_run()) return;  // reading it reports the error
-    lock_.emplace(run.lock(), run.folder, "training");
-    refuse_another_run(*arguments_);
-  }
-
-  const TrainArguments* arguments_;
-  std::optional<FolderLock> lock_;
-};
 
 // A quiet run still reports why it ended early.
 [[noreturn]] void end_with(int code, const TrainArguments& arguments, const events::Finished& end) {
@@ -147,69 +93,48 @@ class Watched {
   std::unique_ptr<serve::Server> server_;
 };
 
-// Masks of moving objects where the capture lacks them, for the first time or all times. A resumed run reads
-// those it was started with; a new run finds them. Returns nothing if none are needed.
-std::optional<FoundObjects> objects_for(Capture& capture, const TrainOptions& options,
-                                        const TrainArguments& arguments, const std::atomic<bool>& stop) {
-  const std::filesystem::path folder = RunFolder{arguments.output}.masks();
-  if (arguments.resume) {
-    FoundMasks kept = read_masks(folder, capture);
-    return kept.empty() ? std::nullopt : std::optional(FoundObjects{std::move(kept), {}});
-  }
-  if (follows_bodies(capture, options)) leave_out_odd_masks(capture);
-  const int iterations = iterations_to_find_objects(capture, options);
-  if (iterations == 0) return std::nullopt;
+// The objects to follow. Shows the progress of the search.
+RunTraining::SoughtObjects objects_for(const RunTraining& run, Capture& capture, const TrainOptions& options,
+                                       const TrainArguments& arguments, const std::atomic<bool>& stop) {
   const Clock::time_point start = Clock::now();
   CountProgress progress = CountProgress::for_stderr();
-  std::optional<FoundObjects> found =
-      find_objects(capture, options, iterations, [&](int64_t done, int64_t all) {
-        if (!arguments.quiet) {
-          progress.show({"masks", "iterations", done, all}, seconds_since(start));
-        }
-        return !stop;
-      });
+  RunTraining::SoughtObjects objects = run.objects_for(capture, options, [&](int64_t done, int64_t all) {
+    if (!arguments.quiet) progress.show({"masks", "iterations", done, all}, seconds_since(start));
+    return !stop;
+  });
   progress.finish();
-  if (!found) throw Exit{exit_interrupted};
-  const double seconds = seconds_since(start);
-  if (!arguments.quiet) {
+  if (objects.stopped) throw Exit{exit_interrupted};
+  if (objects.found && !arguments.resume && !arguments.quiet) {
+    const FoundMasks& masks = objects.found->masks;
     std::cerr << fmt::format(
         "found what moves in {} pictures without masks: {:.1f}% of their pixels, as {} shows ({})\n",
-        found->masks.size(), 100 * covered_share(found->masks), folder.string(), duration_text(seconds));
+        masks.size(), 100 * covered_share(masks), RunFolder{arguments.output}.masks().string(),
+        duration_text(seconds_since(start)));
   }
-  return found;
+  return objects;
 }
 
 void train(const TrainArguments& arguments, const OptionArguments& given, const DeviceArguments& devices,
            const ServerArguments& where) {
   arguments.view_options.validate();
-  HeldFolder folder(arguments);
-  const Checkpoint checkpoint = checkpoint_to_resume(arguments);
-  const TrainOptions options = settings(arguments, given, checkpoint);
+  RunTraining run(arguments.output, arguments.resume);
+  const TrainOptions options = settings(arguments, given, run);
   std::string data = arguments.data;
-  if (data.empty()) data = checkpoint.capture_folder;
+  if (data.empty()) data = run.checkpoint().capture_folder;
   if (data.empty()) throw InputError("--data", "", "nothing", "a capture: a folder or a zip archive");
 
   Capture capture = load_capture(data, options.capture);
   const Device device = devices.choose(arguments.quiet);
   const std::atomic<bool>& stop = stop_on_signals();
-  const std::optional<FoundObjects> objects = objects_for(capture, options, arguments, stop);
-  if (objects) give_objects(*objects, capture);
-  Trainer trainer(options, std::move(capture), arguments.output, device);
-  folder.make();
-  if (objects) write_masks(objects->masks, RunFolder{arguments.output}.masks());
+  const RunTraining::SoughtObjects objects = objects_for(run, capture, options, arguments, stop);
+  const std::unique_ptr<Trainer> held = run.trainer(options, std::move(capture), device, objects);
+  Trainer& trainer = *held;
   if (arguments.quiet) {
     trainer.stream().listen(warnings_alone(std::cerr));
   } else {
     trainer.stream().listen(Progress::for_stderr());
   }
-  auto log = std::make_shared<EventLog>(RunFolder{arguments.output}.log(), 10);
-  trainer.stream().listen([log](const events::Event& event) { (*log)(event); });
-  if (!folder.keeps_others_out()) {
-    trainer.stream().emit(events::Warning{
-        0,
-        arguments.output + " is on a file system without locks: see that no second training writes there"});
-  }
-  if (arguments.resume) trainer.resume();
+  run.begin(trainer);
   std::optional<Watched> watched;
   if (arguments.view) watched.emplace(trainer, arguments, where, stop);
 

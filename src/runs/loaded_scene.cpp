@@ -1,8 +1,8 @@
-#include "cli/runs/loaded_scene.h"
+#include "runs/loaded_scene.h"
 
 #include "scene/run_folder.h"
 
-namespace traceflow::cli {
+namespace traceflow {
 
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment) {
   if (std::filesystem::is_regular_file(path))
@@ -24,11 +24,12 @@ LoadedScene load_scene(const std::filesystem::path& path, const std::string& env
   return {std::move(subject), std::move(run)};
 }
 
-Capture capture_of(const LoadedScene& scene, const std::filesystem::path& folder, int downscale) {
-  if (scene.run) return capture_of(*scene.run, folder, downscale);
+Capture capture_of(const LoadedScene& scene, const std::filesystem::path& folder, int downscale,
+                   std::string& warning) {
+  if (scene.run) return capture_of(*scene.run, folder, downscale, warning);
   CaptureOptions options;
   if (downscale > 0) options.downscale = downscale;
   return load_capture(folder, options);
 }
 
-}  // namespace traceflow::cli
+}  // namespace traceflow

@@ -1,14 +1,13 @@
-#include "cli/runs/trained_run.h"
+#include "runs/trained_run.h"
 
 #include <cmath>
-#include <iostream>
 
 #include "scene/run_folder.h"
 #include "scene/scene_file.h"
 #include "train/continuation.h"
 #include "train/schedule.h"
 
-namespace traceflow::cli {
+namespace traceflow {
 
 std::string run_name(const std::filesystem::path& folder) {
   return (std::filesystem::absolute(folder) / "").lexically_normal().parent_path().filename().string();
@@ -38,7 +37,8 @@ bool has_views_of(const TrainedRun& run, const Capture& capture) {
   return are_views_of(run.views, run.subject.scene.normalisation, capture);
 }
 
-Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale) {
+Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale,
+                   std::string& warning) {
   CaptureOptions options = run.options.capture;
   if (downscale > 0) options.downscale = downscale;
   const std::filesystem::path& where = folder.empty() ? run.capture_folder : folder;
@@ -48,10 +48,9 @@ Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, i
   }
   Capture capture = load_capture(where, options);
   if (!has_views_of(run, capture)) {
-    std::cerr << where.string()
-              << ": its training views are not those that the run was trained on: times may have moved, and "
-                 "views that were trained on may be test views now"
-              << std::endl;
+    warning = where.string() +
+              ": its training views are not those that the run was trained on: times may have moved, and "
+              "views that were trained on may be test views now";
     return capture;
   }
   for (size_t i = 0; i < capture.train.size(); ++i) {
@@ -70,4 +69,4 @@ const std::vector<View>& views_of(const Capture& capture, const std::string& spl
   return views;
 }
 
-}  // namespace traceflow::cli
+}  // namespace traceflow

@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "cli/runs/trained_run.h"
+#include "runs/trained_run.h"
 
-namespace traceflow::cli {
+namespace traceflow {
 
 // A scene and, if it comes from a run, the run's other data.
 struct LoadedScene {
@@ -18,7 +18,8 @@ struct LoadedScene {
 LoadedScene load_scene(const std::filesystem::path& path, const std::string& environment);
 
 // The capture in `folder` or, if that is empty, the one that the run was trained on. downscale 0: the run's,
-// or the default. Throws InputError.
-Capture capture_of(const LoadedScene& scene, const std::filesystem::path& folder, int downscale);
+// or the default. `warning` as in runs/trained_run.h. Throws InputError.
+Capture capture_of(const LoadedScene& scene, const std::filesystem::path& folder, int downscale,
+                   std::string& warning);
 
-}  // namespace traceflow::cli
+}  // namespace traceflow

@@ -7,9 +7,9 @@
 #include "train/options.h"
 #include "viz/subject.h"
 
-namespace traceflow::cli {
+namespace traceflow {
 
-// A run as eval, render and export read it.
+// A run as those read it who show or measure it.
 struct TrainedRun {
   viz::Subject subject;  // with the parts that had started to train (method §7.1–§7.3)
   TrainOptions options;
@@ -29,9 +29,10 @@ std::string run_name(const std::filesystem::path& folder);
 TrainedRun read_run(const std::filesystem::path& folder);
 
 // The capture that the run was trained on, or the one in `folder` if given. downscale 0: the run's. Training
-// views get the cameras that the run refined. Prints a warning to standard error if the capture's views are
-// not those of the training.
-Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale);
+// views get the cameras that the run refined, unless the capture's views are not those of the training: then
+// `warning` gets one line, and otherwise stays as it is. Throws InputError.
+Capture capture_of(const TrainedRun& run, const std::filesystem::path& folder, int downscale,
+                   std::string& warning);
 
 // Whether the capture's training views are those of the run, as far as the checkpoint shows.
 bool has_views_of(const TrainedRun& run, const Capture& capture);
@@ -39,4 +40,4 @@ bool has_views_of(const TrainedRun& run, const Capture& capture);
 // The views of the named split. Throws InputError if the capture has none.
 const std::vector<View>& views_of(const Capture& capture, const std::string& split);
 
-}  // namespace traceflow::cli
+}  // namespace traceflow

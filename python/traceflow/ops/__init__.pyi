@@ -1,0 +1,11 @@
+from . import deform as deform
+from . import environment_map as environment_map
+from . import lighting as lighting
+from . import loss as loss
+from . import motion as motion
+from . import nodes as nodes
+from . import raster as raster
+from . import render as render
+from . import shade as shade
+from . import surface as surface
+from . import trace as trace
