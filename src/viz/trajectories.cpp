@@ -15,7 +15,7 @@ Trajectories follow_surfels(const Subject& subject, std::vector<Shot> shots,
   std::vector<float> times;
   for (const Shot& shot : shots) times.push_back(*shot.time);
   std::vector<float> capture_times = times;
-  capture_times.erase(std::ranges::unique(capture_times).begin(), capture_times.end());
+  capture_times.erase(std::unique(capture_times.begin(), capture_times.end()), capture_times.end());
 
   FrameRequest request = subject.request;
   request.specular = false;

@@ -66,6 +66,7 @@ std::vector<VerbWords> verbs_of(const CLI::App& program) {
 
 std::vector<std::string> names_of(const std::vector<VerbWords>& verbs) {
   std::vector<std::string> names;
+  names.reserve(verbs.size());
   for (const VerbWords& verb : verbs) names.push_back(verb.name);
   return names;
 }
