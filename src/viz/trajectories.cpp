@@ -13,6 +13,7 @@ Trajectories follow_surfels(const Subject& subject, std::vector<Shot> shots,
                             const TrajectoryProgress& progress) {
   std::ranges::stable_sort(shots, [](const Shot& a, const Shot& b) { return *a.time < *b.time; });
   std::vector<float> times;
+  times.reserve(shots.size());
   for (const Shot& shot : shots) times.push_back(*shot.time);
   std::vector<float> capture_times = times;
   capture_times.erase(std::unique(capture_times.begin(), capture_times.end()), capture_times.end());
