@@ -48,7 +48,7 @@ class HeldTrainer {
     TrainOptions chosen = options_from(options, resume);
     const std::filesystem::path path = capture_path(capture, chosen);
     run_.check(chosen);
-    RunTraining::SoughtObjects objects;
+    RunTraining::ObjectSearch objects;
     std::exception_ptr error;
     {
       const py::gil_scoped_release others_run;
@@ -62,7 +62,7 @@ class HeldTrainer {
       if (!error) trainer_ = run_.trainer(chosen, std::move(own), where, objects);
     }
     if (error) std::rethrow_exception(error);
-    trainer_->stream().listen([this](const events::Event& event) { hear(event); });
+    trainer_->stream().listen([this](const events::Event& event) { on_event(event); });
     const InUse in_use(*this);
     run_.begin(*trainer_);
     if (error_) std::rethrow_exception(std::exchange(error_, nullptr));
@@ -171,7 +171,7 @@ class HeldTrainer {
     return signal_error();
   }
 
-  void hear(const events::Event& event) {
+  void on_event(const events::Event& event) {
     const py::gil_scoped_acquire held;
     if (error_) return;
     const bool tells = !callback_.is_none();

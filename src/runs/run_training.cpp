@@ -37,8 +37,8 @@ void RunTraining::check(const TrainOptions& options) const {
   if (resume_) refuse_reshaping(checkpoint_.options, options);
 }
 
-RunTraining::SoughtObjects RunTraining::objects_for(Capture& capture, const TrainOptions& options,
-                                                    const StepsDone& told) const {
+RunTraining::ObjectSearch RunTraining::objects_for(Capture& capture, const TrainOptions& options,
+                                                   const StepsDone& progress) const {
   if (resume_) {
     FoundMasks kept = read_masks(folder_.masks(), capture);
     if (kept.empty()) return {};
@@ -47,13 +47,13 @@ RunTraining::SoughtObjects RunTraining::objects_for(Capture& capture, const Trai
   if (follows_bodies(capture, options)) leave_out_odd_masks(capture);
   const int iterations = iterations_to_find_objects(capture, options);
   if (iterations == 0) return {};
-  std::optional<FoundObjects> found = find_objects(capture, options, iterations, told);
+  std::optional<FoundObjects> found = find_objects(capture, options, iterations, progress);
   const bool stopped = !found;
   return {std::move(found), stopped};
 }
 
 std::unique_ptr<Trainer> RunTraining::trainer(const TrainOptions& options, Capture capture, Device device,
-                                              const SoughtObjects& objects) {
+                                              const ObjectSearch& objects) {
   if (objects.found) give_objects(*objects.found, capture);
   auto trainer = std::make_unique<Trainer>(options, std::move(capture), folder_.folder, device);
   if (!lock_) hold();

@@ -14,7 +14,7 @@ namespace traceflow {
 // A training with its folder, new or continued: what must happen around a Trainer, in this order.
 //   RunTraining run(folder, resume);            // nobody else trains there
 //   … options, capture (from run.checkpoint() if it is continued)
-//   SoughtObjects objects = run.objects_for(capture, options, told);
+//   ObjectSearch objects = run.objects_for(capture, options, progress);
 //   std::unique_ptr<Trainer> trainer = run.trainer(options, std::move(capture), device, objects);
 //   … listeners
 //   run.begin(*trainer);
@@ -27,9 +27,9 @@ class RunTraining {
     std::string capture_folder;
   };
   // Masks of moving objects where the capture lacks them; none if none are needed.
-  struct SoughtObjects {
+  struct ObjectSearch {
     std::optional<FoundObjects> found;
-    bool stopped = false;  // `told` has ended the search
+    bool stopped = false;  // `progress` has ended the search
   };
 
   // Locks the folder if it exists, and reads the checkpoint of a continued run. A new folder is created only
@@ -42,12 +42,12 @@ class RunTraining {
   void check(const TrainOptions& options) const;
 
   // Leaves out implausible masks of a new run's capture, and finds objects if it has no masks. A continued
-  // run has those that it was started with. told: the progress of the search.
-  SoughtObjects objects_for(Capture& capture, const TrainOptions& options, const StepsDone& told) const;
+  // run has those that it was started with. progress: of the search; may end it.
+  ObjectSearch objects_for(Capture& capture, const TrainOptions& options, const StepsDone& progress) const;
 
   // Makes the folder and the trainer, which writes its events to the run's log.
   std::unique_ptr<Trainer> trainer(const TrainOptions& options, Capture capture, Device device,
-                                   const SoughtObjects& objects);
+                                   const ObjectSearch& objects);
   // Warns if nothing keeps other trainings out of the folder, and reads a continued run's state.
   void begin(Trainer& trainer) const;
 

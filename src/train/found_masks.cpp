@@ -162,7 +162,7 @@ Tensor<float> moving_share(const StillScene::Look& still, const ViewImages& phot
 }
 
 std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOptions& options, int iterations,
-                                         const StepsDone& told) {
+                                         const StepsDone& progress) {
   const int width = capture.train.front().camera.width;
   const int factor = (width + widest - 1) / widest;
   TrainOptions small = options;
@@ -171,7 +171,7 @@ std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOpti
   require(film.train.size() == capture.train.size(), "a capture has the same views at any size", "");
   bool stopped = false;
   StillScene still(film, small, iterations, [&](int64_t done, int64_t all) {
-    stopped = !told(done, all);
+    stopped = !progress(done, all);
     return !stopped;
   });
   if (stopped) return std::nullopt;

@@ -28,9 +28,10 @@ int iterations_to_find_objects(const Capture& capture, const TrainOptions& optio
 // The share of each pixel of a photograph that moves, in [0, 1] (H×W).
 Tensor<float> moving_share(const StillScene::Look& still, const ViewImages& photograph);
 
-// Finds moving objects. Loads the capture again, at most 160 pixels wide. Returns nothing if `told` stops it.
+// Finds moving objects. Loads the capture again, at most 160 pixels wide. Returns nothing if `progress` stops
+// it.
 std::optional<FoundObjects> find_objects(const Capture& capture, const TrainOptions& options, int iterations,
-                                         const StepsDone& told);
+                                         const StepsDone& progress);
 
 // The share of all pixels that the masks cover.
 double covered_share(const FoundMasks& masks);

@@ -11,7 +11,7 @@
 #include "base/clock.h"
 #include "base/option_fields.h"
 #include "base/version.h"
-#include "cli/runs/told_capture.h"
+#include "cli/runs/load_capture_of.h"
 #include "cli/terminal/count_progress.h"
 #include "scene/run_folder.h"
 #include "scene/viewpoint.h"
@@ -77,7 +77,7 @@ void add_evaluation_arguments(CLI::App& verb, EvaluationArguments& a) {
 Evaluation::Evaluation(const EvaluationArguments& a, const DeviceArguments& devices)
     : folder_(a.run),
       run_(read_run(a.run)),
-      capture_(told_capture(run_, a.capture, a.downscale)),
+      capture_(load_capture_of(run_, a.capture, a.downscale)),
       views_(&views_of(capture_, a.split)),
       aligns_(a.align_cameras || (a.split == "test" && !run_.cameras.empty())),
       pictures_(views_->size()) {

@@ -7,7 +7,7 @@
 #include <charconv>
 #include <map>
 
-#include "cli/runs/told_capture.h"
+#include "cli/runs/load_capture_of.h"
 #include "scene/viewpoint.h"
 #include "viz/cameras/camera_file.h"
 #include "viz/cameras/camera_path.h"
@@ -81,7 +81,7 @@ class Chooser {
       throw InputError("a .ply", "", "no cameras",
                        "--cameras FILE, --camera-path FILE, --orbit, or -d CAPTURE");
     }
-    capture_ = told_capture(scene_, a_.capture, a_.downscale);
+    capture_ = load_capture_of(scene_, a_.capture, a_.downscale);
     return *capture_;
   }
 

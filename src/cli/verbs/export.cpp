@@ -10,7 +10,7 @@
 #include "base/clock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
-#include "cli/runs/told_capture.h"
+#include "cli/runs/load_capture_of.h"
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/stop_request.h"
@@ -77,7 +77,7 @@ class SceneCapture {
     if (!capture_) {
       if (!scene_.run && a_.capture.empty())
         throw InputError(a_.scene, "", "no capture", "a run, or -d CAPTURE");
-      capture_ = told_capture(scene_, a_.capture, 0);
+      capture_ = load_capture_of(scene_, a_.capture, 0);
     }
     return *capture_;
   }

@@ -10,8 +10,8 @@
 #include "base/clock.h"
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/option_arguments.h"
+#include "cli/runs/load_capture_of.h"
 #include "cli/runs/render_shots.h"
-#include "cli/runs/told_capture.h"
 #include "cli/terminal/count_progress.h"
 #include "cli/terminal/error_boundary.h"
 #include "cli/terminal/stop_request.h"
@@ -84,7 +84,7 @@ std::vector<float> times_for_tracks(const RenderArguments& a, const LoadedScene&
   const bool is_there =
       scene.run && (!a.shots.capture.empty() || std::filesystem::exists(scene.run->capture_folder));
   if (!chosen.times.empty() || !is_there) return chosen.times;
-  return times_of(told_capture(scene, a.shots.capture, a.shots.downscale));
+  return times_of(load_capture_of(scene, a.shots.capture, a.shots.downscale));
 }
 
 // Renders until the end or Ctrl-C. Returns the number of rendered shots.

@@ -94,11 +94,11 @@ class Watched {
 };
 
 // The objects to follow. Shows the progress of the search.
-RunTraining::SoughtObjects objects_for(const RunTraining& run, Capture& capture, const TrainOptions& options,
-                                       const TrainArguments& arguments, const std::atomic<bool>& stop) {
+RunTraining::ObjectSearch objects_for(const RunTraining& run, Capture& capture, const TrainOptions& options,
+                                      const TrainArguments& arguments, const std::atomic<bool>& stop) {
   const Clock::time_point start = Clock::now();
   CountProgress progress = CountProgress::for_stderr();
-  RunTraining::SoughtObjects objects = run.objects_for(capture, options, [&](int64_t done, int64_t all) {
+  RunTraining::ObjectSearch objects = run.objects_for(capture, options, [&](int64_t done, int64_t all) {
     if (!arguments.quiet) progress.show({"masks", "iterations", done, all}, seconds_since(start));
     return !stop;
   });
@@ -126,7 +126,7 @@ void train(const TrainArguments& arguments, const OptionArguments& given, const 
   Capture capture = load_capture(data, options.capture);
   const Device device = devices.choose(arguments.quiet);
   const std::atomic<bool>& stop = stop_on_signals();
-  const RunTraining::SoughtObjects objects = objects_for(run, capture, options, arguments, stop);
+  const RunTraining::ObjectSearch objects = objects_for(run, capture, options, arguments, stop);
   const std::unique_ptr<Trainer> held = run.trainer(options, std::move(capture), device, objects);
   Trainer& trainer = *held;
   if (arguments.quiet) {

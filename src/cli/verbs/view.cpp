@@ -6,7 +6,7 @@
 
 #include "cli/arguments/device_arguments.h"
 #include "cli/arguments/server_arguments.h"
-#include "cli/runs/told_capture.h"
+#include "cli/runs/load_capture_of.h"
 #include "cli/terminal/stop_request.h"
 #include "cli/verbs/verbs.h"
 #include "serve/run_view.h"
@@ -35,10 +35,10 @@ serve::RunView::Shown shown_of(TrainedRun run) {
 
 // The capture, if available: a run can be viewed without its photographs.
 std::optional<Capture> capture_beside(const ViewArguments& a, const LoadedScene& scene) {
-  if (!a.capture.empty()) return told_capture(scene, a.capture, a.downscale);
+  if (!a.capture.empty()) return load_capture_of(scene, a.capture, a.downscale);
   if (!scene.run) return std::nullopt;
   const std::filesystem::path& folder = scene.run->capture_folder;
-  if (std::filesystem::exists(folder)) return told_capture(scene, folder, a.downscale);
+  if (std::filesystem::exists(folder)) return load_capture_of(scene, folder, a.downscale);
   std::cerr << folder.string()
             << " is not there: no photographs to compare with; say where they are with -d CAPTURE\n";
   return std::nullopt;
