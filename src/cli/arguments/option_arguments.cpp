@@ -87,6 +87,7 @@ std::string help_of_set(const std::vector<OptionField>& fields,
 
 std::string names_for_completion(const std::vector<OptionField>& fields) {
   std::vector<std::string> names;
+  names.reserve(fields.size());
   for (const OptionField& field : fields) names.push_back(field.path + "=");
   return fmt::format("{{{}}}", fmt::join(names, ","));
 }
