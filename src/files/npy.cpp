@@ -227,6 +227,15 @@ Tensor<float> read_npz(const std::filesystem::path& path, const std::string& nam
   return NpyFile(path, name).read();
 }
 
+std::vector<std::string> names_in_npz(const std::filesystem::path& path) {
+  std::vector<std::string> names;
+  for (const ZipMember& member : list_zip(InputFile(path))) {
+    const std::string_view name = member.name;
+    names.emplace_back(name.ends_with(".npy") ? name.substr(0, name.size() - 4) : name);
+  }
+  return names;
+}
+
 namespace {
 
 template <class T>

@@ -19,6 +19,8 @@ Tensor<float> read_npy(InputFile file);
 Tensor<float> read_npy(const std::filesystem::path& path);
 // Reads the array `name` of a .npz (zip, stored or deflated); an empty name means the only one.
 Tensor<float> read_npz(const std::filesystem::path& path, const std::string& name = "");
+// The names of a .npz's arrays, in its order.
+std::vector<std::string> names_in_npz(const std::filesystem::path& path);
 // Writes float32 or int32, C order, format version 1.0, atomically.
 void write_npy(const std::filesystem::path& path, const Tensor<float>& array);
 void write_npy(const std::filesystem::path& path, const Tensor<int32_t>& array);

@@ -118,6 +118,14 @@ ViewIds ids_in(const Capture& capture, const CaptureOptions& options) {
 }
 
 // The requested data does not depend on the size, and some captures only have smaller images.
+// The views that so many images in order belong to; null if there is no such number of views.
+const std::vector<std::string>* views_of_count(const ViewIds& ids, int64_t count) {
+  for (const auto* list : {&ids.train, &ids.all, &ids.listed_train, &ids.listed}) {
+    if (count == static_cast<int64_t>(list->size())) return list;
+  }
+  return nullptr;
+}
+
 CaptureOptions at_largest_size(const fs::path& capture) {
   CaptureOptions options;
   const auto is_there = [&] {
@@ -198,6 +206,7 @@ void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOption
   fs::create_directories(staging / "mask/1x");
   double covered = 0;
   for_each_view(
+  std::string assumed;
       matched, [&](const auto& indices, const auto& f) { source.take_some(true, indices, f); },
       [&](const std::string& id, const Tensor<uint8_t>& picture) {
         const Tensor<uint8_t> mask = as_mask(picture);
@@ -214,7 +223,8 @@ void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOption
 
 void attach_tracks(const Capture& capture, const ViewIds& ids, const AttachOptions& options,
                    const Staging& staging, const Say& say) {
-  const TrackSource source(options.tracks);
+  const TrackSource source(options.tracks,
+                           [&](int64_t count) { return views_of_count(ids, count) != nullptr; });
   const auto matched = match_views(options.tracks, {}, source.times(), ids);
   const Lens& lens = capture.images->source(capture.train.front().id).lens;
   const double width = options.tracks_width > 0 ? options.tracks_width : lens.width;
@@ -231,9 +241,9 @@ void attach_tracks(const Capture& capture, const ViewIds& ids, const AttachOptio
                      "most of them", "say with --tracks-width how wide the pictures were that were tracked");
   }
   write_npy(staging / tracks_kind.name, rows);
-  say(fmt::format("{:<10}{} points on {} training views, each seen by {:.0f} in the mean", "tracks",
+  say(fmt::format("{:<10}{} points on {} training views, each seen by {:.0f} in the mean ({})", "tracks",
                   source.points(), capture.train.size(),
-                  static_cast<double>(inside) / static_cast<double>(source.points())));
+                  static_cast<double>(inside) / static_cast<double>(source.points()), source.assumed()));
 }
 
 }  // namespace
@@ -256,10 +266,8 @@ std::map<std::string, int64_t> match_views(const std::string& origin, const std:
   const auto training =
       std::ranges::count_if(ids.train, [&](const std::string& id) { return matched.contains(id); });
   if (training == static_cast<std::ptrdiff_t>(ids.train.size())) return matched;
-  const std::array lists{&ids.train, &ids.all, &ids.listed_train, &ids.listed};
-  const auto list = std::ranges::find_if(
-      lists, [&](const std::vector<std::string>* l) { return count == static_cast<int64_t>(l->size()); });
-  if (list == lists.end()) {
+  const std::vector<std::string>* const list = views_of_count(ids, count);
+  if (list == nullptr) {
     throw InputError(
         origin, "count", fmt::format("{}, of which {} have a training view's name", count, training),
         fmt::format("one for each of {} training views or of all {}", ids.train.size(), ids.all.size()),
@@ -267,8 +275,8 @@ std::map<std::string, int64_t> match_views(const std::string& origin, const std:
   }
   matched.clear();
   const std::set<std::string> there(ids.all.begin(), ids.all.end());
-  for (size_t i = 0; i < (*list)->size(); ++i) {
-    if (there.contains((**list)[i])) matched.emplace((**list)[i], static_cast<int64_t>(i));
+  for (size_t i = 0; i < list->size(); ++i) {
+    if (there.contains((*list)[i])) matched.emplace((*list)[i], static_cast<int64_t>(i));
   }
   return matched;
 }
