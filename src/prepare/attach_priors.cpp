@@ -16,6 +16,7 @@
 #include "capture/image_cache.h"
 #include "files/png.h"
 #include "prepare/capture_folder.h"
+#include "prepare/mask_coding.h"
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
 #include "prepare/programs.h"
@@ -117,7 +118,6 @@ ViewIds ids_in(const Capture& capture, const CaptureOptions& options) {
   return ids;
 }
 
-// The requested data does not depend on the size, and some captures only have smaller images.
 // The views that so many images in order belong to; null if there is no such number of views.
 const std::vector<std::string>* views_of_count(const ViewIds& ids, int64_t count) {
   for (const auto* list : {&ids.train, &ids.all, &ids.listed_train, &ids.listed}) {
@@ -126,6 +126,7 @@ const std::vector<std::string>* views_of_count(const ViewIds& ids, int64_t count
   return nullptr;
 }
 
+// The requested data does not depend on the size, and some captures only have smaller images.
 CaptureOptions at_largest_size(const fs::path& capture) {
   CaptureOptions options;
   const auto is_there = [&] {
@@ -205,11 +206,13 @@ void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOption
   }
   fs::create_directories(staging / "mask/1x");
   double covered = 0;
-  for_each_view(
   std::string assumed;
-      matched, [&](const auto& indices, const auto& f) { source.take_some(true, indices, f); },
-      [&](const std::string& id, const Tensor<uint8_t>& picture) {
-        const Tensor<uint8_t> mask = as_mask(picture);
+  for_each_view(
+      matched,
+      [&](const auto& indices, const auto& f) {
+        assumed = take_masks(source, options.masks, options.mask_white, indices, f);
+      },
+      [&](const std::string& id, const Tensor<uint8_t>& mask) {
         const Camera<float>& camera = cameras.at(id);
         require_proportions(options.masks, mask, id, camera.width, camera.height);
         covered += share_of(mask) / static_cast<double>(matched.size());
@@ -217,8 +220,8 @@ void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOption
       });
   require_white(options.masks, covered);
   write_atomically(staging / attached_masks, "by traceflow attach-priors\n");
-  say(fmt::format("{:<10}{} of {} views, covering {:.1f}% of the pixels", "masks", matched.size(),
-                  capture.train.size() + capture.test.size(), 100 * covered));
+  say(fmt::format("{:<10}{} of {} views, covering {:.1f}% of the pixels ({})", "masks", matched.size(),
+                  capture.train.size() + capture.test.size(), 100 * covered, assumed));
 }
 
 void attach_tracks(const Capture& capture, const ViewIds& ids, const AttachOptions& options,

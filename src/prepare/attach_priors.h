@@ -9,12 +9,14 @@
 
 #include "capture/capture.h"
 #include "capture/prior_axes.h"
+#include "prepare/mask_white.h"
 
 namespace traceflow::prepare {
 
 struct AttachOptions {
   std::string normals;
   std::string masks;
+  MaskWhite mask_white = MaskWhite::automatic;
   std::string tracks;
   int tracks_width = 0;
   PriorAxes axes = PriorAxes::automatic;
@@ -24,9 +26,13 @@ struct AttachOptions {
   void visit(Visitor& v) {
     v.field("normals", normals, "",
             "Normals: an .npz or .npy array T×H×W×3, a video, or a folder of images.");
-    v.field("masks", masks, "", "Masks: a folder or video with the moving object in white.");
-    v.field("tracks", tracks, "",
-            "Point tracks: an .npz file with the arrays tracks (T×N×2, pixels) and visibility (T×N).");
+    v.field("masks", masks, "",
+            "Masks: a folder or video, in white and black or with labels of the moving objects.");
+    v.field("mask_white", mask_white, "",
+            "What is white in the masks; automatic: determined from the border of the images.");
+    v.field(
+        "tracks", tracks, "",
+        "Point tracks: an .npz file with the arrays tracks and visibility (CoTracker) or visibles (TAPIR).");
     v.field("tracks_width", tracks_width, "pixels",
             "Width of the tracked images; 0: the width of the capture's images.");
     v.field("axes", axes, "", "Axes of the normals; automatic: determined with the capture's points.");

@@ -11,6 +11,7 @@
 #include "capture/lens/resample.h"
 #include "capture/sharpness.h"
 #include "files/png.h"
+#include "prepare/mask_coding.h"
 #include "prepare/motion/moving_mask.h"
 #include "prepare/picture_source.h"
 #include "prepare/programs.h"
@@ -39,9 +40,10 @@ Scaled small_grey(const fs::path& path) {
   return {to_8bit(resample(from_8bit(grey), {side(grey.dim(1)), side(grey.dim(0)), factor, factor})), factor};
 }
 
-// Calls f(frame, mask) for every frame with a mask in --masks.
-void take_supplied(const PrepareOptions& options, const Frames& frames, const fs::path& log, const Work& work,
-                   const std::function<void(const Frame& frame, const Tensor<uint8_t>& mask)>& f) {
+// Calls f(frame, mask) for every frame with a mask in --masks. Returns what was assumed about the masks.
+std::string take_supplied(const PrepareOptions& options, const Frames& frames, const fs::path& log,
+                          const Work& work,
+                          const std::function<void(const Frame& frame, const Tensor<uint8_t>& mask)>& f) {
   const PictureSource source(options.masks, 0, log, work.stop());
   const std::vector<std::optional<int64_t>> matched =
       match_masks(options.masks, source.names(), source.count(), frames);
@@ -52,10 +54,11 @@ void take_supplied(const PrepareOptions& options, const Frames& frames, const fs
   std::vector<int64_t> indices;
   indices.reserve(wanted.size());
   for (const auto& [index, frame] : wanted) indices.push_back(index);
-  source.take_some(true, indices, [&](int64_t place, Tensor<uint8_t>&& picture) {
-    f(*wanted.at(indices[static_cast<size_t>(place)]), as_mask(picture));
+  const auto take = [&](int64_t place, const Tensor<uint8_t>& mask) {
+    f(*wanted.at(indices[static_cast<size_t>(place)]), mask);
     work.tell(place + 1, static_cast<int64_t>(indices.size()));
-  });
+  };
+  return take_masks(source, options.masks, options.mask_white, indices, take);
 }
 
 using Matched = std::vector<std::optional<int64_t>>;
@@ -151,6 +154,7 @@ std::string make_masks(const PrepareOptions& options, const Frames& frames, cons
   fs::create_directories(masks);
   double covered = 0;
   int64_t count = 0;
+  std::string assumed;
   const auto keep = [&](const Frame& frame, const Tensor<uint8_t>& mask) {
     require_proportions(options.masks, mask, frame.id, static_cast<double>(frame.width),
                         static_cast<double>(frame.height));
@@ -159,7 +163,7 @@ std::string make_masks(const PrepareOptions& options, const Frames& frames, cons
     ++count;
   };
   if (options.masks != "estimate") {
-    take_supplied(options, frames, log, work, keep);
+    assumed = " (" + take_supplied(options, frames, log, work, keep) + ")";
     require_white(options.masks, covered);
   } else {
     for (const int camera : {0, 1}) {
@@ -175,11 +179,11 @@ std::string make_masks(const PrepareOptions& options, const Frames& frames, cons
           [&](int64_t i, const Tensor<uint8_t>& mask) { keep(*mine[static_cast<size_t>(i)], mask); });
     }
   }
-  return fmt::format("{} {}, covering {:.1f}% of the pixels",
+  return fmt::format("{} {}, covering {:.1f}% of the pixels{}",
                      options.masks == "estimate" ? fmt::format("{}", count)
                                                  : fmt::format("{} of {}", count, frames.frames.size()),
                      options.masks == "estimate" ? "estimated" : "supplied",
-                     100 * covered / static_cast<double>(std::max<int64_t>(1, count)));
+                     100 * covered / static_cast<double>(std::max<int64_t>(1, count)), assumed);
 }
 
 void write_mask(const fs::path& path, const Tensor<uint8_t>& mask) {
@@ -215,7 +219,8 @@ void require_proportions(const std::string& origin, const Tensor<uint8_t>& mask,
 }
 
 void require_white(const std::string& origin, double covered) {
-  if (!(covered > 0)) throw InputError(origin, "masks", "nothing white in any", "the moving object white");
+  if (!(covered > 0))
+    throw InputError(origin, "masks", "nothing that moves in any", "the moving object white");
 }
 
 double share_of(const Tensor<uint8_t>& mask) {

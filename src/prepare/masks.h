@@ -51,7 +51,7 @@ Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_
 // rotated or cropped.
 void require_proportions(const std::string& origin, const Tensor<uint8_t>& mask, const std::string& picture,
                          double width, double height);
-// Throws InputError for masks that cover nothing: their white may be a darker grey.
+// Throws InputError for masks that cover nothing: their white may be a darker grey in a film or JPEG files.
 void require_white(const std::string& origin, double covered);
 // The fraction of ones.
 double share_of(const Tensor<uint8_t>& mask);

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "base/options.h"
+#include "prepare/mask_white.h"
 
 namespace traceflow::prepare {
 
@@ -34,6 +35,7 @@ struct PrepareOptions {
   double end = 0;
   int size = 960;
   std::string masks = "estimate";
+  MaskWhite mask_white = MaskWhite::automatic;
   Matcher matcher = Matcher::automatic;
   int overlap = 10;
   int features = 4096;
@@ -53,7 +55,10 @@ struct PrepareOptions {
     v.field("end", end, "s", "End of the part of the video to use; 0: the end of the video.");
     v.field("size", size, "pixels", "Longest side of the images; larger images are scaled down.");
     v.field("masks", masks, "",
-            "Masks of what moves: estimate, none, or a folder or video with the moving object in white.");
+            "Masks of what moves: estimate, none, or a folder or video, in white and black or with labels of "
+            "the moving objects.");
+    v.field("mask_white", mask_white, "",
+            "What is white in the supplied masks; automatic: determined from the border of the images.");
     v.field("matcher", matcher, "",
             "Pairs of frames to compare: sequential (near in time), exhaustive (all), or automatic "
             "(exhaustive up to 80 frames).");

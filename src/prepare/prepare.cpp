@@ -172,7 +172,7 @@ class Preparation {
       throw InputError("option", "masks", options_.masks + ", which does not exist",
                        "estimate, none, a folder or a film");
     }
-    return {{"masks", identity_of(options_.masks)}};
+    return {{"masks", identity_of(options_.masks)}, {"mask_white", static_cast<int>(options_.mask_white)}};
   }
 
   std::string finish() {

@@ -242,11 +242,12 @@ class PrepareTest : public testing::Test {
   fs::path write_masks(int width, int height, const std::string& name = "mine") const {
     fs::create_directory(folder_ / name);
     for (int i = 0; i < frames; ++i) {
-      const std::string file = folder_ / name / fmt::format("{:06}.png", i);
-      write_still(file);
-      std::ofstream grey(file + ".pgm", std::ios::binary);
-      grey << "P5\n" << width << " " << height << "\n255\n";
-      for (int k = 0; k < width * height; ++k) grey.put(k % width < width / 2 ? '\xff' : '\0');
+      const std::string file = fmt::format("{:06}.png", i), hidden = folder_ / name / ("." + file);
+      write_still(hidden);
+      std::ofstream(folder_ / name / file) << "a picture";
+      std::ofstream colour(hidden + ".ppm", std::ios::binary);
+      colour << "P6\n" << width << " " << height << "\n255\n";
+      for (int k = 0; k < 3 * width * height; ++k) colour.put(k / 3 % width < width / 2 ? '\xff' : '\0');
     }
     return folder_ / name;
   }
