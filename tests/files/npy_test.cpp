@@ -101,6 +101,15 @@ TEST(Npy, every_type_widens_to_float) {
   }
 }
 
+TEST(Npy, names_of_an_archives_arrays) {
+  const TempFolder folder;
+  const Tensor<float> array({2});
+  write_npz(folder / "a.npz", {{"tracks", &array}, {"visibility", &array}});
+  EXPECT_EQ(names_in_npz(folder / "a.npz"), (std::vector<std::string>{"tracks", "visibility"}));
+  write_npy(folder / "a.npy", array);
+  EXPECT_THROW(names_in_npz(folder / "a.npy"), InputError);
+}
+
 TEST(Npy, versions_two_and_three_scalars_and_python_2_shapes) {
   const TempFolder folder;
   for (const int version : {1, 2, 3}) {

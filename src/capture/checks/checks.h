@@ -30,5 +30,9 @@ void check_neighbours(const Capture& capture, const std::vector<ViewFacts>& fact
 void check_masks(const std::vector<ViewFacts>& facts, Findings& findings);
 // Finds views with too few priors and views whose priors are rotated against the geometry.
 void check_priors(const std::vector<ViewFacts>& facts, Findings& findings);
+// Finds tracks that contradict the cameras. Places on masks are left out, since what moves may contradict
+// them.
+Inspection::Tracks check_tracks(const Capture& capture, const std::vector<ViewFacts>& facts,
+                                Findings& findings);
 
 }  // namespace traceflow

@@ -180,6 +180,7 @@ Inspection inspect(const Capture& capture, bool quick) {
   if (!quick) check_neighbours(capture, facts, result.findings);
   check_masks(facts, result.findings);
   check_priors(facts, result.findings);
+  result.tracks = check_tracks(capture, facts, result.findings);
   std::ranges::stable_sort(result.findings, {}, &Finding::severity);
   return result;
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,16 @@ struct Inspection {
     double unseen = 0;   // in the image of no view
     double behind = 0;   // behind every camera
   };
+  // How the point tracks agree with the cameras. Places of a point in two views a fixed number of views apart
+  // are compared.
+  struct Tracks {
+    int64_t points = 0;
+    double views = 0;      // that see a point, in the mean
+    int64_t compared = 0;  // pairs of places off the masks
+    // Shares of the pairs that agree or lie on masks, and of those off the masks that agree; none where there
+    // are too few.
+    std::optional<double> consistent, agreeing;
+  };
 
   Split train, test;
   std::map<std::pair<int, int>, int64_t> sizes;  // width, height → views
@@ -48,6 +59,7 @@ struct Inspection {
   Vec3<double> points_low{0}, points_high{0};
   Sight sight;
   Pixels pixels;
+  Tracks tracks;
   std::vector<std::string> missing;  // optional parts that the capture does not have
   std::vector<Finding> findings;     // from loading and from all checks; problems first
 };

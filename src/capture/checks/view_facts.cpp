@@ -75,6 +75,32 @@ void measure_prior(const Capture& capture, const Tensor<uint8_t>& mask, const Su
   if (samples >= enough) facts.prior_angle = glm::degrees(sum / static_cast<double>(samples));
 }
 
+// Edges of masks are less exact than tracks.
+bool is_beside(const Tensor<uint8_t>& mask, const Vec2<float>& at) {
+  constexpr int64_t margin = 2;  // pixels
+  const auto x = static_cast<int64_t>(std::floor(at.x)), y = static_cast<int64_t>(std::floor(at.y));
+  for (int64_t j = std::max<int64_t>(0, y - margin); j <= std::min(mask.dim(0) - 1, y + margin); ++j) {
+    for (int64_t i = std::max<int64_t>(0, x - margin); i <= std::min(mask.dim(1) - 1, x + margin); ++i) {
+      if (mask(j, i) != 0) return true;
+    }
+  }
+  return false;
+}
+
+void measure_tracks(const Capture& capture, const Tensor<uint8_t>& mask, ViewFacts& facts) {
+  const PointTracks& tracks = capture.tracks;
+  const auto view =
+      std::ranges::find_if(capture.train, [&](const View& other) { return &other == facts.view; });
+  if (tracks.empty() || mask.empty() || view == capture.train.end()) return;
+  const auto row = std::distance(capture.train.begin(), view);
+  facts.track_on_mask.resize(static_cast<size_t>(tracks.count()));
+  for (int64_t n = 0; n < tracks.count(); ++n) {
+    if (tracks.seen(row, n) == 0) continue;
+    const Vec3<float> direction(tracks.direction(row, n, 0), tracks.direction(row, n, 1), 1);
+    facts.track_on_mask[static_cast<size_t>(n)] = is_beside(mask, view->camera.project(direction)) ? 1 : 0;
+  }
+}
+
 void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& facts) {
   const ViewSource& source = capture.images->source(facts.view->id);
   const Tensor<uint8_t> colour = decode_colour(source).colour;
@@ -87,6 +113,7 @@ void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& fa
     const auto on = std::ranges::count(mask.values(), 1);
     facts.masked = static_cast<double>(on) / static_cast<double>(mask.size());
   }
+  measure_tracks(capture, mask, facts);
   if (source.has_prior()) measure_prior(capture, mask, surface, facts);
   load_truth(capture, *facts.view);
 }

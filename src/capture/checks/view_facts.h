@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "capture/capture.h"
 #include "capture/surface_points.h"
@@ -20,6 +21,9 @@ struct ViewFacts {
   std::optional<double> masked, with_prior;   // fractions of the pixels
   std::optional<double> noise, masked_noise;  // standard deviations in 8-bit levels, of all and in the mask
   std::optional<double> prior_angle;  // degrees: mean angle to planes through the points, outside the mask
+  // For each point of the tracks whether the view sees it on the mask or beside it; empty without a mask or
+  // tracks, and for test views.
+  std::vector<uint8_t> track_on_mask;
 };
 
 // Decodes the view, without the cache.

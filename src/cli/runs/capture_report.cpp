@@ -103,10 +103,14 @@ void print_extras(const Capture& capture, const Inspection& found) {
                         : ""));
   }
   if (!capture.tracks.empty()) {
-    const PointTracks& tracks = capture.tracks;
-    const auto seen = std::ranges::count(tracks.seen.values(), 1);
-    row("tracks", fmt::format("{} points, a view sees {:.0f} of them", tracks.count(),
-                              static_cast<double>(seen) / static_cast<double>(capture.train.size())));
+    const Inspection::Tracks& tracks = found.tracks;
+    std::string text = fmt::format("{} points, each seen by {:.0f} of {} views", tracks.points, tracks.views,
+                                   capture.train.size());
+    if (tracks.consistent) {
+      text += fmt::format("; {:.0f}% agree with the cameras{}", 100 * *tracks.consistent,
+                          capture.has_masks ? " or lie on masks" : "");
+    }
+    row("tracks", text);
   }
 }
 
@@ -167,6 +171,15 @@ nlohmann::json points_json(const Capture& capture, const Inspection& found) {
           {"in_view", found.sight.in_view},
           {"unseen", found.sight.unseen},
           {"behind", found.sight.behind}};
+}
+
+nlohmann::json tracks_json(const Inspection::Tracks& tracks) {
+  if (tracks.points == 0) return nullptr;
+  return {{"points", tracks.points},
+          {"views_per_point", tracks.views},
+          {"consistent", to_json(tracks.consistent)},
+          {"compared_off_masks", tracks.compared},
+          {"agreeing_off_masks", to_json(tracks.agreeing)}};
 }
 
 nlohmann::json decoded_json(const Inspection::Pixels& pixels) {
@@ -235,6 +248,7 @@ nlohmann::json report_json(const Capture& capture, const Inspection& found, cons
           {"prior_axes",
            capture.has_normal_priors ? nlohmann::json(prior_axes_name(capture.prior_axes)) : nullptr},
           {"tracked_points", capture.tracks.count()},
+          {"tracks", tracks_json(found.tracks)},
           {"decoded", decoded_json(found.pixels)},
           {"memory",
            {{"decoded_bytes", found.decoded_bytes},
