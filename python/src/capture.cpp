@@ -108,6 +108,8 @@ void add_view(py::module_& module) {
              "H×W float32 in [0, 1], the share of a pixel that the mask covers.");
   add_pixels(kind, "normal", &ViewImages::normal_prior,
              "Prior normals, H×W×3 float32, world axes, unit; zero where there is none.");
+  add_pixels(kind, "depth", &ViewImages::depth_prior,
+             "Prior depths along the camera's z, H×W float32, scene units; 0 if unknown.");
   add_truth(kind, "true_normal", &ViewTruth::normal,
             "True normals, H×W×3 float32, world axes, unit or zero.");
   add_truth(kind, "true_depth", &ViewTruth::depth,

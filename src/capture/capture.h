@@ -34,6 +34,7 @@ struct ViewImages {
   Tensor<uint8_t> mask;        // H×W, 1 on the moving specular object
   Tensor<float> coverage;      // H×W in [0, 1], fraction that the mask covers; empty without a mask
   Tensor<float> normal_prior;  // H×W×3, world axes, unit or zero (no prior)
+  Tensor<float> depth_prior;   // H×W, camera z in scene units, 0 if unknown
 };
 
 // Ground truth that synthetic captures have for test views.
@@ -64,6 +65,7 @@ struct Capture {
   bool masks_are_found = false;
   int64_t found_masks = 0;  // number of masks that training found and gave to views
   bool has_normal_priors = false;
+  bool has_depth_priors = false;
   bool has_truth = false;
   PriorAxes prior_axes = PriorAxes::opengl;  // the axes in use, never `automatic`
   std::vector<Finding> warnings;             // what looks wrong

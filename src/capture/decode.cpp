@@ -51,14 +51,18 @@ Tensor<float> read_normal_image(const TreeFile& file) {
   return normals_of_picture(read_image16(file.open()), file.name());
 }
 
-Tensor<float> read_depth(const TreeFile& file) {
-  const NpyFile array(file.open());
+NpyFile open_depth(const TreeFile& file) {
+  NpyFile array(file.open());
   const Shape& shape = array.shape();
   if (shape.elements() == 0 || !(shape.rank() == 2 || (shape.rank() == 3 && shape[2] == 1)))
     throw InputError(file.name(), "shape", shape.to_string(), "H×W");
   if (!is_image_size(shape[1], shape[0]))
     throw InputError(file.name(), "shape", shape.to_string(), image_size_limits, "scale the depths down");
-  const Tensor<float> depth = array.read();
+  return array;
+}
+
+Tensor<float> read_depth(const TreeFile& file) {
+  const Tensor<float> depth = open_depth(file).read();
   constexpr float farthest = 1e6F;
   Tensor<float> result({depth.dim(0), depth.dim(1), 1});
   for (int64_t i = 0; i < depth.size(); ++i) {
@@ -132,6 +136,11 @@ Tensor<float> normals_of_picture(const Tensor<uint16_t>& picture, const std::str
   return normals;
 }
 
+Vec2<double> depth_size(const TreeFile& file) {
+  const Shape shape = open_depth(file).shape();
+  return {static_cast<double>(shape[1]), static_cast<double>(shape[0])};
+}
+
 DecodedColour decode_colour(const ViewSource& view) {
   const Tensor<uint8_t> pixels = read_image(view.image.open());
   if (pixels.dim(1) != static_cast<int64_t>(view.lens.width) ||
@@ -166,6 +175,10 @@ DecodedMask decode_mask(const ViewSource& view) {
 Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture) {
   return normals_on_view_grid(view, view.prior_slice >= 0 ? capture.prior_array->slice(view.prior_slice)
                                                           : read_normal_image(view.prior));
+}
+
+Tensor<float> decode_depth(const ViewSource& view, const CaptureSource& capture) {
+  return depth_on_view_grid(view, read_depth(view.depth), static_cast<float>(capture.scale));
 }
 
 ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture) {

@@ -18,8 +18,13 @@ struct DecodedMask {
   Tensor<uint8_t> coverage;  // H×W, 255 if the mask covers the whole pixel
 };
 DecodedMask decode_mask(const ViewSource& view);
+// Width and height of a file of depths. Throws InputError unless it is H×W or H×W×1 and no larger than
+// images.
+Vec2<double> depth_size(const TreeFile& file);
 // H×W×3 in the prior's own axes, unit or zero (no prior).
 Tensor<float> decode_prior(const ViewSource& view, const CaptureSource& capture);
+// H×W, camera z in scene units, 0 if unknown. The view has a depth prior.
+Tensor<float> decode_depth(const ViewSource& view, const CaptureSource& capture);
 ViewTruth decode_truth(const ViewSource& view, const CaptureSource& capture);
 
 // The normals 2v − 1 of an image H×W×C (C ≥ 3) with values v; zero if the colour means "none". H×W×3, not

@@ -89,7 +89,8 @@ int64_t ImageCache::bytes() const {
 int64_t ImageCache::bytes_of(const std::string& id) const {
   const ViewSource& view = source(id);
   return view.width() * view.height() *
-         (3 + (view.transparent_is_unknown ? 1 : 0) + (has_mask(id) ? 2 : 0) + (view.has_prior() ? 6 : 0));
+         (3 + (view.transparent_is_unknown ? 1 : 0) + (has_mask(id) ? 2 : 0) + (view.has_prior() ? 6 : 0) +
+          (view.depth ? 4 : 0));
 }
 
 std::shared_ptr<const ViewPixels> ImageCache::load(const std::string& id) {
@@ -122,6 +123,7 @@ ViewPixels ImageCache::decode(const std::string& id) const {
     turn_to_world(normals, view, capture_.prior_signs);
     pixels.normal_prior = narrow(normals);
   }
+  if (view.depth) pixels.depth_prior = decode_depth(view, capture_);
   return pixels;
 }
 

@@ -60,6 +60,7 @@ class Assembly {
     take_points();
     find_masks();
     find_priors();
+    find_depths();
     find_tracks();
     find_truth();
     choose_axes();
@@ -371,6 +372,20 @@ class Assembly {
       if (found != sources_.end()) found->second.prior_slice = static_cast<int64_t>(i);
     }
     capture_.has_normal_priors = true;
+  }
+
+  void find_depths() {
+    const std::string scale = std::to_string(found_.images.stored) + "x";
+    for (auto& [id, source] : sources_) {
+      source.depth = first_file({"depth/" + scale + "/" + id + ".npy", "depth/1x/" + id + ".npy"});
+      capture_.has_depth_priors |= static_cast<bool>(source.depth);
+    }
+    const auto has = [](const ViewSource& source) { return static_cast<bool>(source.depth); };
+    warn_if_partial(capture_.train, ids_without(capture_.train, sources_, has),
+                    "training views have no depth prior", "missing-prior");
+    warn_about_proportions("depth prior", "prior-size", [](const ViewSource& source) {
+      return source.depth ? std::optional(depth_size(source.depth)) : std::nullopt;
+    });
   }
 
   void find_tracks() {

@@ -12,6 +12,7 @@ void widen(const ViewPixels& pixels, const std::optional<Mat3<float>>& prior_tur
   images.colour.place(device).resize(pixels.colour.shape());
   images.known = pixels.known;
   images.mask = pixels.mask;
+  images.depth_prior = pixels.depth_prior;
   images.coverage.place(device).resize(with_coverage ? pixels.coverage.shape() : Shape{0});
   images.normal_prior.place(device).resize(pixels.normal_prior.shape());
   constexpr int64_t grain = 16384;

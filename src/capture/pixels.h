@@ -14,14 +14,16 @@ struct ViewPixels {
   Tensor<uint8_t> mask;          // H×W
   Tensor<uint8_t> coverage;      // H×W, 255 if the mask covers the whole pixel
   Tensor<int16_t> normal_prior;  // H×W×3, unit normals times 32767
+  Tensor<float> depth_prior;     // H×W, camera z in scene units, 0 if unknown
 
   int64_t bytes() const {
-    return colour.size() + known.size() + mask.size() + coverage.size() + 2 * normal_prior.size();
+    return colour.size() + known.size() + mask.size() + coverage.size() + 2 * normal_prior.size() +
+           4 * depth_prior.size();
   }
   // The same pixels on a device.
   ViewPixels on(Device device) const {
-    return {colour.on(device), known.on(device), mask.on(device), coverage.on(device),
-            normal_prior.on(device)};
+    return {colour.on(device),   known.on(device),        mask.on(device),
+            coverage.on(device), normal_prior.on(device), depth_prior.on(device)};
   }
 };
 

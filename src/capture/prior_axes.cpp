@@ -29,7 +29,7 @@ struct Sums {
 };
 
 void add_view(const PriorView& view, const SurfacePoints& points, Sums& sums) {
-  points.for_each_visible(view.camera, [&](const Vec2<float>& at, const Vec3<double>& truth) {
+  points.for_each_visible(view.camera, [&](const Vec2<float>& at, float, const Vec3<double>& truth) {
     const Vec3<double> prior =
         load3<double>(&view.normal(static_cast<int64_t>(at.y), static_cast<int64_t>(at.x), 0));
     if (prior != Vec3<double>(0)) sums.add(prior, truth);

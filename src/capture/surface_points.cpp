@@ -98,7 +98,7 @@ SurfacePoints::SurfacePoints(const Tensor<float>& points) {
 
 void SurfacePoints::for_each_visible(
     const Camera<float>& camera,
-    const std::function<void(const Vec2<float>& pixel, const Vec3<double>& normal)>& f) const {
+    const std::function<void(const Vec2<float>& pixel, float depth, const Vec3<double>& normal)>& f) const {
   if (empty()) return;
   const DepthCells cells(camera, points_);
   for (int64_t i = 0; i < points_.dim(0); ++i) {
@@ -106,7 +106,7 @@ void SurfacePoints::for_each_visible(
     Vec2<float> at;
     if (!cells.sees(x, at) || cells.hides(at, x.z)) continue;
     const Vec3<double> normal(camera.camera_from_world * load3<float>(normals_.row(i)));
-    if (normal != Vec3<double>(0)) f(at, dot(normal, Vec3<double>(x)) > 0 ? -normal : normal);
+    if (normal != Vec3<double>(0)) f(at, x.z, dot(normal, Vec3<double>(x)) > 0 ? -normal : normal);
   }
 }
 

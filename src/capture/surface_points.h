@@ -15,11 +15,11 @@ class SurfacePoints {
   explicit SurfacePoints(const Tensor<float>& points);
 
   bool empty() const { return points_.empty(); }
-  // Calls f(pixel, normal) for each point that has a normal, is in the image and is not hidden by a nearer
-  // point. The normal is unit, in camera space and turned to the viewer.
+  // Calls f for each point that has a normal, is in the image and is not hidden by a nearer point. depth: its
+  // camera z. The normal is unit, in camera space and turned to the viewer.
   void for_each_visible(
       const Camera<float>& camera,
-      const std::function<void(const Vec2<float>& pixel, const Vec3<double>& normal)>& f) const;
+      const std::function<void(const Vec2<float>& pixel, float depth, const Vec3<double>& normal)>& f) const;
 
  private:
   Tensor<float> points_;   // P×3; empty if there are too few for planes

@@ -11,7 +11,7 @@ namespace traceflow {
 
 // Where a view's pixels come from and how they are processed. Files are false if the capture lacks them.
 struct ViewSource {
-  TreeFile image, mask, prior, truth_normal, truth_depth;
+  TreeFile image, mask, prior, depth, truth_normal, truth_depth;
   bool mask_is_inverted = false;  // NeRF-DS's resized_mask: black = object
   int64_t prior_slice = -1;       // element of the capture's array of priors; −1 if there is no array
   Lens lens;                      // of the stored image

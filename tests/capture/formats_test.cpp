@@ -3,6 +3,7 @@
 
 #include "capture/pixels.h"
 #include "fake_formats.h"
+#include "files/npy.h"
 #include "loaded_capture.h"
 
 namespace traceflow {
@@ -112,7 +113,11 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
   fake.dataset = {{"ids", {"not looked at"}}};
   fake.save();
   fake.write_text("extra.json", R"({"factor": 2})");
-  fake.write_text("depth/1x/0_00000.npy", "x");
+  Tensor<float> depth({8, 12, 1});
+  depth.fill(3);
+  std::filesystem::create_directories(fake.path() / "depth/1x");
+  write_npy(fake.path() / "depth/1x/0_00000.npy", depth);
+  fake.write_text("covisible/1x/val/1_00000.png", "x");
   const auto save = [&] {
     for (const auto& [name, split] : splits) fake.write_text("splits/" + name + ".json", split.dump());
   };
@@ -124,7 +129,8 @@ TEST(DyCheckCapture, splits_give_views_and_times) {
   EXPECT_FLOAT_EQ(capture.test[2].time, 2.0F / 3);
   EXPECT_EQ(capture.images->source("1_00002").rig_camera, "1");
   EXPECT_EQ(capture.normalisation.scale, 0.5);
-  EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "depth/ is not used")));
+  EXPECT_THAT(capture.warnings, Contains(tells("not-used", Severity::notice, "covisible/ is not used")));
+  EXPECT_FLOAT_EQ(load_images(capture, capture.train[0])->depth_prior(4, 6), 1.5) << "of the depth camera";
 
   const std::pair<std::function<void()>, const char*> cases[] = {
       {[&] { splits["val"]["time_ids"].erase(0); },

@@ -497,5 +497,40 @@ TEST(Truth, is_read_in_scene_units_and_on_the_views_grid) {
   EXPECT_TRUE(load_truth(capture, capture.test[1]).normal.empty());
 }
 
+// A view's prior is read as its truth is.
+TEST(DepthPriors, are_read_like_true_depths) {
+  NerfDsCapture fake;
+  Tensor<float> depth({8, 12, 1});
+  for (int64_t i = 0; i < depth.size(); ++i) depth[i] = static_cast<float>(i % 7) - 1;
+  for (const char* folder : {"truth/depth", "depth/1x"}) {
+    std::filesystem::create_directories(fake.path() / folder);
+    write_npy(fake.path() / folder / "000000_left.npy", depth);
+  }
+  fake.save();
+  CaptureOptions options;
+  options.downscale = 2;
+  const Capture capture = load_capture(fake.path(), options);
+  EXPECT_TRUE(capture.has_depth_priors);
+  const auto images = load_images(capture, capture.train[0]);
+  const Tensor<float> expected = load_truth(capture, capture.train[0]).depth;
+  ASSERT_EQ(images->depth_prior.shape(), expected.shape());
+  EXPECT_EQ(images->depth_prior.values().size(), 24U);
+  for (int64_t i = 0; i < 24; ++i) EXPECT_EQ(images->depth_prior[i], expected[i]);
+  EXPECT_TRUE(load_images(capture, capture.train[1])->depth_prior.empty());
+  const std::shared_ptr<const ViewPixels> pixels = load_pixels(capture, capture.train[0]);
+  EXPECT_EQ(capture.images->bytes_of(capture.train[0].id), pixels->bytes());
+  EXPECT_TRUE(std::ranges::any_of(capture.warnings, [](const Finding& finding) {
+    return finding.kind == "missing-prior" && finding.text.find("depth") != std::string::npos;
+  }));
+}
+
+TEST(DepthPriors, of_another_shape_are_refused_when_the_capture_is_opened) {
+  NerfDsCapture fake;
+  std::filesystem::create_directories(fake.path() / "depth/1x");
+  write_npy(fake.path() / "depth/1x/000000_left.npy", Tensor<float>({8, 12, 3}));
+  fake.save();
+  EXPECT_THROW(load_capture(fake.path(), {}), InputError);
+}
+
 }  // namespace
 }  // namespace traceflow

@@ -35,4 +35,7 @@ void check_priors(const std::vector<ViewFacts>& facts, Findings& findings);
 Inspection::Tracks check_tracks(const Capture& capture, const std::vector<ViewFacts>& facts,
                                 Findings& findings);
 
+// Finds depth priors that disagree with the points, in all views or in some.
+void check_depths(const std::vector<ViewFacts>& facts, Findings& findings);
+
 }  // namespace traceflow

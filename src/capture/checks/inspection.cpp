@@ -23,6 +23,7 @@ Inspection::Split inspect_split(const Capture& capture, const std::vector<View>&
     ++split.views;
     split.masks += source.mask ? 1 : 0;
     split.normal_priors += source.has_prior() ? 1 : 0;
+    split.depth_priors += source.depth ? 1 : 0;
     split.truth_normals += source.truth_normal ? 1 : 0;
     split.truth_depths += source.truth_depth ? 1 : 0;
     times.insert(view.time);
@@ -109,7 +110,8 @@ std::vector<ViewFacts> measure_views(const Capture& capture, bool quick) {
     const auto chosen = spread(*split, quick ? quick_views : static_cast<int64_t>(split->size()));
     views.insert(views.end(), chosen.begin(), chosen.end());
   }
-  const SurfacePoints surface(capture.has_normal_priors ? capture.points : Tensor<float>());
+  const bool compares = capture.has_normal_priors || capture.has_depth_priors;
+  const SurfacePoints surface(compares ? capture.points : Tensor<float>());
   std::vector<ViewFacts> facts(views.size());
   parallel_for(
       "inspect: views", static_cast<int64_t>(views.size()),
@@ -154,6 +156,9 @@ Inspection::Pixels sum_up(const std::vector<ViewFacts>& facts) {
   pixels.noise = root_mean_square(values_of(facts, [](const ViewFacts& v) { return v.noise; }));
   pixels.masked_noise = root_mean_square(values_of(facts, [](const ViewFacts& v) { return v.masked_noise; }));
   pixels.prior_angle = median(values_of(facts, [](const ViewFacts& v) { return v.prior_angle; }));
+  pixels.with_depth = mean(values_of(facts, [](const ViewFacts& v) { return v.with_depth; }));
+  pixels.depth_error = median(values_of(facts, [](const ViewFacts& v) { return v.depth_error; }));
+  pixels.depth_drift = robust_deviation(values_of(facts, [](const ViewFacts& v) { return v.depth_scale; }));
   return pixels;
 }
 
@@ -181,6 +186,7 @@ Inspection inspect(const Capture& capture, bool quick) {
   check_masks(facts, result.findings);
   check_priors(facts, result.findings);
   result.tracks = check_tracks(capture, facts, result.findings);
+  check_depths(facts, result.findings);
   std::ranges::stable_sort(result.findings, {}, &Finding::severity);
   return result;
 }

@@ -14,7 +14,7 @@ namespace traceflow {
 // The results of `traceflow inspect` (docs/inspect.md).
 struct Inspection {
   struct Split {
-    int64_t views = 0, masks = 0, normal_priors = 0, truth_normals = 0, truth_depths = 0;
+    int64_t views = 0, masks = 0, normal_priors = 0, depth_priors = 0, truth_normals = 0, truth_depths = 0;
     int64_t times = 0;  // number of different times
     double first_time = 0, last_time = 0;
   };
@@ -28,6 +28,10 @@ struct Inspection {
     double noise = 0, masked_noise = 0;
     double prior_angle =
         0;  // degrees, median over the views, of the angle to planes through the points; 0: unknown
+    double with_depth = 0;
+    // Of depth priors against the points: the median error, and the standard deviation of the views' scale;
+    // relative, 0: unknown.
+    double depth_error = 0, depth_drift = 0;
   };
   // Visibility of a sample of the points in the training views. Shares are of points.
   struct Sight {

@@ -14,6 +14,9 @@ constexpr double wide_angle = 60;    // degrees, over all views; random directio
 // Limits for one view against the median of all: degrees, and deviations.
 constexpr double odd_angle = 15;
 constexpr double odd_deviations = 6;
+// Relative errors of depths: of half of the views, and of one view against the median of all.
+constexpr double wrong_depth = 0.25;
+constexpr double odd_depth = 0.15;
 
 void check_empty(const std::vector<ViewFacts>& facts, Findings& findings) {
   std::vector<std::string> empty;
@@ -77,6 +80,40 @@ void check_angles(const std::vector<ViewFacts>& facts, Findings& findings) {
 void check_priors(const std::vector<ViewFacts>& facts, Findings& findings) {
   check_empty(facts, findings);
   check_angles(facts, findings);
+}
+
+void check_depths(const std::vector<ViewFacts>& facts, Findings& findings) {
+  std::vector<double> errors;
+  for (const ViewFacts& view : facts) {
+    if (view.depth_error) errors.push_back(*view.depth_error);
+  }
+  const double usual = median(errors);
+  if (usual > wrong_depth) {
+    Finding& finding = findings.emplace_back(
+        fmt::format("the depth priors are {:.0f}% off the points, in half of the views or more", 100 * usual),
+        "depth-disagrees");
+    finding.value = usual;
+    finding.threshold = wrong_depth;
+    return;
+  }
+  if (errors.size() < fewest_views) return;
+  const double limit = usual + std::max(odd_depth, odd_deviations * robust_deviation(errors));
+  std::vector<std::string> odd;
+  double worst = 0;
+  for (const ViewFacts& view : facts) {
+    if (!view.depth_error || *view.depth_error <= limit) continue;
+    odd.push_back(view.view->id);
+    worst = std::max(worst, *view.depth_error);
+  }
+  if (odd.empty()) return;
+  Finding& finding = findings.emplace_back(
+      fmt::format("{} depth {} with the geometry ({}): up to {:.0f}% off the points, where {:.0f}% is usual",
+                  odd.size(), odd.size() == 1 ? "prior disagrees" : "priors disagree", ids_text(odd),
+                  100 * worst, 100 * usual),
+      "depth-disagrees");
+  finding.views = std::move(odd);
+  finding.value = worst;
+  finding.threshold = limit;
 }
 
 }  // namespace traceflow

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/robust.h"
 #include "capture/decode.h"
 #include "capture/image_cache.h"
 #include "capture/lens/resample.h"
@@ -64,7 +65,7 @@ void measure_prior(const Capture& capture, const Tensor<uint8_t>& mask, const Su
 
   double sum = 0;
   int64_t samples = 0;
-  surface.for_each_visible(facts.view->camera, [&](const Vec2<float>& at, const Vec3<double>& normal) {
+  surface.for_each_visible(facts.view->camera, [&](const Vec2<float>& at, float, const Vec3<double>& normal) {
     const auto y = static_cast<int64_t>(at.y), x = static_cast<int64_t>(at.x);
     if (!mask.empty() && mask(y, x) != 0) return;
     const Vec3<double> direction = shared.prior_signs * load3<double>(&prior(y, x, 0));
@@ -101,6 +102,24 @@ void measure_tracks(const Capture& capture, const Tensor<uint8_t>& mask, ViewFac
   }
 }
 
+void measure_depth(const Capture& capture, const Tensor<uint8_t>& mask, const SurfacePoints& surface,
+                   ViewFacts& facts) {
+  constexpr size_t enough = 30;
+  const Tensor<float> prior = decode_depth(capture.images->source(facts.view->id), capture.images->capture());
+  const auto known = std::ranges::count_if(prior.values(), [](float z) { return z > 0; });
+  facts.with_depth = static_cast<double>(known) / static_cast<double>(prior.size());
+  std::vector<double> ratios, errors;
+  surface.for_each_visible(facts.view->camera, [&](const Vec2<float>& at, float depth, const Vec3<double>&) {
+    const auto y = static_cast<int64_t>(at.y), x = static_cast<int64_t>(at.x);
+    if ((!mask.empty() && mask(y, x) != 0) || !(prior(y, x) > 0)) return;
+    ratios.push_back(prior(y, x) / depth);
+    errors.push_back(std::abs(ratios.back() - 1));
+  });
+  if (ratios.size() < enough) return;
+  facts.depth_scale = median(std::move(ratios));
+  facts.depth_error = median(std::move(errors));
+}
+
 void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& facts) {
   const ViewSource& source = capture.images->source(facts.view->id);
   const Tensor<uint8_t> colour = decode_colour(source).colour;
@@ -115,6 +134,7 @@ void measure(const Capture& capture, const SurfacePoints& surface, ViewFacts& fa
   }
   measure_tracks(capture, mask, facts);
   if (source.has_prior()) measure_prior(capture, mask, surface, facts);
+  if (source.depth) measure_depth(capture, mask, surface, facts);
   load_truth(capture, *facts.view);
 }
 

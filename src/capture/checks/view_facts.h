@@ -20,6 +20,10 @@ struct ViewFacts {
   Tensor<uint8_t> thumbnail;       // grey, H×W
   std::optional<double> masked, with_prior;   // fractions of the pixels
   std::optional<double> noise, masked_noise;  // standard deviations in 8-bit levels, of all and in the mask
+  std::optional<double> with_depth;           // fraction of the pixels with a depth prior
+  std::optional<double>
+      depth_error;  // median relative error of the depth prior at the points outside the mask
+  std::optional<double> depth_scale;  // median of the prior's depth over the points' there
   std::optional<double> prior_angle;  // degrees: mean angle to planes through the points, outside the mask
   // For each point of the tracks whether the view sees it on the mask or beside it; empty without a mask or
   // tracks, and for test views.

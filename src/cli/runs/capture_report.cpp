@@ -33,6 +33,7 @@ void row(const std::string& name, const Inspection::Split& split) {
   const char* between = "; ";
   for (const auto& [count, what] : {std::pair{split.masks, "masks"},
                                     {split.normal_priors, "normal priors"},
+                                    {split.depth_priors, "depth priors"},
                                     {split.truth_normals, "true normals"},
                                     {split.truth_depths, "true depths"}}) {
     if (count == 0) continue;
@@ -102,6 +103,14 @@ void print_extras(const Capture& capture, const Inspection& found) {
                         ? fmt::format(", {:.0f}° from planes through the points", found.pixels.prior_angle)
                         : ""));
   }
+  if (capture.has_depth_priors) {
+    row("depth priors",
+        fmt::format("on {:.1f}% of the pixels{}", 100 * found.pixels.with_depth,
+                    found.pixels.depth_error > 0
+                        ? fmt::format(", {:.1f}% off the points; the scale varies by {:.1f}% between views",
+                                      100 * found.pixels.depth_error, 100 * found.pixels.depth_drift)
+                        : ""));
+  }
   if (!capture.tracks.empty()) {
     const Inspection::Tracks& tracks = found.tracks;
     std::string text = fmt::format("{} points, each seen by {:.0f} of {} views", tracks.points, tracks.views,
@@ -132,6 +141,7 @@ nlohmann::json to_json(const Inspection::Split& split) {
   return {{"views", split.views},
           {"masks", split.masks},
           {"normal_priors", split.normal_priors},
+          {"depth_priors", split.depth_priors},
           {"truth_normals", split.truth_normals},
           {"truth_depths", split.truth_depths},
           {"times", split.times},
@@ -189,7 +199,10 @@ nlohmann::json decoded_json(const Inspection::Pixels& pixels) {
           {"with_prior", pixels.with_prior},
           {"noise", pixels.noise > 0 ? nlohmann::json(pixels.noise / 255) : nullptr},
           {"masked_noise", pixels.masked_noise > 0 ? nlohmann::json(pixels.masked_noise / 255) : nullptr},
-          {"prior_angle_degrees", pixels.prior_angle > 0 ? nlohmann::json(pixels.prior_angle) : nullptr}};
+          {"prior_angle_degrees", pixels.prior_angle > 0 ? nlohmann::json(pixels.prior_angle) : nullptr},
+          {"with_depth", pixels.with_depth},
+          {"depth_error", pixels.depth_error > 0 ? nlohmann::json(pixels.depth_error) : nullptr},
+          {"depth_drift", pixels.depth_error > 0 ? nlohmann::json(pixels.depth_drift) : nullptr}};
 }
 
 }  // namespace

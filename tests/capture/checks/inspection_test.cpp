@@ -59,6 +59,48 @@ TEST(Inspect, counts_what_is_there) {
   EXPECT_TRUE(found.missing.empty()) << found.missing.front();
 }
 
+// A wall of points, and depths that are right, of another scale in one view, or wrong everywhere.
+TEST(Inspect, judges_depth_priors_by_the_points) {
+  NerfDsCapture fake(8);
+  Tensor<float> points({1600, 3});
+  for (int64_t i = 0; i < 1600; ++i) {
+    points(i, 0) = 0.1F * static_cast<float>(i % 40) - 2;
+    points(i, 1) = 0.1F * static_cast<float>(i / 40) - 2;
+    points(i, 2) = 6;
+  }
+  write_npy(fake.path() / "points.npy", points);
+  fake.save();
+  const auto with = [&](const std::function<float(int view)>& factor) {
+    const Capture capture = load_capture(fake.path(), {});
+    std::filesystem::create_directories(fake.path() / "depth/1x");
+    for (int v = 0; v < 8; ++v) {
+      Tensor<float> depth({8, 12});
+      const View& view = capture.train[static_cast<size_t>(v)];
+      const double scale = capture.normalisation.scale;
+      const Vec3<float> wall(capture.normalisation.in_scene({0, 0, 6}));
+      depth.fill(factor(v) * static_cast<float>(view.camera.point_in_camera(wall).z / scale));
+      write_npy(fake.path() / "depth/1x" / (view.id + ".npy"), depth);
+    }
+    return inspect(load_capture(fake.path(), {}));
+  };
+  const auto is_about = [](const Finding& finding) { return finding.kind == "depth-disagrees"; };
+  const Inspection right = with([](int) { return 1.02F; });
+  EXPECT_EQ(right.train.depth_priors, 8);
+  EXPECT_EQ(right.pixels.with_depth, 1);
+  EXPECT_NEAR(right.pixels.depth_error, 0.02, 1e-3);
+  EXPECT_NEAR(right.pixels.depth_drift, 0, 1e-3);
+  EXPECT_FALSE(std::ranges::any_of(right.findings, is_about));
+  const Inspection odd =
+      with([](int view) { return view == 3 ? 1.5F : 1 + 0.01F * static_cast<float>(view); });
+  EXPECT_GT(odd.pixels.depth_drift, 0.01);
+  const auto finding = std::ranges::find_if(odd.findings, is_about);
+  ASSERT_NE(finding, odd.findings.end());
+  EXPECT_EQ(finding->views.size(), 1U);
+  EXPECT_NEAR(*finding->value, 0.5, 1e-3);
+  const Inspection wrong = with([](int) { return 2.0F; });
+  EXPECT_TRUE(std::ranges::any_of(wrong.findings, is_about));
+}
+
 TEST(Inspect, tells_what_is_missing_and_what_looks_wrong) {
   InterpCapture fake(1);
   fake.scene.erase("near");

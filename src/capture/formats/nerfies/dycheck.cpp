@@ -57,10 +57,8 @@ NerfiesLayout read_dycheck_layout(const FileTree& tree, std::vector<Finding>& wa
     warnings.emplace_back("splits/val.json is missing: there is nothing to evaluate on", "no-test",
                           Severity::notice);
   }
-  for (const char* unused : {"depth", "covisible"}) {
-    if (tree.has_folder(unused))
-      warnings.emplace_back(std::string(unused) + "/ is not used", "not-used", Severity::notice);
-  }
+  if (tree.has_folder("covisible"))
+    warnings.emplace_back("covisible/ is not used", "not-used", Severity::notice);
   read_nerfies_scene(tree, layout);
   return layout;
 }
