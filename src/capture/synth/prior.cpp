@@ -20,6 +20,7 @@ constexpr double blur_per_width = 1.3 / 240;                 // standard deviati
 constexpr double fixed_turn = 2.5 * std::numbers::pi / 180;  // of the whole capture
 constexpr double view_turn = 1.5 * std::numbers::pi / 180;   // of one view, standard deviation
 constexpr double warp = 4.0 * std::numbers::pi / 180;        // varies slowly over the image, maximum
+constexpr double depth_warp = 0.04;                          // likewise, of the inverse depth
 
 std::vector<double> gaussian_weights(double deviation) {
   const int radius = static_cast<int>(std::ceil(3 * deviation));
@@ -34,16 +35,18 @@ Tensor<float> blurred(const Tensor<float>& image, const std::vector<double>& wei
   const auto radius = static_cast<int64_t>(weights.size() / 2);
   Tensor<float> result(image.shape());
   parallel_for(
-      "blur normal prior", image.dim(0),
+      "blur prior", image.dim(0),
       [&](int64_t y) {
         for (int64_t x = 0; x < image.dim(1); ++x) {
-          Vector sum(0);
-          for (int64_t k = -radius; k <= radius; ++k) {
-            const int64_t from_y = std::clamp<int64_t>(y + k * step_y, 0, image.dim(0) - 1);
-            const int64_t from_x = std::clamp<int64_t>(x + k * step_x, 0, image.dim(1) - 1);
-            sum += weights[static_cast<size_t>(k + radius)] * load3<double>(&image(from_y, from_x, 0));
+          for (int64_t c = 0; c < image.dim(2); ++c) {
+            double sum = 0;
+            for (int64_t k = -radius; k <= radius; ++k) {
+              const int64_t from_y = std::clamp<int64_t>(y + k * step_y, 0, image.dim(0) - 1);
+              const int64_t from_x = std::clamp<int64_t>(x + k * step_x, 0, image.dim(1) - 1);
+              sum += weights[static_cast<size_t>(k + radius)] * static_cast<double>(image(from_y, from_x, c));
+            }
+            result(y, x, c) = static_cast<float>(sum);
           }
-          store3(&result(y, x, 0), sum);
         }
       },
       16);
@@ -82,6 +85,16 @@ class SlowWarp {
   Wave waves_[waves];
 };
 
+Tensor<float> blurred_as_prior(const SynthOptions& options, const Tensor<float>& image) {
+  const double noise = options.prior_noise;
+  const std::vector<double> weights = gaussian_weights(noise * blur_per_width * options.width);
+  return blurred(blurred(image, weights, 0, 1), weights, 1, 0);
+}
+
+Random random_of(uint64_t key, const SynthView& view) {
+  return Random(synth::combine_bits(key, static_cast<uint64_t>(view.frame) * 2 + (view.is_test ? 1 : 0)));
+}
+
 // From world axes to the priors' camera space: OpenCV's with y and z negated.
 Tensor<float> in_prior_space(const Camera<double>& camera, const Tensor<float>& normal) {
   Tensor<float> result(normal.shape());
@@ -100,12 +113,10 @@ Tensor<float> synth_normal_prior(const SynthOptions& options, const SynthView& v
   const double noise = options.prior_noise;
   if (noise == 0) return prior;
 
-  const std::vector<double> weights = gaussian_weights(noise * blur_per_width * options.width);
-  prior = blurred(blurred(prior, weights, 0, 1), weights, 1, 0);
-
+  prior = blurred_as_prior(options, prior);
   const uint64_t key = synth::combine_bits(static_cast<uint64_t>(options.seed), 0x7072696F72);
   Random of_capture(key);
-  Random of_view(synth::combine_bits(key, static_cast<uint64_t>(view.frame) * 2 + (view.is_test ? 1 : 0)));
+  Random of_view = random_of(key, view);
   const Mat3<double> turn =
       synth::rotation_about(random_axis(of_view), noise * view_turn * of_view.normal()) *
       synth::rotation_about(random_axis(of_capture), noise * fixed_turn);
@@ -121,6 +132,26 @@ Tensor<float> synth_normal_prior(const SynthOptions& options, const SynthView& v
     }
   }
   return prior;
+}
+
+Tensor<float> synth_inverse_depth(const SynthOptions& options, const SynthView& view,
+                                  const Tensor<float>& depth) {
+  Tensor<float> inverse({depth.dim(0), depth.dim(1), 1});
+  for (int64_t i = 0; i < depth.size(); ++i) inverse[i] = 1 / depth[i];
+  if (const double noise = options.prior_noise; noise > 0) {
+    inverse = blurred_as_prior(options, inverse);
+    Random random = random_of(synth::combine_bits(static_cast<uint64_t>(options.seed), 0x6465707468), view);
+    const SlowWarp slow_warp(random, noise * depth_warp);
+    for (int64_t i = 0; i < inverse.size(); ++i) {
+      const auto y = static_cast<double>(i / depth.dim(1)), x = static_cast<double>(i % depth.dim(1));
+      const double error = slow_warp.at(Vec2<double>(x, y) / static_cast<double>(options.width)).x;
+      inverse[i] = static_cast<float>(inverse[i] * (1 + error));
+    }
+  }
+  const auto [least, most] = std::ranges::minmax(inverse.values());
+  for (float& value : inverse.values()) value = (value - least) / (most - least);
+  inverse.resize(depth.shape());
+  return inverse;
 }
 
 }  // namespace traceflow

@@ -32,6 +32,7 @@ struct SynthOptions {
   int samples = 16;
   int test_every = 4;
   float prior_noise = 1;
+  bool estimated_depths = false;
   int points = 10000;
 
   template <class Visitor>
@@ -45,7 +46,12 @@ struct SynthOptions {
     v.field("samples", samples, "paths/pixel", "Light paths per pixel.");
     v.field("test_every", test_every, "frames", "The right (test) camera takes every n-th frame.");
     v.field("prior_noise", prior_noise, "",
-            "Errors of the normal priors: 0 for exact priors, 1 for the errors of a monocular estimator.");
+            "Errors of the normal priors and estimated depths: 0 for exact priors, 1 for the errors of a "
+            "monocular estimator.");
+    v.field(
+        "estimated_depths", estimated_depths, "",
+        "Also write estimates/depth: the training views' depths as an estimator of relative inverse depth "
+        "gives them, for attach-priors --depth.");
     v.field("points", points, "points", "Number of surface points at time 0.");
   }
   void validate() const;
@@ -78,6 +84,11 @@ SynthImages synth_images(const SynthOptions& options, const SynthView& view);
 // the image. H×W×3 in the camera space of normal priors (x right, y up, z to the viewer), unit.
 Tensor<float> synth_normal_prior(const SynthOptions& options, const SynthView& view,
                                  const Tensor<float>& normal);
+
+// A view's depths (H×W) as an estimator of relative inverse depth gives them: inverse depth, blurred and with
+// an error that varies slowly over the image by up to 4 %, scaled so that it covers [0, 1]. H×W.
+Tensor<float> synth_inverse_depth(const SynthOptions& options, const SynthView& view,
+                                  const Tensor<float>& depth);
 
 // Noisy points, P×3 in world, on the surfaces at time 0 that the left camera sees from anywhere on its path.
 Tensor<float> synth_points(const SynthOptions& options);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/atomic_file.h"
@@ -20,7 +21,7 @@ using nlohmann::json;
 
 // The file that marks a folder as a synthetic capture, which may be overwritten.
 constexpr const char* marker = "synth.json";
-constexpr std::array<const char*, 5> subfolders{"rgb", "camera", "mask", "normal", "truth"};
+constexpr std::array<const char*, 6> subfolders{"rgb", "camera", "mask", "normal", "truth", "estimates"};
 
 [[noreturn]] void refuse(const fs::path& folder, const std::string& found) {
   throw InputError(folder.string(), "output folder", found, "an empty folder or an earlier synthetic capture",
@@ -72,6 +73,15 @@ Tensor<uint8_t> mask_picture(const Tensor<uint8_t>& mask) {
   return picture;
 }
 
+// [0, 1] as grey of 16 bits.
+Tensor<uint16_t> depth_picture(const Tensor<float>& inverse_depth) {
+  constexpr float full = 65535;
+  Tensor<uint16_t> picture(inverse_depth.shape());
+  for (int64_t i = 0; i < picture.size(); ++i)
+    picture[i] = static_cast<uint16_t>(std::lround(full * inverse_depth[i]));
+  return picture;
+}
+
 void write_truth(const fs::path& folder, const std::string& id, const SynthImages& images) {
   write_png(folder / "truth/normal" / (id + ".png"), normal_picture(images.normal));
   write_npy(folder / "truth/depth" / (id + ".npy"), images.depth);
@@ -88,6 +98,10 @@ void write_view(const SynthOptions& options, const SynthView& view, const fs::pa
   } else {
     const Tensor<float> prior = synth_normal_prior(options, view, images.normal);
     write_png(folder / "normal/1x" / (view.id + ".png"), normal_picture(prior));
+    if (options.estimated_depths) {
+      write_png(folder / "estimates/depth" / (view.id + ".png"),
+                depth_picture(synth_inverse_depth(options, view, images.depth)));
+    }
   }
 }
 
@@ -105,6 +119,7 @@ std::vector<NerfiesView> layout_of(const std::vector<SynthView>& views) {
 void write_synthetic_capture(const SynthOptions& options, const fs::path& folder) {
   options.validate();
   prepare_folder(folder);
+  if (options.estimated_depths) fs::create_directories(folder / "estimates/depth");
   write_json(folder / marker, as_json(options));
 
   const std::vector<SynthView> views = synth_views(options);

@@ -267,6 +267,33 @@ TEST(SynthPrior, ErrorsAreThoseOfAnEstimatorAndGrowWithTheNoise) {
                          synth_normal_prior(options, view, images.normal)));
 }
 
+TEST(SynthPrior, InverseDepthIsThatOfTheTruthUpToScaleShiftAndErrors) {
+  SynthOptions options = small_options();
+  const SynthView view = synth_views(options)[1];
+  const Tensor<float> depth = synth_images(options, view).depth;
+  const auto [least, most] = std::ranges::minmax(depth.values());
+  double before = 0;
+  for (const float noise : {0.0F, 1.0F, 2.0F}) {
+    options.prior_noise = noise;
+    const Tensor<float> found = synth_inverse_depth(options, view, depth);
+    ASSERT_EQ(found.shape(), depth.shape());
+    const auto [low, high] = std::ranges::minmax(found.values());
+    EXPECT_EQ(low, 0);
+    EXPECT_EQ(high, 1);
+    double error = 0;
+    for (int64_t i = 0; i < depth.size(); ++i) {
+      const double exact = (1 / depth[i] - 1 / most) / (1 / least - 1 / most);
+      error += std::abs(found[i] - exact) / static_cast<double>(depth.size());
+    }
+    EXPECT_LT(error, noise == 0 ? 1e-6 : 0.1 * noise);
+    EXPECT_GE(error, before);
+    before = error;
+  }
+  EXPECT_GT(before, 0.01);
+  EXPECT_TRUE(
+      same_bytes(synth_inverse_depth(options, view, depth), synth_inverse_depth(options, view, depth)));
+}
+
 TEST(SynthOptions, ValidateNamesWhatIsWrong) {
   const auto complains = [](auto change) {
     SynthOptions options;
