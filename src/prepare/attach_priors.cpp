@@ -14,8 +14,11 @@
 #include "capture/decode.h"
 #include "capture/formats/formats.h"
 #include "capture/image_cache.h"
+#include "capture/surface_points.h"
 #include "files/png.h"
 #include "prepare/capture_folder.h"
+#include "prepare/depth_fit.h"
+#include "prepare/depth_source.h"
 #include "prepare/mask_coding.h"
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
@@ -35,10 +38,11 @@ struct Kind {
   const char* name;
   std::vector<const char*> replaced;
 };
-const std::array<Kind, 3> kinds = {{{"normal", {"normal", "normal.npz", "normal.npy"}},
+const std::array<Kind, 4> kinds = {{{"normal", {"normal", "normal.npz", "normal.npy"}},
                                     {"mask", {"mask", "resized_mask"}},
-                                    {"tracks.npy", {"tracks.npy"}}}};
-const Kind &normals_kind = kinds[0], &masks_kind = kinds[1], &tracks_kind = kinds[2];
+                                    {"tracks.npy", {"tracks.npy"}},
+                                    {"depth", {"depth"}}}};
+const Kind &normals_kind = kinds[0], &masks_kind = kinds[1], &tracks_kind = kinds[2], &depth_kind = kinds[3];
 
 // Holds new data until it is complete.
 class Staging {
@@ -214,7 +218,8 @@ void attach_masks(const Capture& capture, const ViewIds& ids, const AttachOption
       },
       [&](const std::string& id, const Tensor<uint8_t>& mask) {
         const Camera<float>& camera = cameras.at(id);
-        require_proportions(options.masks, mask, id, camera.width, camera.height);
+        require_proportions(options.masks, "masks", {mask.dim(1), mask.dim(0)}, id, camera.width,
+                            camera.height);
         covered += share_of(mask) / static_cast<double>(matched.size());
         write_mask(staging / "mask/1x" / (id + ".png.png"), mask);
       });
@@ -249,11 +254,50 @@ void attach_tracks(const Capture& capture, const ViewIds& ids, const AttachOptio
                   static_cast<double>(inside) / static_cast<double>(source.points()), source.assumed()));
 }
 
+void attach_depths(const Capture& capture, const ViewIds& ids, const AttachOptions& options,
+                   const Staging& staging, const Say& say, const std::atomic<bool>& stop) {
+  const DepthSource source(options.depth, staging / "ffmpeg.log", stop);
+  const auto matched = match_views(options.depth, source.names(), source.count(), ids);
+  const auto take = [&](const auto& indices, const auto& f) { source.take(indices, f); };
+  std::map<std::string, const View*> views;
+  for (const auto* split : {&capture.train, &capture.test}) {
+    for (const View& view : *split) views.emplace(view.id, &view);
+  }
+  const SurfacePoints points(capture.points);
+  std::map<std::string, std::vector<DepthSample>> samples;
+  for_each_view(matched, take, [&](const std::string& id, const Tensor<float>& values) {
+    if (stop) throw Stopped{};
+    const Camera<float>& camera = views.at(id)->camera;
+    require_proportions(options.depth, "depth", {values.dim(1), values.dim(0)}, id, camera.width,
+                        camera.height);
+    samples.emplace(id, depth_samples(capture, points, *views.at(id), values));
+  });
+  const DepthFits fits = fit_views(samples, options.depth_kind);
+  if (2 * fits.of_view.size() < matched.size()) {
+    throw InputError(options.depth, "depth",
+                     fmt::format("values that fit the capture's points in {} of {} views",
+                                 fits.of_view.size(), matched.size()),
+                     "most of them",
+                     "check the order of the views; the capture needs points on what stands still");
+  }
+  fs::create_directories(staging / depth_kind.name / "1x");
+  for_each_view(matched, take, [&](const std::string& id, Tensor<float>& values) {
+    if (stop) throw Stopped{};
+    const auto fit = fits.of_view.find(id);
+    if (fit == fits.of_view.end()) return;
+    for (float& value : values.values()) value = static_cast<float>(fit->second.depth_of(value));
+    write_npy(staging / depth_kind.name / "1x" / (id + ".npy"), values);
+  });
+  say(fmt::format("{:<10}{} of {} views, as {} with a scale and a shift for each; {:.1f}% off the points",
+                  "depth", fits.of_view.size(), views.size(),
+                  fits.kind == DepthKind::inverse ? "inverse depth" : "depth", 100 * fits.error()));
+}
+
 }  // namespace
 
 void AttachOptions::validate() const {
-  if (normals.empty() && masks.empty() && tracks.empty())
-    throw InputError("option", "normals", "nothing", "--normals, --masks or --tracks");
+  if (normals.empty() && masks.empty() && tracks.empty() && depth.empty())
+    throw InputError("option", "normals", "nothing", "--normals, --masks, --tracks or --depth");
   if (tracks_width < 0)
     throw InputError("option", "tracks_width", std::to_string(tracks_width), "a number from 0 on");
 }
@@ -316,6 +360,7 @@ void attach_priors(const fs::path& capture, const AttachOptions& options, const 
   if (!options.normals.empty()) refuse_to_replace(capture, normals_kind, options);
   if (!options.masks.empty()) refuse_to_replace(capture, masks_kind, options);
   if (!options.tracks.empty()) refuse_to_replace(capture, tracks_kind, options);
+  if (!options.depth.empty()) refuse_to_replace(capture, depth_kind, options);
   const CaptureOptions size = at_largest_size(capture);
   const Capture loaded = load_capture(capture, size);
   const ViewIds ids = ids_in(loaded, size);
@@ -323,6 +368,7 @@ void attach_priors(const fs::path& capture, const AttachOptions& options, const 
   if (!options.normals.empty()) attach_normals(loaded, ids, options, staging, say, stop);
   if (!options.masks.empty()) attach_masks(loaded, ids, options, staging, say, stop);
   if (!options.tracks.empty()) attach_tracks(loaded, ids, options, staging, say);
+  if (!options.depth.empty()) attach_depths(loaded, ids, options, staging, say, stop);
   staging.move_in();
 }
 

@@ -9,6 +9,7 @@
 
 #include "capture/capture.h"
 #include "capture/prior_axes.h"
+#include "prepare/depth_fit.h"
 #include "prepare/mask_white.h"
 
 namespace traceflow::prepare {
@@ -19,6 +20,8 @@ struct AttachOptions {
   MaskWhite mask_white = MaskWhite::automatic;
   std::string tracks;
   int tracks_width = 0;
+  std::string depth;
+  DepthKind depth_kind = DepthKind::automatic;
   PriorAxes axes = PriorAxes::automatic;
   bool force = false;
 
@@ -35,16 +38,22 @@ struct AttachOptions {
         "Point tracks: an .npz file with the arrays tracks and visibility (CoTracker) or visibles (TAPIR).");
     v.field("tracks_width", tracks_width, "pixels",
             "Width of the tracked images; 0: the width of the capture's images.");
+    v.field(
+        "depth", depth, "",
+        "Depths: an .npz or .npy array T×H×W, a folder of arrays or grey images, or a video. A scale and a "
+        "shift are fitted to the capture's points in each view.");
+    v.field("depth_kind", depth_kind, "",
+            "What the values of --depth are: depth, inverse depth, or what fits the points better.");
     v.field("axes", axes, "", "Axes of the normals; automatic: determined with the capture's points.");
-    v.field("force", force, "", "Replace existing normals, masks and tracks.");
+    v.field("force", force, "", "Replace existing normals, masks, tracks and depths.");
   }
   void validate() const;
 };
 
-// Adds normals, masks and tracks of other programs to a capture of any format: normal/1x/ID.png with 16 bits
-// and the default axes (x right, y up, z to the viewer), mask/1x/ID.png.png, tracks.npy. `say` gets a line
-// for each result. Throws InputError, also if another process is changing the capture, and Stopped; the
-// capture is then unchanged.
+// Adds normals, masks, tracks and depths of other programs to a capture of any format: normal/1x/ID.png with
+// 16 bits and the default axes (x right, y up, z to the viewer), mask/1x/ID.png.png, tracks.npy,
+// depth/1x/ID.npy in the capture's units. `say` gets a line for each result. Throws InputError, also if
+// another process is changing the capture, and Stopped; the capture is then unchanged.
 void attach_priors(const std::filesystem::path& capture, const AttachOptions& options,
                    const std::function<void(const std::string& line)>& say, const std::atomic<bool>& stop);
 

@@ -156,8 +156,8 @@ std::string make_masks(const PrepareOptions& options, const Frames& frames, cons
   int64_t count = 0;
   std::string assumed;
   const auto keep = [&](const Frame& frame, const Tensor<uint8_t>& mask) {
-    require_proportions(options.masks, mask, frame.id, static_cast<double>(frame.width),
-                        static_cast<double>(frame.height));
+    require_proportions(options.masks, "masks", {mask.dim(1), mask.dim(0)}, frame.id,
+                        static_cast<double>(frame.width), static_cast<double>(frame.height));
     write_mask(masks / (frame.id + ".png"), resized_mask(mask, frame.height, frame.width));
     covered += share_of(mask);
     ++count;
@@ -209,11 +209,10 @@ Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_
   return result;
 }
 
-void require_proportions(const std::string& origin, const Tensor<uint8_t>& mask, const std::string& picture,
-                         double width, double height) {
-  const auto mask_width = static_cast<double>(mask.dim(1)), mask_height = static_cast<double>(mask.dim(0));
-  if (same_proportions(mask_width, mask_height, width, height)) return;
-  throw InputError(origin, "masks", fmt::format("{}×{} for {}", mask_width, mask_height, picture),
+void require_proportions(const std::string& origin, const std::string& field, const Vec2<int64_t>& size,
+                         const std::string& picture, double width, double height) {
+  if (same_proportions(static_cast<double>(size.x), static_cast<double>(size.y), width, height)) return;
+  throw InputError(origin, field, fmt::format("{}×{} for {}", size.x, size.y, picture),
                    fmt::format("the proportions of {}×{}", width, height),
                    "turn or cut them as the pictures are");
 }

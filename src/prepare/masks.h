@@ -47,10 +47,10 @@ void write_mask(const std::filesystem::path& path, const Tensor<uint8_t>& mask);
 Tensor<uint8_t> as_mask(const Tensor<uint8_t>& picture);
 // The mask at another size, by nearest pixel.
 Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_t width);
-// Throws InputError if the mask's proportions differ from those of the image with this name and size: it was
-// rotated or cropped.
-void require_proportions(const std::string& origin, const Tensor<uint8_t>& mask, const std::string& picture,
-                         double width, double height);
+// Throws InputError if the proportions of a mask or a depth image, whose size is `size`, differ from those of
+// the image with this name and size: it was rotated or cropped. field: "masks" or "depth".
+void require_proportions(const std::string& origin, const std::string& field, const Vec2<int64_t>& size,
+                         const std::string& picture, double width, double height);
 // Throws InputError for masks that cover nothing: their white may be a darker grey in a film or JPEG files.
 void require_white(const std::string& origin, double covered);
 // The fraction of ones.

@@ -490,7 +490,7 @@ TEST_F(AttachPriors, WithoutFfmpegSaysHowToGetIt) {
 
 TEST_F(AttachPriors, WhatDoesNotFitIsRefusedAndTheCaptureLeftAsItWas) {
   AttachOptions options;
-  EXPECT_THAT(refusal(options), HasSubstr("--normals, --masks or --tracks"));
+  EXPECT_THAT(refusal(options), HasSubstr("--normals, --masks, --tracks or --depth"));
   options.normals = folder_ / "nowhere.npz";
   EXPECT_THAT(refusal(options), HasSubstr("nowhere.npz"));
   Tensor<float> short_array({3, 48, 80, 3});

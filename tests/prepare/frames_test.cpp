@@ -230,9 +230,9 @@ TEST(MatchMasks, OneMaskForTwoFramesIsRefused) {
 }
 
 TEST(Proportions, OfAPictureThatWasTurnedAreRefused) {
-  const Tensor<uint8_t> mask({192, 108});
-  EXPECT_THAT(refusal_of([&] { require_proportions("m", mask, "000003", 1080, 1920); }), "accepted");
-  EXPECT_THAT(refusal_of([&] { require_proportions("m", mask, "000003", 960, 540); }),
+  const Vec2<int64_t> size(108, 192);
+  EXPECT_THAT(refusal_of([&] { require_proportions("m", "masks", size, "000003", 1080, 1920); }), "accepted");
+  EXPECT_THAT(refusal_of([&] { require_proportions("m", "masks", size, "000003", 960, 540); }),
               HasSubstr("m: masks: found 108×192 for 000003, expected the proportions of 960×540"));
 }
 
