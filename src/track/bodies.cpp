@@ -276,9 +276,12 @@ Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>&
   constexpr int64_t most_points = 1500;  // per thing
   std::vector<float> made;
   if (const View* const first = earliest_with_mask(capture)) {
+    const Tensor<float> depth = load_images(capture, *first)->depth_prior;
     for (const Thing& thing : things_in(capture, *first, points, points.dim(0))) {
-      if (!thing.is_bare || !thing.depth_beside) continue;
-      const Tensor<float> surface = inflated(thing.pixels, first->camera, *thing.depth_beside, most_points);
+      if (!thing.is_bare) continue;
+      Tensor<float> surface = at_depths(thing.pixels, first->camera, depth, most_points);
+      if (surface.dim(0) < least_surfels && thing.depth_beside)
+        surface = inflated(thing.pixels, first->camera, *thing.depth_beside, most_points);
       made.insert(made.end(), surface.values().begin(), surface.values().end());
     }
   }

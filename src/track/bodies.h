@@ -20,9 +20,9 @@ inline constexpr float solid_opacity = 0.95F;
 // body away.
 void make_solid(const Motion& motion, Surfels& surfels);
 
-// Points (P×3) of an inflated surface (track/inflation.h) for each part of the earliest mask that shows a
-// thing without points. That is a part with fewer than 24 of `points` (P×3), with points farther away than
-// what is beside it, or with mostly static points.
+// Points (P×3) for each part of the earliest mask that shows a thing without points: at the depths of the
+// view's prior, or of an inflated surface (track/inflation.h) if there is none. That is a part with fewer
+// than 24 of `points` (P×3), with points farther away than what is beside it, or with mostly static points.
 Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>& points);
 
 // One body for each connected part of the earliest mask. A body gets the surfels that project into the part

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "base/parallel.h"
@@ -36,6 +37,22 @@ float distance_to(const std::vector<Vec2<float>>& outline, const Vec2<float>& at
   float nearest2 = std::numeric_limits<float>::infinity();
   for (const Vec2<float>& p : outline) nearest2 = std::min(nearest2, dot(p - at, p - at));
   return std::sqrt(nearest2);
+}
+
+// Every `step`th pixel of every `step`th row, so that about `most` remain.
+std::vector<int64_t> thinned(const std::vector<int64_t>& part, int64_t width, int64_t most) {
+  const auto count = static_cast<double>(part.size());
+  const auto step = static_cast<int64_t>(std::ceil(std::sqrt(count / static_cast<double>(most))));
+  std::vector<int64_t> kept;
+  std::ranges::copy_if(part, std::back_inserter(kept),
+                       [&](int64_t pixel) { return pixel / width % step == 0 && pixel % width % step == 0; });
+  return kept;
+}
+
+Tensor<float> tensor_of_points(const std::vector<Vec3<float>>& points) {
+  Tensor<float> result({static_cast<int64_t>(points.size()), 3});
+  for (size_t k = 0; k < points.size(); ++k) store3(result.row(static_cast<int64_t>(k)), points[k]);
+  return result;
 }
 
 }  // namespace
@@ -80,26 +97,36 @@ std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor
 Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& camera, float depth,
                        int64_t most) {
   const std::vector<Vec2<float>> outline = outline_of(part, camera);
-  const auto count = static_cast<int64_t>(part.size());
+  const auto inwards_at = [&](int64_t pixel) {
+    return outline.empty() ? 0 : distance_to(outline, pixel_centre(pixel, camera.width));
+  };
   std::vector<float> inwards(part.size());
-  parallel_for("inflation", count, [&](int64_t k) {
-    const auto at = static_cast<size_t>(k);
-    inwards[at] = outline.empty() ? 0 : distance_to(outline, pixel_centre(part[at], camera.width));
+  parallel_for("inflation", static_cast<int64_t>(part.size()), [&](int64_t k) {
+    inwards[static_cast<size_t>(k)] = inwards_at(part[static_cast<size_t>(k)]);
   });
   const float radius = *std::max_element(inwards.begin(), inwards.end());
-  // Every `step`th pixel of every `step`th row.
-  const auto step =
-      static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(count) / static_cast<double>(most))));
   std::vector<Vec3<float>> made;
-  for (size_t k = 0; k < part.size(); ++k) {
-    if (part[k] / camera.width % step != 0 || part[k] % camera.width % step != 0) continue;
-    const Vec2<float> at = pixel_centre(part[k], camera.width);
-    const float height = std::sqrt(inwards[k] * (2 * radius - inwards[k])) / camera.focal_x;
+  for (const int64_t pixel : thinned(part, camera.width, most)) {
+    const Vec2<float> at = pixel_centre(pixel, camera.width);
+    const float inside = inwards_at(pixel);
+    const float height = std::sqrt(inside * (2 * radius - inside)) / camera.focal_x;
     made.push_back(camera.position + depth * (1 - height) * camera.ray_in_world(at.x, at.y));
   }
-  Tensor<float> points({static_cast<int64_t>(made.size()), 3});
-  for (size_t k = 0; k < made.size(); ++k) store3(points.row(static_cast<int64_t>(k)), made[k]);
-  return points;
+  return tensor_of_points(made);
+}
+
+Tensor<float> at_depths(const std::vector<int64_t>& part, const Camera<float>& camera,
+                        const Tensor<float>& depth, int64_t most) {
+  std::vector<Vec3<float>> made;
+  if (depth.empty()) return tensor_of_points(made);
+  const std::vector<Vec2<float>> outline = outline_of(part, camera);
+  const float margin = std::max(1.5F, static_cast<float>(camera.width) / 160);
+  for (const int64_t pixel : thinned(part, camera.width, most)) {
+    const Vec2<float> at = pixel_centre(pixel, camera.width);
+    if (depth[pixel] > 0 && distance_to(outline, at) >= margin)
+      made.push_back(camera.position + depth[pixel] * camera.ray_in_world(at.x, at.y));
+  }
+  return tensor_of_points(made);
 }
 
 }  // namespace traceflow

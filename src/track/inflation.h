@@ -22,4 +22,10 @@ std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor
 Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& camera, float depth,
                        int64_t most);
 
+// Points at the known depths (H×W, 0: unknown; may be empty) of the part's pixels, evenly thinned to about
+// `most`. Pixels at the outline are left out, because a prior's depths there are between those of the thing
+// and its background.
+Tensor<float> at_depths(const std::vector<int64_t>& part, const Camera<float>& camera,
+                        const Tensor<float>& depth, int64_t most);
+
 }  // namespace traceflow

@@ -44,6 +44,27 @@ TEST(Inflation, MakesHalfABallOfADisc) {
   }
 }
 
+TEST(AtDepths, PointsLieWhereTheDepthsSay) {
+  const Camera<float> camera = camera_of(90, 120);
+  const std::vector<int64_t> part = disc(camera, {60, 45}, 30);
+  Tensor<float> depth({90, 120});
+  for (int64_t i = 0; i < depth.size(); ++i) depth[i] = 3 + 0.01F * static_cast<float>(i % 120);
+  for (int64_t x = 0; x < 120; ++x) depth(45, x) = 0;
+  const Tensor<float> points = at_depths(part, camera, depth, 100000);
+  ASSERT_GT(points.dim(0), 2000);
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const Vec3<float> p = load3<float>(points.row(i));
+    const Vec2<float> at = camera.project(camera.point_in_camera(p));
+    EXPECT_NEAR(p.z, 3 + 0.01F * std::floor(at.x), 1e-4);
+    EXPECT_LT(length(at - Vec2<float>(60, 45)), 29) << "beside the outline the depth is not the thing's";
+    EXPECT_NE(std::floor(at.y), 45) << "unknown";
+  }
+  const int64_t few = at_depths(part, camera, depth, 400).dim(0);
+  EXPECT_GT(few, 200);
+  EXPECT_LE(few, 400);
+  EXPECT_EQ(at_depths(part, camera, {}, 400).dim(0), 0);
+}
+
 TEST(Inflation, ThePicturesBorderIsNoOutline) {
   const Camera<float> camera = camera_of(90, 120);
   // Half of a disc, cut off by the left border: it is highest there.
