@@ -56,6 +56,14 @@ void add_image_terms(py::module_& module) {
       py::arg("silhouette"), py::arg("mask"),
       "Mean Huber distance. H×W each, in [0, 1]; gradient by the silhouette.");
   module.def(
+      "depth_prior",
+      [](const py::object& depth, const py::object& prior) {
+        return compared(tensor_of_array<float>(depth, "depth", {'H', 'W'}), prior, "prior",
+                        [](auto&&... a) { loss::depth_prior(a...); });
+      },
+      py::arg("depth"), py::arg("prior"),
+      "Mean Huber distance of depth / prior from 1. H×W each, 0: unknown; gradient by the depth.");
+  module.def(
       "distortion",
       [](const py::object& map) {
         const auto values = tensor_of_array<float>(map, "distortion", {'H', 'W'});

@@ -68,6 +68,7 @@ struct FrameGradient {
   Tensor<float> colour;                 // H×W×3
   Tensor<float> normal;                 // H×W×3
   Tensor<float> pseudo_normal;          // H×W×3
+  Tensor<float> depth;                  // H×W
   Tensor<float> distortion;             // H×W
   Tensor<float> alpha;                  // H×W
   Tensor<float> silhouette;             // H×W

@@ -259,6 +259,14 @@ void Renderer::begin_raster_gradient(const FrameRequest& request, const FrameGra
                                      frame_.raster.alpha, options_.depth_ratio, grad_frame.pseudo_normal,
                                      grad_raster_.depth, grad_raster_.median_depth, grad_camera);
   }
+  if (with_geometry && !grad_frame.depth.empty()) {
+    if (faces) {
+      parallel_for(device, "render: add depth gradients", grad_frame.depth.size(),
+                   AddNumbers{grad_frame.depth.data(), grad_raster_.depth.data()});
+    } else {
+      grad_raster_.depth = grad_frame.depth;
+    }
+  }
   if (has_several()) {
     for (Tensor<float>* shaded : {&grad_raster_.colour, &grad_raster_.tint})
       shaded->place(device).resize(none);

@@ -52,6 +52,14 @@ std::span<const LossTerm> loss_terms() {
                             by_tint ? in.frame.raster.tint : nowhere, in.options.normal_prior_on_mirrors,
                             weight, g.frame.normal, slot);
        }},
+      {"depth_prior",
+       [](const LossInputs& in) {
+         return in.target.depth_prior.empty() ? 0 : in.depth_prior_share * in.options.depth_prior;
+       },
+       [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
+         g.frame.depth.reset(in.frame.raster.depth.shape());
+         loss::depth_prior(in.frame.raster.depth, in.target.depth_prior, weight, g.frame.depth, slot);
+       }},
       {"distortion", [](const LossInputs& in) { return double{in.options.distortion}; },
        [](const LossInputs& in, double weight, const LossGradient& g, const loss::MeanSlot& slot) {
          g.frame.distortion.reset(in.frame.raster.distortion.shape());
@@ -130,8 +138,8 @@ void evaluate_objective(const LossInputs& inputs, const LossGradient& gradient, 
   gradient.frame.colour.place(device).reset(frame.colour.shape());
   gradient.frame.silhouette.place(device).reset(frame.raster.silhouette.shape());
   for (Tensor<float>* unused :
-       {&gradient.frame.pseudo_normal, &gradient.frame.alpha, &gradient.frame.distortion,
-        &gradient.frame.main_position, &gradient.frame.environment_residuals})
+       {&gradient.frame.pseudo_normal, &gradient.frame.depth, &gradient.frame.alpha,
+        &gradient.frame.distortion, &gradient.frame.main_position, &gradient.frame.environment_residuals})
     unused->place(device).reset(none);
   gradient.rest.place(device).reset(none);
   const bool has_normals = normal_weight(inputs) > 0 || normal_prior_weight(inputs) > 0;

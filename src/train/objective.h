@@ -31,6 +31,8 @@ struct LossInputs {
   const Neighbours* neighbours = nullptr;
   // What the environment's field adds to each surfel.
   const Tensor<float>* environment_residuals = nullptr;
+  // The share of loss.depth_prior that counts (Schedule::depth_prior_share).
+  double depth_prior_share = 0;
 };
 
 // The gradient of the loss.

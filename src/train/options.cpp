@@ -137,6 +137,8 @@ void LossOptions::validate() const {
   check_share(ssim, "loss.ssim");
   check_not_negative(normal, "loss.normal");
   check_not_negative(normal_prior, "loss.normal_prior");
+  check_not_negative(depth_prior, "loss.depth_prior");
+  check_option(depth_prior_until > 0, "loss.depth_prior_until", depth_prior_until, "a positive number");
   check_not_negative(normal_prior_on_mirrors, "loss.normal_prior_on_mirrors");
   check_not_negative(distortion, "loss.distortion");
   check_not_negative(rigidity, "loss.rigidity");

@@ -123,6 +123,8 @@ struct LossOptions {
   float normal = 0.05F;
   float normal_prior = 0.05F;
   float normal_prior_on_mirrors = 1;
+  float depth_prior = 0;
+  int depth_prior_until = 30000;
   float distortion = 0;
   float rigidity = 0;
   float rigidity_strain = 0.2F;
@@ -142,6 +144,11 @@ struct LossOptions {
     v.field("normal_prior_on_mirrors", normal_prior_on_mirrors, "",
             "Factor on the weight of normal priors where the tint is 1; the factor is 1 where the tint is 0 "
             "and while bodies are tracked (not in the paper).");
+    v.field(
+        "depth_prior", depth_prior, "",
+        "Initial weight of the agreement with the capture's depth priors (method §7.4; not in the paper).");
+    v.field("depth_prior_until", depth_prior_until, "iteration",
+            "The weight of depth priors, which falls linearly, reaches zero.");
     v.field("distortion", distortion, "", "Weight of the depth distortion (method §7.4).");
     v.field("rigidity", rigidity, "",
             "Weight of the loss that keeps the distances between neighbouring main surfels while the field "

@@ -54,6 +54,10 @@ bool Schedule::uses_normal_losses(int iteration) const {
   return iteration >= mark(options_.schedule.normal_from);
 }
 
+double Schedule::depth_prior_share(int iteration) const {
+  return std::max(0.0, 1 - static_cast<double>(iteration) / interval(options_.loss.depth_prior_until));
+}
+
 bool Schedule::uses_lpips(int iteration) const {
   return options_.loss.lpips > 0 && iteration >= mark(options_.loss.lpips_from);
 }

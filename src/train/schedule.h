@@ -31,6 +31,9 @@ class Schedule {
   bool deforms_main(int iteration) const;
   bool deforms_environment(int iteration) const;
   bool uses_normal_losses(int iteration) const;
+  // From 1 at the start linearly to 0 at loss.depth_prior_until: priors guide the shape, and photographs
+  // decide it.
+  double depth_prior_share(int iteration) const;
   bool uses_lpips(int iteration) const;
   // The number along each side of a pixel (RenderOptions).
   int samples(int iteration) const;

@@ -204,6 +204,7 @@ LossValues Trainer::step() {
   const Frame& frame = renderer_.forward(state_.scene, request, true);
   take_unknown(frame.colour, target);
   LossInputs inputs{frame, target, options_.loss, normal_losses(trainable, tracks)};
+  if (trainable.main) inputs.depth_prior_share = schedule_.depth_prior_share(iteration);
   if (schedule_.uses_lpips(iteration)) inputs.perceptual = &*perceptual_;
   if (trainable.main_field && state_.scene.main_field && options_.loss.rigidity > 0 &&
       frame.main.count() > 0) {

@@ -88,7 +88,6 @@ class Graph {
     g.environment = zeros_like<double>(p_.environment);
     g.environment_field = zeros_like<double>(p_.environment_field);
     g.camera = {};
-    grad_.depth.reset(raster_.depth.shape());
     grad_.median_depth.reset(raster_.depth.shape());
     surface::pseudo_normals_backward(p_.camera, raster_.depth, raster_.median_depth, raster_.alpha,
                                      s_.depth_ratio, grad_pseudo_, grad_.depth, grad_.median_depth,
@@ -245,6 +244,9 @@ class Graph {
                                                            grad_.normal, grad_.alpha, grad_pseudo_);
     total += w.normal_prior *
              loss::normal_prior_reference(raster_.normal, s_.prior, {}, 1, w.normal_prior, grad_.normal);
+    grad_.depth.reset(raster_.depth.shape());
+    total += w.depth_prior *
+             loss::depth_prior_reference(raster_.depth, s_.depth_prior, w.depth_prior, grad_.depth);
     const auto pixels = static_cast<double>(raster_.distortion.size());
     grad_.distortion.reset(raster_.distortion.shape());
     grad_.distortion.fill(w.distortion / pixels);

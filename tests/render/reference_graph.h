@@ -28,7 +28,7 @@ struct Gradient {
 };
 
 struct Weights {
-  double l1 = 0.8, ssim = 0.2, normal = 0.3, normal_prior = 0.3, distortion = 0.5;
+  double l1 = 0.8, ssim = 0.2, normal = 0.3, normal_prior = 0.3, depth_prior = 0.4, distortion = 0.5;
 };
 
 // What stays still while parameters move.
@@ -43,6 +43,7 @@ struct Setting {
   bool specular = true;
   Weights weights;
   Tensor<double> target, prior;  // H×W×3
+  Tensor<double> depth_prior;    // H×W
   // Where the fields are evaluated: their inputs enter detached (method §1.2), so central differences hold
   // them still.
   Tensor<double> main_points, environment_points, map_directions;

@@ -97,6 +97,9 @@ FrameGradient frame_gradient(const Frame& frame, const reference::Setting& s) {
   loss::normal_consistency(frame.raster.normal, frame.raster.alpha, frame.pseudo_normal, s.weights.normal,
                            g.normal, g.alpha, g.pseudo_normal);
   loss::normal_prior(frame.raster.normal, prior, s.weights.normal_prior, g.normal);
+  g.depth.place(device).reset(frame.raster.depth.shape());
+  loss::depth_prior(frame.raster.depth, convert<float>(s.depth_prior).on(device), s.weights.depth_prior,
+                    g.depth);
   loss::distortion(frame.raster.distortion, s.weights.distortion, g.distortion);
   return g;
 }
@@ -164,6 +167,8 @@ Case make_case(Graph graph) {
   c.setting.specular = c.request.specular;
   c.setting.target = random_image(random, false);
   c.setting.prior = random_image(random, true);
+  // The wall is 2 away, so that some pixels are in the quadratic part of the loss and some are beyond it.
+  c.setting.depth_prior = random_tensor<double>({height, width}, random, 1.7, 2.3);
   c.setting.main_points = c.parameters.main.position;
   c.setting.environment_points = c.parameters.environment.position;
   if (graph == Graph::reflected_map)

@@ -29,6 +29,11 @@ inline double normal_prior(const Tensor<float>& normal, const Tensor<float>& pri
     normal_prior(normal, prior, tint, on_mirrors, weight, grad_normal, slot);
   });
 }
+inline double depth_prior(const Tensor<float>& depth, const Tensor<float>& prior, double weight,
+                          Tensor<float>& grad_depth) {
+  return value_of(depth.device(),
+                  [&](const MeanSlot& slot) { depth_prior(depth, prior, weight, grad_depth, slot); });
+}
 inline double distortion(const Tensor<float>& map, double weight, Tensor<float>& grad_map) {
   return value_of(map.device(), [&](const MeanSlot& slot) { distortion(map, weight, grad_map, slot); });
 }

@@ -60,6 +60,31 @@ TEST(Objective, TheTotalIsTheWeightedSumOfItsTerms) {
               1e-12);
 }
 
+TEST(Objective, DepthPriorsCountByTheirShare) {
+  Fixture f;
+  Random random(8);
+  f.frame.raster.depth = random_tensor<float>({20, 24}, random, 1, 2);
+  f.options.depth_prior = 0.5F;
+  LossMeans means;
+  FrameGradient gradient;
+  Tensor<float> rest;
+  LossInputs inputs{f.frame, f.target, f.options};
+  const auto evaluated = [&](double share) {
+    inputs.depth_prior_share = share;
+    evaluate_objective(inputs, {gradient, rest}, means);
+    return means.read();
+  };
+  const double without = evaluated(1).total;
+  EXPECT_TRUE(gradient.depth.empty()) << "the capture has none";
+  f.target.depth_prior = random_tensor<float>({20, 24}, random, 1, 2);
+  EXPECT_EQ(evaluated(0).total, without);
+  const LossValues half = evaluated(0.5), whole = evaluated(1);
+  EXPECT_GT(whole["depth_prior"], 0.1);
+  EXPECT_NEAR(whole.total - without, 0.5 * whole["depth_prior"], 1e-9);
+  EXPECT_NEAR(half.total - without, 0.25 * whole["depth_prior"], 1e-9);
+  EXPECT_EQ(gradient.depth.shape(), f.frame.raster.depth.shape());
+}
+
 TEST(Objective, NormalPriorsCountMoreOnMirrors) {
   Fixture f;
   FrameGradient on_mirrors, even, none;

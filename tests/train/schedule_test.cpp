@@ -65,6 +65,17 @@ TEST(Schedule, TheLastTimeIsReachedWhateverTheFirstIs) {
   }
 }
 
+TEST(Schedule, DepthPriorsFadeLinearlyOverTheirShareOfTheRun) {
+  TrainOptions options = paper();
+  options.iterations = options.schedule.length / 100;
+  options.loss.depth_prior_until = 20000;
+  const Schedule schedule(options);
+  EXPECT_EQ(schedule.depth_prior_share(0), 1);
+  EXPECT_DOUBLE_EQ(schedule.depth_prior_share(50), 0.75);
+  EXPECT_EQ(schedule.depth_prior_share(200), 0);
+  EXPECT_EQ(schedule.depth_prior_share(options.iterations), 0);
+}
+
 TEST(Schedule, ThePerceptualTermIsLateAndOffWithoutAWeight) {
   TrainOptions options = paper();
   EXPECT_FALSE(Schedule(options).uses_lpips(59999));

@@ -89,6 +89,15 @@ void silhouette(const Tensor<float>& silhouette, const Tensor<float>& mask, doub
                       MeanOver{count, value.on(silhouette.device())}, block_pixels);
 }
 
+void depth_prior(const Tensor<float>& depth, const Tensor<float>& prior, double weight,
+                 Tensor<float>& grad_depth, const MeanSlot& value) {
+  check_same_shape(depth, prior, grad_depth);
+  const auto count = static_cast<double>(depth.size());
+  const DepthPrior step{depth.data(), prior.data(), static_cast<float>(weight / count), grad_depth.data()};
+  ordered_sum<double>(depth.device(), "loss: depth prior", depth.size(), step,
+                      MeanOver{count, value.on(depth.device())}, block_pixels);
+}
+
 void row_norm(const Tensor<float>& rows, double weight, Tensor<float>& grad_rows, const MeanSlot& value) {
   check_same_shape(rows, rows, grad_rows);
   const auto count = static_cast<double>(rows.dim(0));

@@ -57,6 +57,14 @@ void silhouette(const Tensor<float>& silhouette, const Tensor<float>& mask, doub
 double silhouette_reference(const Tensor<double>& silhouette, const Tensor<double>& mask, double weight,
                             Tensor<double>& grad_silhouette);
 
+// mean H(D/D* − 1) over pixels that have a prior D* and a depth D, with H(x) = x²/0.1 up to |x| = 0.05 and
+// |x| − 0.025 beyond: a prior's edges lie beside the image's, and are wrong by more than its surfaces. The
+// mean divides by H·W, so that priors on half of the pixels weigh half. depth, prior: H×W, camera z, 0: none.
+void depth_prior(const Tensor<float>& depth, const Tensor<float>& prior, double weight,
+                 Tensor<float>& grad_depth, const MeanSlot& value);
+double depth_prior_reference(const Tensor<double>& depth, const Tensor<double>& prior, double weight,
+                             Tensor<double>& grad_depth);
+
 // mean (√(|r|² + ε²) − ε) over rows r, ε = 0.001: how far residuals are from zero. Zero rows remain zero
 // unless the other terms gain more than the weight, so that few rows differ from zero. A row that is not
 // finite counts as zero. rows: N×K.

@@ -12,6 +12,7 @@ template void cuda::sum_each_index<CountedSum>(const char*, int64_t, const loss:
                                                const MeanOverCounted&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::Distortion&, const MeanOver&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::Silhouette&, const MeanOver&);
+template void cuda::sum_each_index<double>(const char*, int64_t, const loss::DepthPrior&, const MeanOver&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::RowNorm&, const MeanOver&);
 template void cuda::sum_each_index<double>(const char*, int64_t, const loss::NormalConsistency<float>&,
                                            const MeanOver&);

@@ -106,22 +106,42 @@ struct Distortion {
   }
 };
 
-struct Silhouette {
-  static constexpr float width = 0.1F;  // of the quadratic part
+// The Huber function x²/(2 width) up to |x| = width, and its derivative.
+struct Huber {
+  float width;
 
+  TRACEFLOW_HD double operator()(float x) const {
+    const float size = std::abs(x);
+    return size < width ? static_cast<double>(x) * x / (2.0 * width)
+                        : static_cast<double>(size) - 0.5 * width;
+  }
+  TRACEFLOW_HD float derivative(float x) const { return std::abs(x) < width ? x / width : sign(x); }
+};
+
+struct Silhouette {
   const float *silhouette, *mask;
   float scale;
   float* gradient;
 
   TRACEFLOW_HD double operator()(int64_t i) const {
+    const Huber huber{0.1F};
     const float x = silhouette[i] - mask[i];
-    const float size = std::abs(x);
-    if (size < width) {
-      gradient[i] += scale * x / width;
-      return static_cast<double>(x) * x / (2.0 * width);
-    }
-    gradient[i] += scale * sign(x);
-    return static_cast<double>(size) - 0.5 * width;
+    gradient[i] += scale * huber.derivative(x);
+    return huber(x);
+  }
+};
+
+struct DepthPrior {
+  const float *depth, *prior;
+  float scale;
+  float* gradient;
+
+  TRACEFLOW_HD double operator()(int64_t i) const {
+    if (!(prior[i] > 0) || depth[i] == 0) return 0;
+    const Huber huber{0.05F};
+    const float x = depth[i] / prior[i] - 1;
+    gradient[i] += scale * huber.derivative(x) / prior[i];
+    return huber(x);
   }
 };
 

@@ -94,6 +94,20 @@ double silhouette_reference(const Tensor<double>& silhouette, const Tensor<doubl
   return count > 0 ? sum / count : 0;
 }
 
+double depth_prior_reference(const Tensor<double>& depth, const Tensor<double>& prior, double weight,
+                             Tensor<double>& grad_depth) {
+  constexpr double width = 0.05;
+  const auto count = static_cast<double>(depth.size());
+  double sum = 0;
+  for (int64_t i = 0; i < depth.size(); ++i) {
+    if (prior[i] == 0 || depth[i] == 0) continue;
+    const double x = (depth[i] - prior[i]) / prior[i];
+    sum += std::abs(x) < width ? x * x / (2 * width) : std::abs(x) - width / 2;
+    grad_depth[i] += weight / count * std::clamp(x / width, -1.0, 1.0) / prior[i];
+  }
+  return count > 0 ? sum / count : 0;
+}
+
 double row_norm_reference(const Tensor<double>& rows, double weight, Tensor<double>& grad_rows) {
   constexpr double soft = 1e-3;
   const auto count = static_cast<double>(rows.dim(0));

@@ -194,6 +194,48 @@ TEST(Silhouette, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
   expect_close(found, expected, 1e-5, "silhouette");
 }
 
+// Away from the bends of the loss, where differences see both sides.
+TEST(DepthPrior, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
+  Random random(5);
+  Tensor<double> prior = random_tensor<double>({6, 7}, random, 0.5, 3);
+  Tensor<double> depth({6, 7});
+  for (int64_t i = 0; i < depth.size(); ++i)
+    depth[i] = prior[i] * (i % 2 == 0 ? 1.03 : random.uniform(1.1, 2));
+  for (int64_t i = 0; i < depth.size(); i += 5) depth[i] = prior[i] * 0.7;
+  Tensor<double> expected({6, 7}), unused({6, 7});
+  const double value = loss::depth_prior_reference(depth, prior, 0.3, expected);
+  expect_close(
+      expected,
+      central_differences(depth, [&] { return 0.3 * loss::depth_prior_reference(depth, prior, 1, unused); }),
+      1e-6, "depth prior");
+  Tensor<float> found({6, 7});
+  EXPECT_NEAR(depth_prior(convert<float>(depth), convert<float>(prior), 0.3, found), value, 1e-6);
+  expect_close(found, expected, 1e-5, "depth prior");
+}
+
+// A scene and its prior scaled alike have the same loss.
+TEST(DepthPrior, IsRelativeAndLeavesOutUnknownDepths) {
+  Random random(6);
+  const Tensor<float> prior = random_tensor<float>({5, 8}, random, 1, 2);
+  Tensor<float> depth = random_tensor<float>({5, 8}, random, 1, 2), gradient({5, 8}), unused({5, 8});
+  const double value = depth_prior(depth, prior, 1, gradient);
+  EXPECT_GT(value, 0.1);
+  const auto times = [](Tensor<float> values, float factor) {
+    for (float& v : values.values()) v *= factor;
+    return values;
+  };
+  EXPECT_NEAR(depth_prior(times(depth, 8), times(prior, 8), 1, unused), value, 1e-6);
+  Tensor<float> nothing({5, 8});
+  Tensor<float> no_prior({5, 8}), no_depth({5, 8});
+  EXPECT_EQ(depth_prior(depth, nothing, 1, no_prior), 0);
+  EXPECT_EQ(depth_prior(nothing, prior, 1, no_depth), 0);
+  for (int64_t i = 0; i < 40; ++i) {
+    EXPECT_NE(gradient[i], 0);
+    EXPECT_EQ(no_prior[i], 0);
+    EXPECT_EQ(no_depth[i], 0);
+  }
+}
+
 TEST(RowNorm, FastAgreesWithReferenceAndReferenceWithCentralDifferences) {
   Random random(6);
   Tensor<double> rows = random_tensor<double>({9, 10}, random, -1, 1);

@@ -68,6 +68,7 @@ std::vector<Result> run(const Pictures& p, Device device) {
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0]); });
   with(1, [&](auto& g) { return normal_prior(normal, unit, 0.05, g[0], p.tint.on(device), 7); });
   with(1, [&](auto& g) { return distortion(image, 3, g[0]); });
+  with(1, [&](auto& g) { return depth_prior(image, target, 3, g[0]); });
   with(0, [&](auto&) { return squared_error(image, target); });
   with(0, [&](auto&) { return squared_error(image, target, p.known.on(device)); });
   with(0, [&](auto&) { return ssim(image, target, {}); });
