@@ -213,6 +213,8 @@ def captures():
     put("capture", "points", b" \n@points.npy\n" + npy("<f4", "(2, 3)", floats(6))
         + b"\n@truth/depth/b.npy\n" + npy("<f4", "(2, 3)", floats(6)))
     put("capture", "prior", b" \n@normal.npz\n" + archive({"normals.npy": npy("<f2", "(1, 2, 3, 3)", bytes(36))}))
+    put("capture", "estimates", b" \n@depth/1x/a.npy\n" + npy("<f4", "(2, 3, 1)", floats(6))
+        + b"\n@tracks.npy\n" + npy("<f4", "(1, 2, 3)", floats(6)))
     put("capture", "photographs", b" \n@rgb/1x/a.png\n" + png(6, 4, 8, 0, [bytes(6)] * 4)
         + b"\n@rgb/1x/b.png\n" + png(3, 2, 8, 6, [bytes(12)] * 2))
 
