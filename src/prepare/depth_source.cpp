@@ -51,6 +51,18 @@ Tensor<float> as_image(const fs::path& path, Tensor<float> values) {
   return values;
 }
 
+// Estimators also write pictures for the eye, whose colours are no measure of depth.
+void require_grey(const fs::path& path, const Tensor<uint16_t>& picture) {
+  constexpr int same = 65535 / 32;
+  if (picture.dim(2) < 3) return;
+  for (int64_t i = 0; i < picture.size(); i += picture.dim(2)) {
+    const auto [least, most] = std::minmax({picture[i], picture[i + 1], picture[i + 2]});
+    if (most - least <= same) continue;
+    throw InputError(path.string(), "colours", "a pixel that is not grey", "depth as grey",
+                     "save depths without a colour map (Depth Anything: --pred-only --grayscale)");
+  }
+}
+
 Tensor<float> first_channel(const Tensor<uint16_t>& picture) {
   constexpr float full = 65535;
   Tensor<float> values({picture.dim(0), picture.dim(1)});
@@ -92,7 +104,9 @@ Tensor<float> DepthSource::read(int64_t index) const {
   if (array_) return as_image(array_->path(), array_->slice(index));
   const fs::path& file = files_[static_cast<size_t>(index)];
   if (is_array(file)) return as_image(file, NpyFile(file, depth_name(file)).read());
-  return first_channel(read_image16(InputFile(file)));
+  const Tensor<uint16_t> picture = read_image16(InputFile(file));
+  require_grey(file, picture);
+  return first_channel(picture);
 }
 
 void DepthSource::take(const std::vector<int64_t>& indices,

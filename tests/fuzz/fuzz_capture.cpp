@@ -203,7 +203,8 @@ void check_pixels(const Capture& capture, const View& view) {
   for (const float v : images->normal_prior.values()) promise(std::isfinite(v), "a prior is finite");
   promise(images->depth_prior.empty() || images->depth_prior.shape() == Shape{height, width},
           "a depth prior has its camera's size");
-  for (const float v : images->depth_prior.values()) promise(std::isfinite(v) && v >= 0, "priors are lengths");
+  for (const float v : images->depth_prior.values())
+    promise(std::isfinite(v) && v >= 0, "priors are lengths");
   const ViewTruth truth = load_truth(capture, view);
   for (const float v : truth.normal.values()) promise(std::isfinite(v), "true normals are finite");
   for (const float v : truth.depth.values()) promise(std::isfinite(v) && v >= 0, "true depths are lengths");

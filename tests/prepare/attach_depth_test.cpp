@@ -150,6 +150,15 @@ TEST_F(AttachDepth, WhatDoesNotFitIsRefused) {
   EXPECT_THAT(refusal_of([&] { attach(folder_ / "turned.npy"); }), HasSubstr("depth: found 48×80"));
   write_npy(folder_ / "short.npy", Tensor<float>({4, 48, 80}));
   EXPECT_THAT(refusal_of([&] { attach(folder_ / "short.npy"); }), HasSubstr("count: found 4"));
+  fs::create_directory(folder_ / "pictures");
+  Tensor<uint8_t> picture({48, 80, 3});
+  for (int i = 0; i < 5; ++i) {
+    for (int64_t k = 0; k < picture.size(); ++k) picture[k] = static_cast<uint8_t>(k / 3 % 250);
+    if (i == 4) picture[30] = 200;
+    write_png(folder_ / "pictures" / (std::to_string(i) + ".png"), picture);
+  }
+  EXPECT_THAT(refusal_of([&] { attach(folder_ / "pictures"); }),
+              AllOf(HasSubstr("4.png: colours"), HasSubstr("--grayscale")));
   fs::create_directory(folder_ / "empty");
   EXPECT_THAT(refusal_of([&] { attach(folder_ / "empty"); }), HasSubstr("neither arrays nor pictures"));
   EXPECT_FALSE(fs::exists(capture() / "depth"));
