@@ -37,6 +37,7 @@ const VisibilityName& visibility_in(const std::filesystem::path& path) {
 // Without dimensions of one before the first `rank` others, or after them.
 std::vector<int64_t> without_batch(const Shape& shape, int rank) {
   std::vector<int64_t> sides;
+  sides.reserve(static_cast<size_t>(shape.rank()));
   for (int i = 0; i < shape.rank(); ++i) sides.push_back(shape[i]);
   if (static_cast<int>(sides.size()) > rank && sides.front() == 1) sides.erase(sides.begin());
   if (static_cast<int>(sides.size()) > rank && sides.back() == 1) sides.pop_back();
