@@ -119,7 +119,7 @@ TEST(Help, ShowsWhatIsTakenElseAndItsUnit) {
 TEST(Help, OfSetSpeaksOfTheVerbsOwnOptions) {
   for (const auto& [verb, words] :
        Values{{"prepare", "Any of these, as in frames=150;"},
-              {"attach-priors", "Any of these, as in tracks_width=0;"},
+              {"attach-priors", "Any of these, as in mask_white=automatic;"},
               {"synth", "Any of these, as in scene=balls;"},
               {"trace", "Any of these, as in t_min=0;"},
               {"render",
