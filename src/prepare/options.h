@@ -36,6 +36,7 @@ struct PrepareOptions {
   int size = 960;
   std::string masks = "estimate";
   MaskWhite mask_white = MaskWhite::automatic;
+  std::string poses = "colmap";
   Matcher matcher = Matcher::automatic;
   int overlap = 10;
   int features = 4096;
@@ -59,6 +60,9 @@ struct PrepareOptions {
             "the moving objects.");
     v.field("mask_white", mask_white, "",
             "What is white in the supplied masks; automatic: determined from the border of the images.");
+    v.field("poses", poses, "",
+            "Where cameras come from: colmap, or an .npz file of MegaSaM with the cameras and depths of the "
+            "frames.");
     v.field("matcher", matcher, "",
             "Pairs of frames to compare: sequential (near in time), exhaustive (all), or automatic "
             "(exhaustive up to 80 frames).");
@@ -75,6 +79,8 @@ struct PrepareOptions {
     v.field("until", until, "", "The last step to run.");
   }
   void validate() const;
+  // Whether a file has the cameras, so that COLMAP is not needed.
+  bool gives_poses() const { return poses != "colmap"; }
 };
 
 }  // namespace traceflow::prepare

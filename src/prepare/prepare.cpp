@@ -13,6 +13,7 @@
 #include "files/options_json.h"
 #include "prepare/capture_folder.h"
 #include "prepare/frames.h"
+#include "prepare/given_poses.h"
 #include "prepare/masks.h"
 #include "prepare/poses.h"
 #include "prepare/programs.h"
@@ -51,6 +52,7 @@ class Preparation {
   void run() {
     for (const fs::path& given : {input_, fs::path(options_.masks), fs::path(options_.test_video)})
       refuse_own_folders(given);
+    if (options_.gives_poses()) open_pose_file();
     for (const Step step :
          {Step::frames, Step::masks, Step::features, Step::matches, Step::poses, Step::capture}) {
       if (step > options_.until) return;
@@ -58,6 +60,8 @@ class Preparation {
       step_ = step;
       run_step(step);
       if (step == Step::frames) frames_ = read_frames(frame_list());
+      // Before the long work on masks.
+      if (step == Step::frames && pose_file_) require_fit(*pose_file_, frames_, pictures());
     }
   }
 
@@ -88,6 +92,17 @@ class Preparation {
     refuse("a part of the capture that this preparation replaces", capture_);
   }
 
+  void open_pose_file() {
+    const fs::path path(options_.poses);
+    if (!fs::is_regular_file(path)) {
+      throw InputError("option", "poses",
+                       options_.poses + (fs::exists(path) ? ", which is no file" : ", which does not exist"),
+                       "colmap, or an .npz file of MegaSaM");
+    }
+    refuse_own_folders(path);
+    pose_file_.emplace(path);
+  }
+
   // Checks before hours of work that the capture's place is free or can be freed, and that no other process
   // does the same work.
   void before_work() {
@@ -100,7 +115,15 @@ class Preparation {
     work_.tell(0, 0);
   }
 
+  // A step that only COLMAP needs.
+  void skip_step(Step step) {
+    steps_.run(
+        step, {{"poses", "of a file"}}, [] { return true; },
+        [] { return "none, since --poses gives the cameras"; });
+  }
+
   void run_step(Step step) {
+    if (pose_file_ && (step == Step::features || step == Step::matches)) return skip_step(step);
     switch (step) {
       case Step::frames:
         return take_frames();
@@ -120,6 +143,11 @@ class Preparation {
             [&] { return fs::exists(poses().matches()); },
             [&] { return match_features(options_, frames_, poses(), work_); });
       case Step::poses:
+        if (pose_file_) {
+          return steps_.run(
+              step, {{"poses", identity_of(options_.poses)}}, [&] { return fs::exists(poses().chosen()); },
+              [&] { return use_given_poses(*pose_file_, frames_, masks(), poses(), work_); });
+        }
         steps_.run(
             step, json::object(), [&] { return fs::exists(poses().chosen()); },
             [&] { return find_poses(options_, frames_, pictures(), poses(), work_); });
@@ -197,6 +225,7 @@ class Preparation {
   std::optional<FolderLock> lock_;
   Steps steps_;
   Frames frames_;
+  std::optional<PoseFile> pose_file_;  // of --poses
 };
 
 }  // namespace
@@ -208,7 +237,7 @@ bool prepare_capture(const fs::path& input, const fs::path& capture, const Prepa
   options.validate();
   if (!fs::exists(input)) throw InputError(input.string(), "", "nothing", "a film or a folder of pictures");
   need_program("ffmpeg");
-  if (options.until > Step::masks) need_program("colmap");
+  if (options.until > Step::masks && !options.gives_poses()) need_program("colmap");
   try {
     Preparation(input, capture, options, callbacks, stop).run();
   } catch (const Stopped&) {
