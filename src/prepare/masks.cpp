@@ -192,6 +192,13 @@ void write_mask(const fs::path& path, const Tensor<uint8_t>& mask) {
   write_png(path, picture);
 }
 
+Tensor<uint8_t> as_mask(const Tensor<uint8_t>& picture) {
+  Tensor<uint8_t> mask({picture.dim(0), picture.dim(1)});
+  const int64_t channels = picture.dim(2);
+  for (int64_t i = 0; i < mask.size(); ++i) mask[i] = picture[i * channels] >= 128 ? 1 : 0;
+  return mask;
+}
+
 Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_t width) {
   if (mask.dim(0) == height && mask.dim(1) == width) return mask;
   Tensor<uint8_t> result({height, width});

@@ -43,6 +43,8 @@ void estimate_masks(const std::vector<std::filesystem::path>& pictures,
 
 // Writes 0 and 1 as black and white.
 void write_mask(const std::filesystem::path& path, const Tensor<uint8_t>& mask);
+// 1 for values from 50 % up, H×W: of a mask that write_mask wrote.
+Tensor<uint8_t> as_mask(const Tensor<uint8_t>& picture);
 // The mask at another size, by nearest pixel.
 Tensor<uint8_t> resized_mask(const Tensor<uint8_t>& mask, int64_t height, int64_t width);
 // Throws InputError if the proportions of a mask or a depth image, whose size is `size`, differ from those of
