@@ -258,6 +258,8 @@ TEST(Options, NonsenseIsRefusedByName) {
   expect_refused("environment_density.prune_above_cloud",
                  [](TrainOptions& o) { o.environment_density.prune_above_cloud = -1; });
   expect_refused("loss.rigidity_strain", [](TrainOptions& o) { o.loss.rigidity_strain = 1e-12F; });
+  expect_refused("loss.depth_prior", [](TrainOptions& o) { o.loss.depth_prior = -1; });
+  expect_refused("loss.depth_prior_until", [](TrainOptions& o) { o.loss.depth_prior_until = 0; });
   expect_refused("loss.normal_prior_on_mirrors",
                  [](TrainOptions& o) { o.loss.normal_prior_on_mirrors = -1; });
   expect_refused("memory_budget", [](TrainOptions& o) { o.memory_budget = int64_t{1} << 43; });
