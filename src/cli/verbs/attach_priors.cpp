@@ -18,8 +18,8 @@ void add_attach_priors(CLI::App& program) {
     std::string capture;
     prepare::AttachOptions options;
   };
-  CLI::App* verb = program.add_subcommand("attach-priors",
-                                          "Add normals, masks and tracks of other programs to a capture.");
+  CLI::App* verb = program.add_subcommand(
+      "attach-priors", "Add normals, masks, tracks and depths of other programs to a capture.");
   const auto a = std::make_shared<Arguments>();
   verb->add_option("-d,--data", a->capture, "The capture's folder")->required()->option_text("CAPTURE");
   const OptionArguments given(*verb, option_fields(a->options));
