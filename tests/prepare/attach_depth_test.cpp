@@ -30,7 +30,7 @@ SynthOptions with_estimates() {
   options.samples = 1;
   options.points = 4000;
   options.test_every = 2;
-  options.estimated_depths = true;
+  options.depths = true;
   return options;
 }
 

@@ -32,7 +32,7 @@ struct SynthOptions {
   int samples = 16;
   int test_every = 4;
   float prior_noise = 1;
-  bool estimated_depths = false;
+  bool depths = false;
   int points = 10000;
 
   template <class Visitor>
@@ -49,7 +49,7 @@ struct SynthOptions {
             "Errors of the normal priors and estimated depths: 0 for exact priors, 1 for the errors of a "
             "monocular estimator.");
     v.field(
-        "estimated_depths", estimated_depths, "",
+        "depths", depths, "",
         "Also write estimates/depth: the training views' depths as an estimator of relative inverse depth "
         "gives them, for attach-priors --depth.");
     v.field("points", points, "points", "Number of surface points at time 0.");

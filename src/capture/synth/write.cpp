@@ -98,7 +98,7 @@ void write_view(const SynthOptions& options, const SynthView& view, const fs::pa
   } else {
     const Tensor<float> prior = synth_normal_prior(options, view, images.normal);
     write_png(folder / "normal/1x" / (view.id + ".png"), normal_picture(prior));
-    if (options.estimated_depths) {
+    if (options.depths) {
       write_png(folder / "estimates/depth" / (view.id + ".png"),
                 depth_picture(synth_inverse_depth(options, view, images.depth)));
     }
@@ -119,7 +119,7 @@ std::vector<NerfiesView> layout_of(const std::vector<SynthView>& views) {
 void write_synthetic_capture(const SynthOptions& options, const fs::path& folder) {
   options.validate();
   prepare_folder(folder);
-  if (options.estimated_depths) fs::create_directories(folder / "estimates/depth");
+  if (options.depths) fs::create_directories(folder / "estimates/depth");
   write_json(folder / marker, as_json(options));
 
   const std::vector<SynthView> views = synth_views(options);
