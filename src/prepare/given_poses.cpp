@@ -94,6 +94,7 @@ std::string use_given_poses(const PoseFile& file, const Frames& frames, const fs
   const Vec2<double> scale =
       file.frame_pixels(static_cast<double>(frame.width), static_cast<double>(frame.height));
   std::vector<Camera<double>> cameras;
+  cameras.reserve(matched.size());
   for (const int64_t index : matched) cameras.push_back(file.camera(index));
 
   // Read the depths of what does not move.

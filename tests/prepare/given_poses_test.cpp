@@ -142,7 +142,7 @@ class GivenPoses : public PrepareTest {
   // White where a frame's pixel or its neighbours show what moves.
   fs::path write_true_masks() const {
     const synth::AnimatedScene scene = synth::make_scene(SynthScene::balls);
-    const fs::path folder = folder_ / "moving";
+    fs::path folder = folder_ / "moving";
     fs::create_directory(folder);
     for (const SynthView& view : views_) {
       const synth::Stage stage = scene.at(view.time);
@@ -156,9 +156,11 @@ class GivenPoses : public PrepareTest {
       std::ofstream grey(file + ".pgm", std::ios::binary);
       grey << "P5\n64 40\n255\n";
       for (int pixel = 0; pixel < 64 * 40; ++pixel) {
+        const int x = pixel % 64, y = pixel / 64;
         bool is_white = false;
-        for (int probe = 0; probe < 25; ++probe)
-          is_white |= moves(pixel % 64 + probe % 5 * 0.5 - 0.5, pixel / 64 + probe / 5 * 0.5 - 0.5);
+        for (const double right : {-0.5, 0.0, 0.5, 1.0, 1.5}) {
+          for (const double down : {-0.5, 0.0, 0.5, 1.0, 1.5}) is_white |= moves(x + right, y + down);
+        }
         grey.put(is_white ? '\xff' : '\0');
       }
     }
