@@ -364,7 +364,7 @@ TEST_F(GivenPoses, IntrinsicsThatAreNoneAreRefused) {
   EXPECT_THAT(with(0, 1, 5), HasSubstr("intrinsic: found other entries than fx, fy, cx and cy"));
 }
 
-// As depths of another unit than the positions, or cameras with other axes.
+// As depths of another unit than the positions.
 TEST_F(GivenPoses, DepthsThatDoNotAgreeAreRefused) {
   const std::string found = refused([](MegaSamFile& file) {
     for (float& value : file.depths.values()) value *= 0.2F;
@@ -372,12 +372,34 @@ TEST_F(GivenPoses, DepthsThatDoNotAgreeAreRefused) {
   EXPECT_THAT(found, AllOf(HasSubstr("depths: found "),
                            HasSubstr("sampled pixels where three frames agree, expected at least 100 and 2%"),
                            HasSubstr("one unit")));
+}
+
+TEST_F(GivenPoses, CamerasOfOtherConventionsAreRefused) {
   const std::string turned = refused([](MegaSamFile& file) {
     for (int64_t i = 0; i < frames; ++i) {
       for (const int64_t entry : {1, 2, 5, 6, 9, 10}) file.cameras[16 * i + entry] *= -1;
     }
   });
-  EXPECT_THAT(turned, HasSubstr("camera axes are x right, y down, z forward"));
+  EXPECT_THAT(turned,
+              AllOf(HasSubstr("cam_c2w: found camera axes x right, y up, z backward, with which three "
+                              "frames agree on "),
+                    HasSubstr("expected matrices from camera to world, camera axes x right, y down")));
+  const std::string inverse = refused([](MegaSamFile& file) {
+    for (int64_t i = 0; i < frames; ++i) {
+      float* const m = file.cameras.row(i);
+      Mat3<double> turn;
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) turn[column][row] = m[4 * row + column];
+      }
+      const Vec3<double> back = -(Vec3<double>(m[3], m[7], m[11]) * turn);
+      for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+          m[4 * row + column] = static_cast<float>(turn[row][column]);
+        m[4 * row + 3] = static_cast<float>(back[row]);
+      }
+    }
+  });
+  EXPECT_THAT(inverse, HasSubstr("cam_c2w: found matrices from world to camera"));
 }
 
 TEST_F(GivenPoses, WhatIsNoFileIsRefusedBeforeAnyWork) {
