@@ -151,17 +151,18 @@ class GivenPoses : public PrepareTest {
             synth::nearest_hit(stage, {view.camera.position, normalize(view.camera.ray_in_world(x, y))});
         return hit && stage.bodies[static_cast<size_t>(hit->body)].object >= 0;
       };
-      const std::string file = folder / fmt::format("{:06}.png", view.frame);
-      write_still(file);
-      std::ofstream grey(file + ".pgm", std::ios::binary);
-      grey << "P5\n64 40\n255\n";
+      const std::string file = fmt::format("{:06}.png", view.frame), hidden = folder / ("." + file);
+      write_still(hidden);
+      std::ofstream(folder / file) << "a picture";
+      std::ofstream colour(hidden + ".ppm", std::ios::binary);
+      colour << "P6\n64 40\n255\n";
       for (int pixel = 0; pixel < 64 * 40; ++pixel) {
         const int x = pixel % 64, y = pixel / 64;
         bool is_white = false;
         for (const double right : {-0.5, 0.0, 0.5, 1.0, 1.5}) {
           for (const double down : {-0.5, 0.0, 0.5, 1.0, 1.5}) is_white |= moves(x + right, y + down);
         }
-        grey.put(is_white ? '\xff' : '\0');
+        for (int channel = 0; channel < 3; ++channel) colour.put(is_white ? '\xff' : '\0');
       }
     }
     return folder;
