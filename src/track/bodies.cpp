@@ -276,10 +276,11 @@ Tensor<float> points_on_bare_things(const Capture& capture, const Tensor<float>&
   constexpr int64_t most_points = 1500;  // per thing
   std::vector<float> made;
   if (const View* const first = earliest_with_mask(capture)) {
-    const Tensor<float> depth = load_images(capture, *first)->depth_prior;
+    const std::shared_ptr<const ViewImages> images = load_images(capture, *first);
     for (const Thing& thing : things_in(capture, *first, points, points.dim(0))) {
       if (!thing.is_bare) continue;
-      Tensor<float> surface = at_depths(thing.pixels, first->camera, depth, most_points);
+      Tensor<float> surface =
+          at_depths(thing.pixels, images->mask, first->camera, images->depth_prior, points, most_points);
       if (surface.dim(0) < least_surfels && thing.depth_beside)
         surface = inflated(thing.pixels, first->camera, *thing.depth_beside, most_points);
       made.insert(made.end(), surface.values().begin(), surface.values().end());

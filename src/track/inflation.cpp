@@ -49,6 +49,53 @@ std::vector<int64_t> thinned(const std::vector<int64_t>& part, int64_t width, in
   return kept;
 }
 
+// The place itself, or, nearer than `margin` to the outline, one at this distance from it: towards the mean
+// of the part's pixels around the place. inside: H×W, 1 for the part's pixels.
+Vec2<float> pushed_inwards(const Tensor<uint8_t>& inside, const std::vector<Vec2<float>>& outline,
+                           const Vec2<float>& at, float margin) {
+  const float distance = outline.empty() ? margin : distance_to(outline, at);
+  if (distance >= margin) return at;
+  const auto radius = static_cast<int64_t>(std::ceil(3 * margin));
+  const auto row = static_cast<int64_t>(at.y), column = static_cast<int64_t>(at.x);
+  Vec2<float> inwards(0);
+  for (int64_t y = std::max<int64_t>(0, row - radius); y <= std::min(inside.dim(0) - 1, row + radius); ++y) {
+    for (int64_t x = std::max<int64_t>(0, column - radius); x <= std::min(inside.dim(1) - 1, column + radius);
+         ++x) {
+      if (inside(y, x) != 0) inwards += pixel_centre(y * inside.dim(1) + x, inside.dim(1)) - at;
+    }
+  }
+  const float size = length(inwards);
+  return size > 0 ? at + ((margin - distance) / size) * inwards : at;
+}
+
+// What the prior's depths are multiplied with so that they fit the points beside the part: a prior's errors
+// vary slowly over the image. Nothing if there are too few points, or the prior has no depth there.
+std::optional<float> scale_beside(const std::vector<int64_t>& part, const Tensor<uint8_t>& mask,
+                                  const Camera<float>& camera, const Tensor<float>& depth,
+                                  const Tensor<float>& points) {
+  constexpr float largest_change = 1.3F;
+  constexpr size_t enough = 8;
+  if (depth.empty()) return std::nullopt;
+  const std::vector<Vec2<float>> outline = outline_of(part, camera);
+  const float farthest = 0.5F * std::sqrt(static_cast<float>(part.size()));
+  std::vector<float> ratios;
+  for (int64_t i = 0; i < points.dim(0); ++i) {
+    const Vec3<float> point = load3<float>(points.row(i));
+    if (!camera.sees(point)) continue;
+    const Vec3<float> in_camera = camera.point_in_camera(point);
+    const Vec2<float> at = camera.project(in_camera);
+    const auto row = static_cast<int64_t>(at.y), column = static_cast<int64_t>(at.x);
+    if (mask(row, column) != 0 || !(depth(row, column) > 0) || distance_to(outline, at) > farthest) continue;
+    // Farther points are hidden, or the prior is of something else.
+    const float ratio = in_camera.z / depth(row, column);
+    if (ratio < largest_change && ratio > 1 / largest_change) ratios.push_back(ratio);
+  }
+  if (ratios.size() < enough) return std::nullopt;
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  return *middle;
+}
+
 Tensor<float> tensor_of_points(const std::vector<Vec3<float>>& points) {
   Tensor<float> result({static_cast<int64_t>(points.size()), 3});
   for (size_t k = 0; k < points.size(); ++k) store3(result.row(static_cast<int64_t>(k)), points[k]);
@@ -115,16 +162,25 @@ Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& ca
   return tensor_of_points(made);
 }
 
-Tensor<float> at_depths(const std::vector<int64_t>& part, const Camera<float>& camera,
-                        const Tensor<float>& depth, int64_t most) {
+Tensor<float> at_depths(const std::vector<int64_t>& part, const Tensor<uint8_t>& mask,
+                        const Camera<float>& camera, const Tensor<float>& depth, const Tensor<float>& points,
+                        int64_t most) {
   std::vector<Vec3<float>> made;
-  if (depth.empty()) return tensor_of_points(made);
+  const std::optional<float> scale = scale_beside(part, mask, camera, depth, points);
+  if (!scale) return tensor_of_points(made);
   const std::vector<Vec2<float>> outline = outline_of(part, camera);
-  const float margin = std::max(1.5F, static_cast<float>(camera.width) / 160);
+  // As wide as the blur of an estimator.
+  const float margin = std::max(2.5F, static_cast<float>(camera.width) / 120);
+  Tensor<uint8_t> inside({camera.height, camera.width});
+  for (const int64_t pixel : part) inside[pixel] = 1;
   for (const int64_t pixel : thinned(part, camera.width, most)) {
     const Vec2<float> at = pixel_centre(pixel, camera.width);
-    if (depth[pixel] > 0 && distance_to(outline, at) >= margin)
-      made.push_back(camera.position + depth[pixel] * camera.ray_in_world(at.x, at.y));
+    const Vec2<float> from = pushed_inwards(inside, outline, at, margin);
+    const auto row = static_cast<int64_t>(std::floor(from.y)),
+               column = static_cast<int64_t>(std::floor(from.x));
+    if (row < 0 || column < 0 || row >= camera.height || column >= camera.width) continue;
+    if (inside(row, column) == 0 || !(depth(row, column) > 0)) continue;
+    made.push_back(camera.position + *scale * depth(row, column) * camera.ray_in_world(at.x, at.y));
   }
   return tensor_of_points(made);
 }

@@ -22,10 +22,12 @@ std::optional<float> depth_beside(const std::vector<int64_t>& part, const Tensor
 Tensor<float> inflated(const std::vector<int64_t>& part, const Camera<float>& camera, float depth,
                        int64_t most);
 
-// Points at the known depths (H×W, 0: unknown; may be empty) of the part's pixels, evenly thinned to about
-// `most`. Pixels at the outline are left out, because a prior's depths there are between those of the thing
-// and its background.
-Tensor<float> at_depths(const std::vector<int64_t>& part, const Camera<float>& camera,
-                        const Tensor<float>& depth, int64_t most);
+// Points at a prior's depths (H×W, 0: unknown; may be empty) of the part's pixels, evenly thinned to about
+// `most`. The depths are scaled to fit the capture's points beside the part, outside all parts of the mask.
+// At the outline a prior's depths are between those of the thing and its background; those farther inside
+// count there. No points if fewer than eight points lie beside the part.
+Tensor<float> at_depths(const std::vector<int64_t>& part, const Tensor<uint8_t>& mask,
+                        const Camera<float>& camera, const Tensor<float>& depth, const Tensor<float>& points,
+                        int64_t most);
 
 }  // namespace traceflow

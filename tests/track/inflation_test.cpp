@@ -44,25 +44,40 @@ TEST(Inflation, MakesHalfABallOfADisc) {
   }
 }
 
-TEST(AtDepths, PointsLieWhereTheDepthsSay) {
+// A ball before a wall, whose depths are a tenth too small, and between the ball's and the wall's at the
+// outline.
+TEST(AtDepths, PointsLieOnTheSurfaceUpToTheOutline) {
   const Camera<float> camera = camera_of(90, 120);
   const std::vector<int64_t> part = disc(camera, {60, 45}, 30);
+  Tensor<uint8_t> mask({90, 120});
+  for (const int64_t pixel : part) mask[pixel] = 1;
+  constexpr float wall = 6, wrong = 0.9F;
+  const auto surface = [](const Vec2<float>& at) {
+    const Vec2<float> off = (at - Vec2<float>(60, 45)) / 30.0F;
+    return 5 - 0.3F * std::sqrt(std::max(0.0F, 1 - dot(off, off)));
+  };
   Tensor<float> depth({90, 120});
-  for (int64_t i = 0; i < depth.size(); ++i) depth[i] = 3 + 0.01F * static_cast<float>(i % 120);
-  for (int64_t x = 0; x < 120; ++x) depth(45, x) = 0;
-  const Tensor<float> points = at_depths(part, camera, depth, 100000);
-  ASSERT_GT(points.dim(0), 2000);
-  for (int64_t i = 0; i < points.dim(0); ++i) {
-    const Vec3<float> p = load3<float>(points.row(i));
-    const Vec2<float> at = camera.project(camera.point_in_camera(p));
-    EXPECT_NEAR(p.z, 3 + 0.01F * std::floor(at.x), 1e-4);
-    EXPECT_LT(length(at - Vec2<float>(60, 45)), 29) << "beside the outline the depth is not the thing's";
-    EXPECT_NE(std::floor(at.y), 45) << "unknown";
+  for (int64_t i = 0; i < depth.size(); ++i) {
+    const Vec2<float> at(static_cast<float>(i % 120) + 0.5F, static_cast<float>(i / 120) + 0.5F);
+    const float off = length(at - Vec2<float>(60, 45));
+    depth[i] = wrong * (mask[i] == 0 ? wall : off > 28.6F ? 0.5F * (wall + surface(at)) : surface(at));
   }
-  const int64_t few = at_depths(part, camera, depth, 400).dim(0);
+  Tensor<float> points({400, 3});
+  for (int64_t i = 0; i < 400; ++i) {
+    const Vec2<float> at(6.0F * static_cast<float>(i % 20) + 1, 4.5F * static_cast<float>(i / 20) + 1);
+    store3(points.row(i), camera.position + wall * camera.ray_in_world(at.x, at.y));
+  }
+  const Tensor<float> made = at_depths(part, mask, camera, depth, points, 100000);
+  EXPECT_EQ(made.dim(0), static_cast<int64_t>(part.size()));
+  for (int64_t i = 0; i < made.dim(0); ++i) {
+    const Vec3<float> p = load3<float>(made.row(i));
+    EXPECT_NEAR(p.z, surface(camera.project(camera.point_in_camera(p))), 0.12F);
+  }
+  const int64_t few = at_depths(part, mask, camera, depth, points, 400).dim(0);
   EXPECT_GT(few, 200);
   EXPECT_LE(few, 400);
-  EXPECT_EQ(at_depths(part, camera, {}, 400).dim(0), 0);
+  EXPECT_EQ(at_depths(part, mask, camera, {}, points, 400).dim(0), 0);
+  EXPECT_EQ(at_depths(part, mask, camera, depth, Tensor<float>({0, 3}), 400).dim(0), 0) << "no scale";
 }
 
 TEST(Inflation, ThePicturesBorderIsNoOutline) {
