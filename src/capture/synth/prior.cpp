@@ -143,8 +143,10 @@ Tensor<float> synth_inverse_depth(const SynthOptions& options, const SynthView& 
     Random random = random_of(synth::combine_bits(static_cast<uint64_t>(options.seed), 0x6465707468), view);
     const SlowWarp slow_warp(random, noise * depth_warp);
     for (int64_t i = 0; i < inverse.size(); ++i) {
-      const auto y = static_cast<double>(i / depth.dim(1)), x = static_cast<double>(i % depth.dim(1));
-      const double error = slow_warp.at(Vec2<double>(x, y) / static_cast<double>(options.width)).x;
+      const int64_t y = i / depth.dim(1), x = i % depth.dim(1);
+      const Vec2<double> position(static_cast<double>(x) / options.width,
+                                  static_cast<double>(y) / options.width);
+      const double error = slow_warp.at(position).x;
       inverse[i] = static_cast<float>(inverse[i] * (1 + error));
     }
   }
