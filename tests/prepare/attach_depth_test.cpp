@@ -6,14 +6,13 @@
 
 #include "base/error.h"
 #include "base/robust.h"
-#include "capture/synth/synth.h"
 #include "files/npy.h"
 #include "files/png.h"
 #include "prepare/attach_priors.h"
+#include "small_capture.h"
 #include "support/file_bytes.h"
 #include "support/refusal.h"
 #include "support/temp_folder.h"
-#include "support/zip_writer.h"
 
 namespace traceflow::prepare {
 namespace {
@@ -23,13 +22,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 SynthOptions with_estimates() {
-  SynthOptions options;
-  options.frames = 5;
-  options.width = 80;
-  options.height = 48;
-  options.samples = 1;
-  options.points = 4000;
-  options.test_every = 2;
+  SynthOptions options = small_capture();
   options.depths = true;
   return options;
 }

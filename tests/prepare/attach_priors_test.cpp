@@ -14,7 +14,6 @@
 #include "base/folder_lock.h"
 #include "base/process.h"
 #include "capture/image_cache.h"
-#include "capture/synth/synth.h"
 #include "files/jpeg.h"
 #include "files/npy.h"
 #include "files/png.h"
@@ -22,6 +21,7 @@
 #include "prepare/masks.h"
 #include "prepare/normal_source.h"
 #include "prepare/picture_source.h"
+#include "small_capture.h"
 #include "support/colmap_writer.h"
 #include "support/file_bytes.h"
 #include "support/refusal.h"
@@ -36,13 +36,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 SynthOptions small() {
-  SynthOptions options;
-  options.frames = 5;
-  options.width = 80;
-  options.height = 48;
-  options.samples = 1;
-  options.points = 4000;
-  options.test_every = 2;
+  SynthOptions options = small_capture();
   options.prior_noise = 0;
   return options;
 }
